@@ -1,0 +1,53 @@
+# Two commands do everything on a fresh machine (Python 3.11+, make, git): `make demo` and `make test`.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: demo demo-11 test test-slow lint type format bench journals clean
+
+$(READY): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+demo: $(READY)  ## 16 robots, no solution, the others fly: out/queens3d-4.html
+	@mkdir -p out
+	$(BIN)/robochoc validate instances/
+	$(BIN)/robochoc solve instances/queens3d-4 --withdraw --html out/queens3d-4.html
+
+demo-11: $(READY)  ## the flagship: 121 robots in 121 processes, planar and full
+	@mkdir -p out
+	@for model in planar full; do \
+		$(BIN)/robochoc generate queens3d --n 11 --model $$model -o out/queens3d-11-$$model --force && \
+		$(BIN)/robochoc solve out/queens3d-11-$$model --html out/queens3d-11-$$model.html || exit $$?; \
+	done
+
+test: $(READY)
+	$(BIN)/pytest -n 2
+
+test-slow: $(READY)
+	$(BIN)/pytest -n 2 -m slow
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+
+type: $(READY)
+	$(BIN)/mypy
+
+format: $(READY)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(READY)  ## figures into benchmarks/RESULTS.md
+	$(BIN)/python benchmarks/run.py
+
+journals: $(READY)  ## rewrite the golden journals: a changed one is a changed protocol
+	$(BIN)/python tests/golden.py
+
+clean:
+	rm -rf $(VENV) out dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,41 @@
+"""Progress of a run: one line on a terminal, silence elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from robochoc.communication.run_result import Progress
+
+REFRESH_S = 0.1
+
+
+@contextmanager
+def progress_line(team: str) -> Iterator[Callable[[Progress], None] | None]:
+    """A function that shows how far the run has come, while it lasts; None where stderr is no terminal.
+
+    Refreshed by calls only: a thread in the background and the forks of a run do not go together.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.live import Live
+    from rich.text import Text
+
+    last = 0.0
+    with Live(console=Console(stderr=True), auto_refresh=False, transient=True) as live:
+
+        def show(progress: Progress) -> None:
+            nonlocal last
+            if time.monotonic() - last < REFRESH_S:
+                return
+            last = time.monotonic()
+            line = f"{team}: {progress.messages:,} messages, {progress.elapsed_s:.1f} s"
+            live.update(Text(line, style="dim"), refresh=True)
+
+        yield show

@@ -1,0 +1,79 @@
+"""An outcome in words, for people."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from robochoc.outcome import Metrics, Outcome, Verdict
+from robochoc.problem import Team, natural
+
+WIDTH = 100
+_CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
+
+
+def report(team: Team, outcome: Outcome) -> str:
+    """The verdict, why, where everybody flies, and what it cost, in a few lines."""
+    lines = [f"{outcome.team}: {_verdict(outcome)}"]
+    if outcome.assignment:
+        lines += _board(team, outcome.assignment) or _list(outcome.assignment)
+    if outcome.withdrawn:
+        lines.append(f"  {len(team.robots) - len(outcome.withdrawn)} robots fly, {len(outcome.withdrawn)} step aside:")
+        lines += _wrapped(outcome.withdrawn)
+    place = (
+        f"{len(team.robots)} processes" if outcome.runtime == "processes" else f"{outcome.runtime}, seed {outcome.seed}"
+    )
+    lines.append(f"  {outcome.protocol}, {place}: {_metrics(outcome.metrics)}")
+    return "\n".join(lines)
+
+
+def _verdict(outcome: Outcome) -> str:
+    proof = f"no solution ({outcome.witness} has derived the empty nogood)" if outcome.witness else "no solution"
+    match outcome.verdict:
+        case Verdict.NO_SOLUTION:
+            return proof
+        case Verdict.UNKNOWN:
+            return "unknown: the time was over before a verdict"
+        case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.withdrawn:
+            return f"{proof} for the whole team; some step aside, checked against every constraint"
+        case Verdict.SOLUTION | Verdict.OPTIMAL:
+            return f"{outcome.verdict}, checked against every constraint"
+
+
+def _metrics(spent: Metrics) -> str:
+    kinds = sorted(spent.messages.items(), key=lambda item: -item[1])
+    types = ", ".join(f"{count:,} {kind}" for kind, count in kinds)
+    return (
+        f"{sum(spent.messages.values()):,} messages ({types or 'none'}), {spent.bytes:,} bytes,"
+        f" {spent.ncccs:,} NCCCs, {spent.checks:,} checks, {spent.wall_s:.2f} s"
+    )
+
+
+def _board(team: Team, assignment: Mapping[str, int]) -> list[str]:
+    """A table of rows and columns, if variables are named for cells (`V3.1`) and the board is not too wide."""
+    cells = {}
+    for name in team.variables:
+        match = _CELL.fullmatch(name)
+        if not match:
+            return []
+        cells[int(match[1]), int(match[2])] = str(assignment.get(name, "-"))
+    rows, columns = sorted({row for row, _ in cells}), sorted({column for _, column in cells})
+    width = 2 + max(len(text) for text in (*cells.values(), str(columns[-1])))
+    if width * len(columns) > WIDTH or len(cells) != len(rows) * len(columns):
+        return []
+    head = "  row\\column" + "".join(f"{column:>{width}}" for column in columns)
+    return [head, *(f"  {row:>10}" + "".join(f"{cells[row, column]:>{width}}" for column in columns) for row in rows)]
+
+
+def _list(assignment: Mapping[str, int]) -> list[str]:
+    return _wrapped([f"{name} = {assignment[name]}" for name in sorted(assignment, key=natural)])
+
+
+def _wrapped(words: tuple[str, ...] | list[str]) -> list[str]:
+    """Words in columns, as many as fit."""
+    width = 2 + max(len(word) for word in words)
+    per_line = max(1, WIDTH // width)
+    return [
+        "    " + "".join(f"{word:<{width}}" for word in words[start : start + per_line]).rstrip()
+        for start in range(0, len(words), per_line)
+    ]

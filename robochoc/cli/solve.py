@@ -1,0 +1,222 @@
+"""`robochoc solve`: teams in, verdicts out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from robochoc.cli.failure import INVALID, LIMIT, LOST, USAGE
+
+if TYPE_CHECKING:
+    from robochoc.observers.journal import Recorder
+    from robochoc.outcome import Outcome
+    from robochoc.problem import Team
+    from robochoc.run import Options
+
+WITHDRAWALS = ("maximal",)
+
+
+class SolveCommand(click.Command):
+    """Lets `--withdraw` stand alone: the word after it is its value only when it is one."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Give a bare `--withdraw` its value."""
+        plain = args.index("--") if "--" in args else len(args)
+        for place, word in enumerate(args[:plain]):
+            if word == "--withdraw" and args[place + 1 : place + 2] not in (
+                [known] for known in (*WITHDRAWALS, "fewest")
+            ):
+                args = [*args[:place], f"--withdraw={WITHDRAWALS[0]}", *args[place + 1 :]]
+        return super().parse_args(ctx, args)
+
+
+@dataclass(frozen=True)
+class Products:
+    """What is made of a run besides what is printed."""
+
+    html: Path | None
+    journal: Path | None
+    serve: bool
+
+    def __bool__(self) -> bool:
+        return bool(self.html or self.journal or self.serve)
+
+
+@click.command(cls=SolveCommand, short_help="Solve teams, each robot in its own process.")
+@click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="PATH ...")
+@click.option("--protocol", default="abt", show_default=True, metavar="NAME", help="What robots speak.")
+@click.option(
+    "--runtime",
+    type=click.Choice(["processes", "simulator"]),
+    default="processes",
+    show_default=True,
+    help="processes: one OS process per robot; simulator: one thread, repeatable.",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the simulator's schedule.")
+@click.option(
+    "--schedule",
+    type=click.Choice(["concurrent", "random"]),
+    default="concurrent",
+    show_default=True,
+    help="Of the simulator: time counted in constraint checks, or any channel next.",
+)
+@click.option(
+    "--delay",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Of the concurrent schedule: a message takes up to so many checks.",
+)
+@click.option(
+    "--timeout",
+    type=click.FloatRange(0, min_open=True),
+    metavar="SECONDS",
+    help="Give up after so long: verdict unknown, exit status 3.",
+)
+@click.option(
+    "--withdraw",
+    type=click.Choice(WITHDRAWALS),
+    metavar="[maximal]",
+    help="When the whole team has no solution, robots that cannot be placed step aside, in priority order.",
+)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a team, and nothing else, on standard output.")
+@click.option(
+    "--html",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write the 3D scene: one page that needs no server.",
+)
+@click.option(
+    "--journal",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write down every message and decision, as JSON lines.",
+)
+@click.option("--serve", is_flag=True, help="Show the 3D scene live on this machine until Ctrl-C.")
+@click.pass_context
+def solve(
+    context: click.Context,
+    paths: tuple[Path, ...],
+    *,
+    as_json: bool,
+    html: Path | None,
+    journal: Path | None,
+    serve: bool,
+    **settings: Any,  # noqa: ANN401 - the options of `robochoc.run.Options`, by their names
+) -> None:
+    """Solve every team at PATH or below: by default each robot in its own OS process.
+
+    Every solution is held against every constraint of every file before it is told.
+    """
+    from robochoc.run import Options, Runtime, ScheduleName, Withdrawal
+
+    withdraw = settings.pop("withdraw")
+    options = Options(
+        runtime=Runtime(settings.pop("runtime")),
+        schedule=ScheduleName(settings.pop("schedule")),
+        withdraw=Withdrawal(withdraw) if withdraw else None,
+        **settings,
+    )
+    folders, statuses = _teams(paths)
+    products = Products(html, journal, serve)
+    if products and len(folders) > 1:
+        raise click.UsageError(f"--html, --journal and --serve are for one team; {len(folders)} were found")
+    for folder in folders:
+        statuses.append(_solve_one(folder, options, products, as_json=as_json))
+    context.exit(next((status for status in (INVALID, USAGE, LOST, LIMIT) if status in statuses), 0))
+
+
+def _teams(paths: tuple[Path, ...]) -> tuple[list[Path], list[int]]:
+    """The teams' folders, and the exit statuses of paths where there is none."""
+    from robochoc.formats import InvalidInput, find_teams
+
+    folders: dict[Path, None] = {}
+    statuses = []
+    for path in paths:
+        try:
+            folders.update(dict.fromkeys(find_teams(path)))
+        except InvalidInput as invalid:
+            click.echo(str(invalid), err=True)
+            statuses.append(INVALID)
+    return list(folders), statuses
+
+
+def _solve_one(folder: Path, options: Options, products: Products, *, as_json: bool) -> int:
+    """Solve the team in `folder`, tell the outcome, and return the exit status."""
+    from robochoc.communication.processes import RobotsLost
+    from robochoc.formats import InvalidInput, read_team
+    from robochoc.registry import UnknownProtocol
+    from robochoc.run import Refuted
+    from robochoc.solver.compiled import Unsupported
+
+    try:
+        team = read_team(folder)
+        outcome = _run(team, options, products)
+    except InvalidInput as invalid:
+        click.echo(str(invalid), err=True)
+        return INVALID
+    except (UnknownProtocol, Unsupported) as refusal:
+        click.echo(f"{folder}: {refusal}", err=True)
+        return USAGE
+    except (RobotsLost, Refuted) as failure:
+        click.echo(f"{folder}: {failure}", err=True)
+        return LOST
+    _tell(team, outcome, as_json=as_json)
+    _show(team, outcome, products, quiet=as_json)
+    return LIMIT if outcome.verdict == "unknown" else 0
+
+
+def _run(team: Team, options: Options, products: Products) -> Outcome:
+    """Run with whatever watches: a journal, a line on the terminal."""
+    from robochoc.cli.progress import progress_line
+    from robochoc.run import solve as run
+
+    if not products.journal:
+        with progress_line(team.name) as progress:
+            return run(team, options, progress=progress)
+    with _journal(team, options, products.journal) as recorder, progress_line(team.name) as progress:
+        outcome = recorder.outcome = run(team, options, observer=recorder, progress=progress)
+        return outcome
+
+
+@contextmanager
+def _journal(team: Team, options: Options, path: Path) -> Iterator[Recorder]:
+    """A recorder whose journal is written at the end, also of a run that breaks off."""
+    from robochoc.formats import write_atomically
+    from robochoc.observers.journal import Header, Recorder
+
+    recorder = Recorder(Header(team=team.name, protocol=options.protocol, runtime=options.runtime, seed=options.seed))
+    try:
+        yield recorder
+    finally:
+        write_atomically(path, recorder.content())
+
+
+def _tell(team: Team, outcome: Outcome, *, as_json: bool) -> None:
+    if as_json:
+        from robochoc.formats.result import result_json
+
+        click.echo(result_json(outcome))
+    else:
+        from robochoc.cli.report import report
+
+        click.echo(report(team, outcome))
+
+
+def _show(team: Team, outcome: Outcome, products: Products, *, quiet: bool) -> None:
+    """Write the page and serve the scene, as asked."""
+    if not (products.html or products.serve):
+        return
+    from robochoc.cli.scene import serve_scene, write_page
+    from robochoc.view.scene import scene_of
+
+    scene = scene_of(outcome, team)
+    if products.html:
+        write_page(scene, products.html, quiet=quiet)
+    if products.serve:
+        serve_scene(scene)

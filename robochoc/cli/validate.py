@@ -1,0 +1,89 @@
+"""`robochoc validate`: every mistake of every file, in one go."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from robochoc.cli.failure import INVALID
+
+if TYPE_CHECKING:
+    from robochoc.formats import InvalidInput
+    from robochoc.problem import Robot
+
+
+@click.command(short_help="Check teams, and tell every mistake with file and line.")
+@click.argument("paths", nargs=-1, type=click.Path(path_type=Path), metavar="[PATH ...]")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a team.")
+@click.pass_context
+def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) -> None:
+    """Check every team at PATH or below (default: instances/), or single robots' files.
+
+    XML, schema, each file's own meaning, and the team as a whole: all mistakes are told at once. Exit status 1 if
+    there are any.
+    """
+    from robochoc.formats import InvalidInput, find_teams
+
+    reports: list[dict[str, Any]] = []
+    for path in paths or (Path("instances"),):
+        try:
+            found = [path] if path.is_file() else find_teams(path)
+        except InvalidInput as invalid:
+            reports.append(_invalid(path, invalid))
+        else:
+            reports.extend(_report(place) for place in found)
+    for report in reports:
+        _print_json(report) if as_json else _print(report)
+    if not all(report["valid"] for report in reports):
+        context.exit(INVALID)
+
+
+def _report(place: Path) -> dict[str, Any]:
+    """The validation of one team, or of one robot's file."""
+    from robochoc.formats import InvalidInput, read_robot, read_team
+
+    try:
+        robots = (read_robot(place),) if place.is_file() else read_team(place).robots
+    except InvalidInput as invalid:
+        return _invalid(place, invalid)
+    return {"path": str(place), "valid": True, **_sizes(robots), "errors": []}
+
+
+def _sizes(robots: tuple[Robot, ...]) -> dict[str, int]:
+    shared = sum(len(robot.private) + len(robot.shared) for robot in robots)
+    parts = sum(len(child.constraints) for robot in robots for child in robot.children)
+    return {
+        "robots": len(robots),
+        "variables": sum(len(robot.variables) for robot in robots),
+        "constraints": shared + parts,
+    }
+
+
+def _invalid(place: Path, invalid: InvalidInput) -> dict[str, Any]:
+    errors = [
+        {"file": one.file, "line": one.line, "message": one.message, "hint": one.hint, "text": str(one)}
+        for one in invalid.diagnostics
+    ]
+    return {"path": str(place), "valid": False, "errors": errors}
+
+
+def _print_json(report: dict[str, Any]) -> None:
+    import msgspec
+
+    click.echo(msgspec.json.encode(report))
+
+
+def _print(report: dict[str, Any]) -> None:
+    if report["valid"]:
+        counts = ", ".join(
+            f"{report[what]} {what if report[what] != 1 else what[:-1]}"
+            for what in ("robots", "variables", "constraints")
+        )
+        click.echo(f"{report['path']}: {counts}: ok")
+        return
+    errors = report["errors"]
+    click.echo(f"{report['path']}: {len(errors)} error{'s' * (len(errors) != 1)}")
+    for error in errors:
+        click.echo(f"  {error['text']}")

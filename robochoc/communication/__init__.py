@@ -1,0 +1,1 @@
+"""Communication Management unit: how envelopes travel, in one thread or between processes."""

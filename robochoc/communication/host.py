@@ -1,0 +1,118 @@
+"""The host: what stands between a protocol, which is pure, and a runtime, which moves envelopes.
+
+It decodes and encodes, stamps envelopes with the clock of non-concurrent constraint checks (NCCC; Meisels et al.
+2002: c = max(c, c of the message), plus one for each check), counts, and reports events to an observer. Every
+runtime uses it, so the same run counts the same everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import msgspec
+
+from robochoc.message import Envelope, Message, encode
+from robochoc.observers.events import Concluded, Decided, Observer, Received, Sent
+from robochoc.outcome import Metrics, Verdict
+from robochoc.protocols.protocol import Protocol
+
+
+class BadMessage(Exception):  # noqa: N818 - named for what arrived
+    """The bytes of an envelope are no message of the protocol."""
+
+
+class Host:
+    """Drives one robot's protocol object."""
+
+    def __init__(self, protocol: Protocol) -> None:
+        self.protocol = protocol
+        self.name = protocol.problem.agent
+        self.clock = 0
+        self.sent: dict[str, int] = {}
+        self.bytes = 0
+        self._decoder = msgspec.msgpack.Decoder(protocol.messages)
+        self._checks = 0
+        self._reported: tuple[int | None, Verdict | None] = (None, None)
+        self._observer: Observer | None = None
+        self._now: Callable[[], float] = lambda: 0.0
+
+    def observe(self, observer: Observer, now: Callable[[], float]) -> None:
+        """From now on tell `observer` of each event, stamped with `now()`."""
+        self._observer = observer
+        self._now = now
+
+    def start(self) -> list[Envelope]:
+        """Begin the search; returns what the robot says first."""
+        return self._step(self.protocol.start)
+
+    def handle(self, packet: Sequence[Envelope]) -> list[Envelope]:
+        """Take in all waiting messages, let the protocol settle, and return what it says.
+
+        Raises `BadMessage` when an envelope's content is no message of the protocol.
+        """
+        for envelope in packet:
+            self._receive(envelope)
+        return self._step(self.protocol.settle)
+
+    def metrics(self) -> Metrics:
+        """What this robot has sent and checked so far; `ncccs` is its own clock."""
+        return Metrics(dict(self.sent), self.bytes, self.clock, self.protocol.problem.checks)
+
+    def _receive(self, envelope: Envelope) -> None:
+        try:
+            message: Message = self._decoder.decode(envelope.content)
+        except msgspec.MsgspecError as error:
+            raise BadMessage(f"{envelope.sender} sent {self.name} what is no message: {error}") from error
+        self.clock = max(self.clock, envelope.clock)
+        self.protocol.receive(envelope.sender, message)
+        self._tick()
+        if self._observer:
+            kind = type(message).__name__
+            self._observer(
+                Received(t=self._now(), sender=envelope.sender, receiver=self.name, type=kind, clock=self.clock)
+            )
+
+    def _step(self, act: Callable[[], None]) -> list[Envelope]:
+        """Let the protocol act, count its checks, and wrap what it has said."""
+        act()
+        self._tick()
+        if self._observer:
+            self._report_state(self._observer)
+        said = [self._wrap(receiver, message) for receiver, message in self.protocol.outbox]
+        self.protocol.outbox.clear()
+        return said
+
+    def _wrap(self, receiver: str, message: Message) -> Envelope:
+        content = encode(message)
+        kind = type(message).__name__
+        self.sent[kind] = self.sent.get(kind, 0) + 1
+        self.bytes += len(content)
+        if self._observer:
+            self._observer(
+                Sent(
+                    t=self._now(),
+                    sender=self.name,
+                    receiver=receiver,
+                    type=kind,
+                    content=msgspec.structs.asdict(message),
+                    bytes=len(content),
+                    clock=self.clock,
+                )
+            )
+        return Envelope(self.name, receiver, content, self.clock)
+
+    def _tick(self) -> None:
+        """Each check done since the last look moves the clock by one."""
+        self.clock += self.protocol.problem.checks - self._checks
+        self._checks = self.protocol.problem.checks
+
+    def _report_state(self, observer: Observer) -> None:
+        """Tell of a value or a verdict that is new since the last report."""
+        state = self.protocol.value, self.protocol.verdict
+        value, verdict = self._reported
+        self._reported = state
+        if state[0] != value:
+            assignment = self.protocol.assignment
+            observer(Decided(t=self._now(), robot=self.name, assignment=assignment, clock=self.clock))
+        if state[1] is not None and state[1] is not verdict:
+            observer(Concluded(t=self._now(), robot=self.name, verdict=str(state[1])))

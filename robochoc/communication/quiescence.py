@@ -1,0 +1,77 @@
+"""Termination detection by four counters (Mattern, "Algorithms for distributed termination detection", 1987).
+
+Every robot counts the protocol messages it has sent and those it has taken in (and finished with). If the sums
+that a first wave collects equal those of a second one, begun after the first had ended, and as many were taken in
+as were sent, then nothing was under way when the second wave began, and nothing ever will be. No timer is part of
+the argument: slow messages only make it wait.
+
+Pure: the runtime carries the waves. As the first wave serves whatever was heard last from each robot, be it a
+report of its own accord or an answer to an earlier wave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+
+class Counts(NamedTuple):
+    """Protocol messages a robot has sent and has taken in so far."""
+
+    sent: int
+    received: int
+
+
+class FourCounters:
+    """What the one who asks keeps: the counters heard last, and the wave under way."""
+
+    def __init__(self, robots: Iterable[str]) -> None:
+        self._latest: dict[str, Counts | None] = dict.fromkeys(robots)
+        self._unheard = len(self._latest)
+        self._total = Counts(0, 0)
+        self._wave = 0
+        self._unanswered: set[str] = set()
+        self._before: Counts | None = None
+        self.quiescent = False
+
+    @property
+    def sent(self) -> int:
+        """Messages sent, as far as heard."""
+        return self._total.sent
+
+    def hear(self, robot: str, counts: Counts) -> None:
+        """Take in counters that `robot` reports of its own accord."""
+        before = self._latest[robot]
+        if before is None:
+            self._unheard -= 1
+            before = Counts(0, 0)
+        self._latest[robot] = counts
+        self._total = Counts(
+            self._total.sent + counts.sent - before.sent, self._total.received + counts.received - before.received
+        )
+
+    @property
+    def due(self) -> bool:
+        """Whether a wave is worth its cost: all have been heard, the sums balance, and none is under way."""
+        return not self._unanswered and not self._unheard and self._total.sent == self._total.received
+
+    def begin_wave(self) -> int:
+        """Open a wave and return its number, to be sent to every robot. Only when none is under way."""
+        self._wave += 1
+        self._unanswered = set(self._latest)
+        self._before = None if self._unheard else self._total
+        return self._wave
+
+    @property
+    def waving(self) -> bool:
+        """Whether a wave is under way."""
+        return bool(self._unanswered)
+
+    def answer(self, robot: str, wave: int, counts: Counts) -> None:
+        """Take in `robot`'s answer to `wave`; the last one settles whether all is quiet."""
+        self.hear(robot, counts)
+        if wave != self._wave:
+            return
+        self._unanswered.discard(robot)
+        if not self._unanswered:
+            self.quiescent = self._total == self._before and self._total.sent == self._total.received

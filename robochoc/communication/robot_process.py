@@ -1,0 +1,286 @@
+"""A robot's own process: its host, its queues to other robots, and its control pipe to the parent.
+
+One loop waits for whatever comes: messages, the parent's orders, room in a pipe that was full, the parent's end.
+All messages that wait when it wakes up are one packet. It ends when it is told to, and at once when the parent is
+gone, however it went.
+"""
+
+from __future__ import annotations
+
+import array
+import multiprocessing
+import os
+import selectors
+import signal
+import socket
+import struct
+import time
+import traceback
+from collections import deque
+from collections.abc import Sequence
+from typing import assert_never
+
+import msgspec
+
+from robochoc.communication.control import (
+    Conclusion,
+    Counters,
+    Events,
+    Failed,
+    FromParent,
+    FromRobot,
+    OpenQueue,
+    QueueFrom,
+    QueueTo,
+    Ready,
+    Report,
+    Start,
+    Stop,
+    Wave,
+)
+from robochoc.communication.host import Host
+from robochoc.communication.queues import READ_BYTES, QueueReader, QueueWriter, unpack
+from robochoc.message import Envelope
+from robochoc.observers.events import AnyEvent
+from robochoc.problem import Robot
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled import Interfaces, LocalProblem, Unsupported
+
+IDLE_S = 0.002
+"""A robot that has heard nothing for so long reports its counters. Only when to ask; never whether it is over."""
+LOWEST_NICE = 19
+EVENTS_AT_ONCE = 500
+FDS_AT_ONCE = 64
+_CLOCK = struct.Struct("!Q")
+
+
+def robot_process(
+    robot: Robot,
+    order: Sequence[str],
+    interfaces: Interfaces,
+    protocol: type[Protocol],
+    control: socket.socket,
+    inherited: Sequence[socket.socket],
+    *,
+    observed: bool,
+) -> None:
+    """What the process of `robot` runs, from its first breath to its report.
+
+    `inherited` are the parent's ends of control pipes that a fork copied: closed here, so that the others see the
+    end of the parent. Ctrl-C reaches the whole process group, and is left to the parent.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    for copy in inherited:
+        copy.close()
+    _take_place(robot.name, order)
+    link = _ControlPipe(control)
+    try:
+        host = Host(protocol(LocalProblem(robot, order, interfaces), PriorityOrder(order)))
+        _RobotLoop(host, link, observed=observed).run()
+    except Unsupported as refusal:
+        link.say(Failed(str(refusal), unsupported=True))
+    except Exception as error:  # noqa: BLE001 - whatever it was, the parent has to know
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        link.say(Failed(f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"))
+    link.finish()
+
+
+def _take_place(name: str, order: Sequence[str]) -> None:
+    """Let the scheduler favour robots that come earlier in the priority order: `nice` from 0 to `LOWEST_NICE`.
+
+    What a robot decides on the basis of an old view is work for nothing, for all below it. On two cores 121 robots
+    need a tenth of the messages this way (docs/design.md, "Processes").
+    """
+    os.nice(LOWEST_NICE * order.index(name) // len(order))
+
+
+class _ControlPipe:
+    """The robot's end of its control pipe: orders, with the queues' ends that come with them, and answers."""
+
+    def __init__(self, control: socket.socket) -> None:
+        self._socket = control
+        self._writer = QueueWriter(control.fileno())
+        self._buffer = bytearray()
+        self._fds: deque[int] = deque()
+        self._encode = msgspec.msgpack.Encoder().encode
+        self._decoder = msgspec.msgpack.Decoder(FromParent)
+        self.ended = False
+
+    def fileno(self) -> int:
+        return self._socket.fileno()
+
+    def say(self, word: FromRobot) -> bool:
+        """Send `word`; False when a part of it has to wait until the pipe is writable."""
+        self._writer.put(self._encode(word))
+        return self._writer.flush()
+
+    def flush(self) -> bool:
+        """Go on with what had to wait; False when something still has to."""
+        return self._writer.flush()
+
+    def orders(self) -> list[FromParent]:
+        """All orders that have come. `ended` tells afterwards whether the parent is gone."""
+        try:
+            chunk, ancillary, _, _ = self._socket.recvmsg(READ_BYTES, socket.CMSG_SPACE(FDS_AT_ONCE * 4))
+        except BlockingIOError:
+            return []
+        except ConnectionResetError:
+            chunk, ancillary = b"", []
+        for _, _, data in ancillary:
+            fds = array.array("i")
+            fds.frombytes(data[: len(data) - len(data) % fds.itemsize])
+            self._fds.extend(fds)
+        self.ended = not chunk
+        self._buffer += chunk
+        return [self._decoder.decode(body) for body in unpack(self._buffer)]
+
+    def take_fd(self) -> int:
+        """The queue's end that came with the order in hand."""
+        return self._fds.popleft()
+
+    def finish(self) -> None:
+        """Send what still waits, and close."""
+        os.set_blocking(self.fileno(), True)
+        self._writer.flush()
+        self._socket.close()
+
+
+class _RobotLoop:
+    """The loop of one robot's process."""
+
+    def __init__(self, host: Host, link: _ControlPipe, *, observed: bool) -> None:
+        self._host = host
+        self._link = link
+        self._began = 0.0
+        self._events: list[AnyEvent] = []
+        if observed:
+            host.observe(self._events.append, self._now)
+        self._readers: list[tuple[str, QueueReader]] = []
+        self._writers: dict[str, QueueWriter] = {}
+        self._sent = self._received = 0
+        self._told: tuple[int, int] | None = None
+        self._concluded = False
+        self._running = True
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(link, selectors.EVENT_READ, self._hear_parent)
+        parent = multiprocessing.parent_process()
+        if parent is not None:
+            self._selector.register(parent.sentinel, selectors.EVENT_READ, self._parent_gone)
+
+    def run(self) -> None:
+        """Confirm, then wait and act until the parent says stop or is gone."""
+        self._say(Ready())
+        while self._running:
+            ready = self._selector.select(self._patience())
+            if not ready:
+                self._report_idle()
+                continue
+            packet: list[Envelope] = []
+            for key, _ in ready:
+                key.data(packet)
+            if packet:
+                self._received += len(packet)
+                self._send(self._host.handle(packet))
+            if len(self._events) > EVENTS_AT_ONCE:
+                self._report_events()
+
+    def _patience(self) -> float | None:
+        """Seconds to wait: for ever, once the parent knows the counters."""
+        return None if self._told in (None, (self._sent, self._received)) else IDLE_S
+
+    def _now(self) -> float:
+        return time.monotonic() - self._began
+
+    # Messages
+
+    def _send(self, envelopes: Sequence[Envelope]) -> None:
+        touched = {}
+        for envelope in envelopes:
+            writer = self._writers.get(envelope.receiver)
+            if writer is None:
+                writer = self._writers[envelope.receiver] = QueueWriter()
+                self._say(OpenQueue(envelope.receiver))
+            writer.put(_CLOCK.pack(envelope.clock) + envelope.content)
+            touched[envelope.receiver] = writer
+        self._sent += len(envelopes)
+        for writer in touched.values():
+            self._flush(writer)
+        verdict = self._host.protocol.verdict
+        if verdict is not None and not self._concluded:
+            self._concluded = True
+            self._say(Conclusion(verdict))
+
+    def _flush(self, writer: QueueWriter) -> None:
+        if writer.flush() or writer.fd is None:
+            return
+        if writer.fd not in self._selector.get_map():
+            self._selector.register(writer.fd, selectors.EVENT_WRITE, lambda _packet: self._flush_later(writer))
+
+    def _flush_later(self, writer: QueueWriter) -> None:
+        if writer.flush() and writer.fd is not None:
+            self._selector.unregister(writer.fd)
+
+    def _read(self, sender: str, reader: QueueReader, packet: list[Envelope]) -> None:
+        for body in reader.get_all():
+            (clock,) = _CLOCK.unpack_from(body)
+            packet.append(Envelope(sender, self._host.name, body[_CLOCK.size :], clock))
+        if reader.ended:  # the sender is gone; what that means is for the parent to say
+            self._selector.unregister(reader.fd)
+            reader.close()
+
+    # The parent
+
+    def _say(self, word: FromRobot) -> None:
+        if not self._link.say(word):
+            self._selector.modify(self._link, selectors.EVENT_READ | selectors.EVENT_WRITE, self._hear_parent)
+
+    def _hear_parent(self, _packet: list[Envelope]) -> None:
+        if self._link.flush():
+            self._selector.modify(self._link, selectors.EVENT_READ, self._hear_parent)
+        for order in self._link.orders():
+            self._obey(order)
+        if self._link.ended:
+            self._running = False
+
+    def _parent_gone(self, _packet: list[Envelope]) -> None:
+        self._running = False
+
+    def _obey(self, order: FromParent) -> None:
+        match order:
+            case Start(began):
+                self._began = began
+                self._told = (-1, -1)
+                self._send(self._host.start())
+            case QueueTo(robot):
+                writer = self._writers[robot]
+                writer.open(self._link.take_fd())
+                self._flush(writer)
+            case QueueFrom(robot):
+                reader = QueueReader(self._link.take_fd())
+                self._selector.register(
+                    reader.fd, selectors.EVENT_READ, lambda packet: self._read(robot, reader, packet)
+                )
+            case Wave(number):
+                self._say_counters(number)
+            case Stop():
+                self._report_events()
+                self._say(Report(self._host.protocol.assignment, self._host.metrics()))
+                self._running = False
+            case never:
+                assert_never(never)
+
+    def _report_idle(self) -> None:
+        self._report_events()
+        self._say_counters(0)
+
+    def _say_counters(self, wave: int) -> None:
+        self._told = (self._sent, self._received)
+        self._say(Counters(wave, *self._told))
+
+    def _report_events(self) -> None:
+        if self._events:
+            self._say(Events(list(self._events)))
+            self._events.clear()

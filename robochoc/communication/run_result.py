@@ -1,0 +1,47 @@
+"""What a runtime reports: while the run goes on, and at its end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import reduce
+from operator import add
+from typing import NamedTuple, Self
+
+from robochoc.outcome import Metrics, Verdict
+
+
+class Progress(NamedTuple):
+    """How far a run has come: messages sent so far, and seconds since its start."""
+
+    messages: int
+    elapsed_s: float
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """How a run ended. `assignments` maps each robot to its variables' values (empty: it has none).
+
+    `witness` is the robot that could tell the verdict alone; None when it follows from quiescence or a limit.
+    """
+
+    verdict: Verdict
+    witness: str | None
+    assignments: dict[str, dict[str, int]]
+    metrics: Metrics
+
+    @classmethod
+    def of(
+        cls,
+        verdict: Verdict,
+        witness: str | None,
+        assignments: Mapping[str, dict[str, int]],
+        parts: Iterable[Metrics],
+        wall_s: float,
+    ) -> Self:
+        """Join the robots' metrics: sums, and for NCCCs the largest of their clocks."""
+        parts = list(parts)
+        total = reduce(add, parts, Metrics())
+        ncccs = max((part.ncccs for part in parts), default=0)
+        metrics = Metrics(total.messages, total.bytes, ncccs, total.checks, wall_s)
+        return cls(verdict, witness, dict(assignments), metrics)

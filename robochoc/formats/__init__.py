@@ -1,0 +1,21 @@
+"""Robots and teams as XML files: reading them with every mistake told, and writing them (FORMAT.md, Figure 2)."""
+
+from robochoc.formats.diagnostics import Diagnostic, InvalidInput
+from robochoc.formats.files import write_atomically
+from robochoc.formats.folder import write_team
+from robochoc.formats.intension import PREDEFINED
+from robochoc.formats.robot import read_robot
+from robochoc.formats.team import find_teams, read_team
+from robochoc.formats.writer import robot_xml
+
+__all__ = [
+    "PREDEFINED",
+    "Diagnostic",
+    "InvalidInput",
+    "find_teams",
+    "read_robot",
+    "read_team",
+    "robot_xml",
+    "write_atomically",
+    "write_team",
+]

@@ -1,0 +1,126 @@
+"""The original platform's files repeat TKC constraints with the parent: both copies must allow the same tuples.
+
+Compared is, for each set of variables, what all constraints on it say together: as they are written, and where that
+differs by trying every tuple.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from itertools import product
+
+from robochoc.expression import Apply, Constant, Expression, Name, Undefined, compiled
+from robochoc.formats.diagnostics import Diagnostic, shortened
+from robochoc.formats.members import Members
+from robochoc.problem import Constraint, Domain, Model, Relation, Robot
+
+MAX_COMPARED = 1_000_000
+"""So many tuples are tried at most to find a difference."""
+
+
+def differing_copies(members: Members, misplaced: Collection[str]) -> Iterator[Diagnostic]:
+    """Copies that the child does not have, or has differently; children whose files are in `misplaced` are left out."""
+    domains = {variable.name: variable.domain for robot in members.robots for variable in robot.variables}
+    for file in members.files.values():
+        for name, copies in file.copies.items():
+            if members.is_parent(file.robot.name, name) and members.files[name].robot.file not in misplaced:
+                yield from _differing(file.robot.file, copies, members.files[name].robot, domains)
+
+
+def _differing(
+    file: str, copies: Iterable[Constraint], child: Robot, domains: Mapping[str, Domain]
+) -> Iterator[Diagnostic]:
+    held = _grouped(constraint for constraint in child.shared if constraint.model is Model.TKC)
+    for variables, group in _grouped(copies).items():
+        what = f"the copy of '{shortened(group[0].name)}' over {shortened(' '.join(variables))}"
+        originals = held.get(variables)
+        if originals is None:
+            message = f"{what}: '{child.name}' has no such constraint"
+            yield Diagnostic(file, group[0].line, message, f"delete the copy, or add the constraint to {child.file}")
+        elif _written(group) != _written(originals):
+            difference = _difference(variables, group, originals, domains)
+            if difference:
+                hint = f"leave the copy out, or make it equal to {child.file}:{originals[0].line}"
+                yield Diagnostic(file, group[0].line, f"{what} {difference}", hint)
+
+
+def _grouped(constraints: Iterable[Constraint]) -> dict[tuple[str, ...], list[Constraint]]:
+    """Constraints by the set of their variables."""
+    groups: dict[tuple[str, ...], list[Constraint]] = {}
+    for constraint in constraints:
+        groups.setdefault(tuple(sorted(constraint.variables)), []).append(constraint)
+    return groups
+
+
+def _written(group: Iterable[Constraint]) -> Counter[Hashable]:
+    """What the constraints say, whatever they and their definitions are called."""
+    written: Counter[Hashable] = Counter()
+    for constraint in group:
+        definition = constraint.definition
+        if isinstance(definition, Relation):
+            tuples = frozenset(zip(definition.tuples, definition.costs or definition.tuples, strict=True))
+            written[definition.semantics, definition.default_cost, constraint.parameters, tuples] += 1
+        else:
+            written[_applied(constraint), constraint.cost] += 1
+    return written
+
+
+def _applied(constraint: Constraint) -> Expression:
+    """The body of a predicate, about the variables and constants it is applied to."""
+    if isinstance(constraint.definition, Relation):
+        raise TypeError("a relation has no body")
+    terms: dict[str, Expression] = {
+        formal: Name(term) if isinstance(term, str) else Constant(term)
+        for formal, term in zip(constraint.definition.parameters, constraint.parameters, strict=True)
+    }
+
+    def replaced(expression: Expression) -> Expression:
+        match expression:
+            case Name(name):
+                return terms[name]
+            case Apply(operator, arguments):
+                return Apply(operator, tuple(map(replaced, arguments)))
+            case Constant():
+                return expression
+
+    return replaced(constraint.definition.body)
+
+
+def _difference(
+    variables: tuple[str, ...],
+    copies: Sequence[Constraint],
+    originals: Sequence[Constraint],
+    domains: Mapping[str, Domain],
+) -> str:
+    """Where the two say different things; empty where they nowhere do."""
+    if any(variable not in domains for variable in variables):
+        return ""  # of a robot whose file is broken
+    size = math.prod(len(domains[variable]) for variable in variables)
+    if size > MAX_COMPARED:
+        return f"is written differently from the child's, and {size} tuples are too many to compare"
+    left = [_price(constraint, variables) for constraint in copies]
+    right = [_price(constraint, variables) for constraint in originals]
+    for values in product(*(domains[variable] for variable in variables)):
+        here, there = sum(price(values) for price in left), sum(price(values) for price in right)
+        if here != there:
+            return f"gives the tuple '{shortened(' '.join(map(str, values)))}' the cost {here}, the child's {there}"
+    return ""
+
+
+def _price(constraint: Constraint, variables: tuple[str, ...]) -> Callable[[tuple[int, ...]], float]:
+    """What values of `variables` pay: `Constraint.price`, made for a million calls."""
+    definition = constraint.definition
+    if isinstance(definition, Relation):
+        slots = [(variables.index(term), 0) if isinstance(term, str) else (-1, term) for term in constraint.parameters]
+        return lambda values: definition.cost([values[slot] if slot >= 0 else constant for slot, constant in slots])
+    holds = compiled(_applied(constraint), variables)
+
+    def price(values: tuple[int, ...]) -> float:
+        try:
+            return 0 if holds(values) else constraint.cost
+        except Undefined:
+            return constraint.cost
+
+    return price

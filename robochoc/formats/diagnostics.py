@@ -1,0 +1,97 @@
+"""What is wrong with an input, where, and what to do about it: a line for each mistake, all of them at once."""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from robochoc.problem import natural
+
+MAX_PER_FILE = 100
+"""So many mistakes of one file are told; who makes more needs no longer list."""
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One mistake: `line` is 0 where no line is to blame, `hint` is the next step."""
+
+    file: str
+    line: int
+    message: str
+    hint: str
+
+    def __str__(self) -> str:
+        place = f"{self.file}:{self.line}" if self.line else self.file
+        return _on_one_line(f"{place}: {self.message} ({self.hint})")
+
+
+class InvalidInput(Exception):  # noqa: N818 - the error is the input's
+    """An input that cannot be used. `diagnostics` holds every mistake found, ordered by file and line."""
+
+    def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
+        self.diagnostics = tuple(sorted(diagnostics, key=_place))
+        super().__init__("\n".join(map(str, self.diagnostics)))
+
+
+class MistakeError(Exception):
+    """A mistake in one element, on its way to the `Report` that knows the file and the line."""
+
+    def __init__(self, message: str, hint: str, line: int = 0) -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+        self.line = line
+
+
+class Report:
+    """The mistakes of one file, collected while it is read."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self._found: list[Diagnostic] = []
+
+    def add(self, line: int, message: str, hint: str) -> None:
+        """Note a mistake. Raises `InvalidInput` when there are so many that reading on is of no use."""
+        if len(self._found) == MAX_PER_FILE:
+            self._found.append(Diagnostic(self.file, line, "and more mistakes from here on", "mend those above first"))
+            raise InvalidInput(self._found)
+        self._found.append(Diagnostic(self.file, line, message, hint))
+
+    @contextmanager
+    def at(self, line: int) -> Iterator[None]:
+        """Note a `MistakeError` raised inside, and go on behind it: the next element may have others."""
+        try:
+            yield
+        except MistakeError as mistake:
+            self.add(mistake.line or line, mistake.message, mistake.hint)
+
+    def finish(self) -> None:
+        """Raise `InvalidInput` when anything was found."""
+        if self._found:
+            raise InvalidInput(self._found)
+
+
+def suggestion(word: str, known: Collection[str], what: str) -> str:
+    """A hint for an unknown name: the known one that looks like it, or all of them; `what` is their plural."""
+    if not known:
+        return f"there are no {what}"
+    close = difflib.get_close_matches(word[:40], list(itertools.islice(known, 100)), n=1)
+    return f"did you mean '{close[0]}'?" if close else f"known {what}: {shortened(' '.join(known))}"
+
+
+def shortened(text: str) -> str:
+    """`text` short enough to stand in a message."""
+    return text if len(text) <= 60 else f"{text[:57]}..."  # noqa: PLR2004 - characters
+
+
+def _place(diagnostic: Diagnostic) -> tuple[object, int]:
+    """The longest paths are 4096 characters; in longer ones `natural` could meet more digits than `int` accepts."""
+    return natural(diagnostic.file[:4096]), diagnostic.line
+
+
+def _on_one_line(text: str) -> str:
+    """No name in an input may break the line, or speak to the terminal."""
+    return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)

@@ -1,0 +1,68 @@
+"""Files that are whole or not there, also when the program is killed while it writes."""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+from pathlib import Path
+
+_NO_UNNAMED = {errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL}
+"""How file systems and kernels say that they know no unnamed files."""
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write `content` to `path`; whoever looks sees the old file or the whole new one.
+
+    It is written beside `path` and then renamed. Where Linux allows it the file has no name until it is complete, so
+    that not even SIGKILL leaves a trace. Devices and pipes (`/dev/stdout`) are written to as they are, symbolic links
+    are followed. Raises `OSError`; nothing is left behind then.
+    """
+    if path.exists() and not path.is_file():
+        path.write_bytes(content)
+        return
+    target = path.resolve()
+    complete = _written_unnamed(target, content) or _written_named(target, content)
+    try:
+        complete.replace(target)
+    except BaseException:
+        complete.unlink(missing_ok=True)
+        raise
+
+
+def _written_unnamed(target: Path, content: bytes) -> Path | None:
+    """The complete file beside `target`, named at the last moment; None where the system cannot do that."""
+    if not hasattr(os, "O_TMPFILE"):
+        return None
+    try:
+        descriptor = os.open(target.parent, os.O_TMPFILE | os.O_WRONLY, 0o666)
+    except OSError as error:
+        if error.errno in _NO_UNNAMED:
+            return None
+        raise
+    with os.fdopen(descriptor, "wb") as file:
+        file.write(content)
+        file.flush()
+        complete = _beside(target)
+        try:
+            # Only with a folder's descriptor does Python ask the kernel to follow the link in /proc.
+            os.link(f"/proc/self/fd/{descriptor}", complete, src_dir_fd=descriptor, follow_symlinks=True)
+        except OSError:
+            return None
+    return complete
+
+
+def _written_named(target: Path, content: bytes) -> Path:
+    complete = _beside(target)
+    try:
+        with complete.open("xb") as file:
+            file.write(content)
+    except BaseException:
+        complete.unlink(missing_ok=True)
+        raise
+    return complete
+
+
+def _beside(target: Path) -> Path:
+    """A hidden name in the same folder that nobody has; short enough whatever `target` is called."""
+    return target.with_name(f".{secrets.token_hex(8)}.part")

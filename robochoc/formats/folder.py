@@ -1,0 +1,53 @@
+"""Writing a team as a folder, whole or not at all."""
+
+from __future__ import annotations
+
+import secrets
+import shutil
+from pathlib import Path
+
+from robochoc.formats.diagnostics import Diagnostic, InvalidInput
+from robochoc.formats.writer import robot_xml
+from robochoc.problem import Team
+
+
+def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
+    """Write one XML file per robot into `folder`, which comes into being complete, or not at all.
+
+    Raises `InvalidInput` when something is there already, unless `replace` is set and it is a team's folder (one
+    that holds nothing but XML files); raises `OSError` when the folder cannot be written.
+    """
+    if folder.exists() or folder.is_symlink():
+        _may_replace(folder, replace=replace)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    new = folder.with_name(f".{folder.name[:100]}.{secrets.token_hex(4)}.new")
+    old = new.with_suffix(".old")
+    try:
+        new.mkdir()
+        for robot in team.robots:
+            (new / f"{robot.name}.xml").write_bytes(robot_xml(robot))
+        if folder.exists():
+            folder.rename(old)
+        new.rename(folder)
+    finally:
+        if old.exists() and not folder.exists():
+            old.rename(folder)
+        for rest in (new, old):
+            shutil.rmtree(rest, ignore_errors=True)
+
+
+def _may_replace(folder: Path, *, replace: bool) -> None:
+    if not replace:
+        raise _refusal(folder, "it exists already", "choose another folder with -o, or replace it with --force")
+    if folder.is_symlink() or not folder.is_dir():
+        raise _refusal(folder, "it is no folder, and is not replaced", "choose another folder with -o")
+    if foreign := sorted(entry.name for entry in folder.iterdir() if entry.suffix != ".xml" or not entry.is_file()):
+        raise _refusal(
+            folder,
+            f"it holds {foreign[0]!r}, which is no robot's file, and is not replaced",
+            "choose another folder with -o, or remove it yourself",
+        )
+
+
+def _refusal(folder: Path, message: str, hint: str) -> InvalidInput:
+    return InvalidInput([Diagnostic(str(folder), 0, message, hint)])

@@ -1,0 +1,85 @@
+"""The JSON result (FORMAT.md, "What comes out"): one object for one team and run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from robochoc.outcome import Metrics, Outcome, Verdict
+
+
+class BadResult(ValueError):  # noqa: N818 - named for what was found
+    """The text is no JSON result."""
+
+
+class _MetricsForm(msgspec.Struct):
+    messages: int
+    bytes: int
+    ncccs: int
+    checks: int
+    wall_s: float
+    messages_by_type: dict[str, int] = {}
+
+
+class _Form(msgspec.Struct):
+    team: str
+    protocol: str
+    runtime: str
+    seed: int
+    verdict: Verdict
+    assignment: dict[str, int]
+    cost: float | int | None
+    withdrawn: list[str]
+    epochs: list[Any]
+    metrics: _MetricsForm
+    verified: bool
+
+
+def result_json(outcome: Outcome) -> bytes:
+    """`outcome` as one line of JSON, without the line's end."""
+    spent = outcome.metrics
+    metrics = _MetricsForm(
+        messages=sum(spent.messages.values()),
+        bytes=spent.bytes,
+        ncccs=spent.ncccs,
+        checks=spent.checks,
+        wall_s=round(spent.wall_s, 6),
+        messages_by_type=dict(sorted(spent.messages.items())),
+    )
+    form = _Form(
+        team=outcome.team,
+        protocol=outcome.protocol,
+        runtime=outcome.runtime,
+        seed=outcome.seed,
+        verdict=outcome.verdict,
+        assignment=outcome.assignment,
+        cost=outcome.cost,
+        withdrawn=list(outcome.withdrawn),
+        epochs=[],
+        metrics=metrics,
+        verified=outcome.verified,
+    )
+    return msgspec.json.encode(form)
+
+
+def read_result(content: bytes) -> Outcome:
+    """The outcome that a JSON result tells of. Raises `BadResult`, saying what is wrong."""
+    try:
+        form = msgspec.json.decode(content, type=_Form)
+    except msgspec.MsgspecError as error:
+        raise BadResult(str(error)) from error
+    spent = form.metrics
+    messages = spent.messages_by_type or {"messages": spent.messages}
+    return Outcome(
+        team=form.team,
+        protocol=form.protocol,
+        runtime=form.runtime,
+        seed=form.seed,
+        verdict=form.verdict,
+        assignment=form.assignment,
+        cost=form.cost,
+        withdrawn=tuple(form.withdrawn),
+        metrics=Metrics(messages, spent.bytes, spent.ncccs, spent.checks, spent.wall_s),
+        verified=form.verified,
+    )

@@ -1,0 +1,222 @@
+"""The third layer: what one robot's file means (FORMAT.md, "One robot"; Figure 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from lxml import etree
+
+from robochoc.formats.constraints import Context, is_name, read_private, read_shared
+from robochoc.formats.diagnostics import Diagnostic, InvalidInput, MistakeError, Report, shortened, suggestion
+from robochoc.formats.extension import check_count, read_domain, read_relation
+from robochoc.formats.intension import PREDEFINED, read_predicate, read_topic
+from robochoc.formats.xml import attribute, line, read_xml
+from robochoc.problem import (
+    Child,
+    Constraint,
+    Domain,
+    Kind,
+    Model,
+    Parent,
+    Predicate,
+    Relation,
+    Robot,
+    Semantics,
+    Topic,
+    Variable,
+)
+
+
+@dataclass(frozen=True)
+class RobotFile:
+    """A robot, and what its file says beyond it: that is the team's to check, and then no longer needed."""
+
+    robot: Robot
+    line: int
+    """Where the file says what kind of problem it is."""
+    copies: Mapping[str, tuple[Constraint, ...]]
+    """By child: the TKC constraints that the original platform's files repeat with the parent."""
+    unsaid: frozenset[str]
+    """The children for which `variable` is left out: what they must be told follows from the scopes."""
+    lines: Mapping[str, int]
+    """Where the robot's variables stand."""
+
+
+def read_robot(path: Path | str) -> Robot:
+    """The robot in the XML file `path`, named after the file's stem.
+
+    Its neighbours are not looked at: `read_team` does that. Raises `InvalidInput` with all mistakes of the file.
+    """
+    return read_robot_file(Path(path)).robot
+
+
+def read_robot_file(path: Path) -> RobotFile:
+    """The robot in the XML file `path`, with what the team has to check. Raises `InvalidInput`."""
+    if not is_name(path.stem):
+        message = f"'{shortened(path.stem)}' cannot be a robot's name"
+        hint = "rename the file: a letter, then letters, digits, '.' and '_'"
+        raise InvalidInput([Diagnostic(str(path), 0, message, hint)])
+    return _Reader(path, read_xml(path, "instance")).whole()
+
+
+class _Reader:
+    """Walks through one `instance`, which the schema has found valid; every mistake goes into one report."""
+
+    def __init__(self, path: Path, instance: etree._Element) -> None:
+        self._name = path.stem
+        self._instance = instance
+        self._report = Report(str(path))
+        self._own: dict[str, int] = {}
+
+    def whole(self) -> RobotFile:
+        presentation = next(self._instance.iterchildren("presentation"))
+        kind = Kind(attribute(presentation, "type"))
+        variables = self._variables(self._domains())
+        topics = self._topics()
+        model = attribute(presentation, "constraintModel")
+        context = Context(kind, Model(model) if model else None, self._own, self._definitions(kind))
+        private = self._constraints(self._instance, context, read_private)
+        copies: dict[str, tuple[Constraint, ...]] = {}
+        parents = tuple(self._parents(context))
+        children = tuple(self._children(context, copies))
+        self._check_neighbours(parents, children)
+        self._report.finish()
+        robot = Robot(self._name, variables, kind, private, parents, children, topics, self._report.file)
+        unsaid = frozenset(
+            attribute(agent, "name") for agent in self._agents("agents_children") if agent.get("variable") is None
+        )
+        return RobotFile(robot, line(presentation), copies, unsaid, self._own)
+
+    def _elements(self, section: str, tag: str, count: str) -> Iterator[etree._Element]:
+        """The elements of a section of the instance, whose count is checked."""
+        for container in self._instance.iterchildren(section):
+            with self._report.at(line(container)):
+                check_count(container, count, len(container))
+            yield from container.iterchildren(tag)
+
+    def _domains(self) -> dict[str, Domain | None]:
+        domains: dict[str, Domain | None] = {}
+        for element in self._elements("domains", "domain", "nbDomains"):
+            with self._report.at(line(element)):
+                self._check_unique("domain", attribute(element, "name"), domains)
+                domains[attribute(element, "name")] = None
+                domains[attribute(element, "name")] = read_domain(element)
+        return domains
+
+    def _variables(self, domains: Mapping[str, Domain | None]) -> tuple[Variable, ...]:
+        variables = []
+        for element in self._elements("variables", "variable", "nbVariables"):
+            name, domain = attribute(element, "name"), attribute(element, "domain")
+            with self._report.at(line(element)):
+                self._check_unique("variable", name, self._own)
+                self._own[name] = line(element)
+                if domain not in domains:
+                    raise MistakeError(f"unknown domain '{shortened(domain)}'", suggestion(domain, domains, "domains"))
+                values = domains[domain]
+                if values:
+                    variables.append(Variable(name, values))
+        if not self._own:
+            element = next(self._instance.iterchildren("variables"))
+            self._report.add(line(element), "the robot has no variable", 'add <variable name="V1.1" domain="D1"/>')
+            self._report.finish()  # whatever else is wrong may follow from it
+        return tuple(variables)
+
+    def _topics(self) -> tuple[Topic, ...]:
+        topics: dict[str, Topic] = {}
+        for element in self._elements("topics", "topic", "nbTopics"):
+            with self._report.at(line(element)):
+                topic = read_topic(element, self._own)
+                self._check_unique("topic", topic.name, topics)
+                topics[topic.name] = topic
+        return tuple(topics.values())
+
+    def _definitions(self, kind: Kind) -> dict[str, Relation | Predicate | None]:
+        definitions: dict[str, Relation | Predicate | None] = {}
+        for element in self._elements("relations", "relation", "nbRelations"):
+            self._define(element, read_relation, definitions)
+            if attribute(element, "semantics") == Semantics.SOFT and kind is not Kind.DISWCSP:
+                hint = 'write type="DisWCSP" in the presentation, or semantics="supports" or "conflicts"'
+                self._report.add(line(element), "a soft relation in a DisCSP", hint)
+        for element in self._elements("predicates", "predicate", "nbPredicates"):
+            self._define(element, read_predicate, definitions)
+        return definitions
+
+    def _define(
+        self,
+        element: etree._Element,
+        read: Callable[[etree._Element], Relation | Predicate],
+        definitions: dict[str, Relation | Predicate | None],
+    ) -> None:
+        name = attribute(element, "name")
+        with self._report.at(line(element)):
+            self._check_unique("definition", name, definitions)
+            definitions[name] = None
+            if name in PREDEFINED:
+                raise MistakeError(f"'{name}' is a predefined predicate", "give your own another name")
+            definitions[name] = read(element)
+
+    def _constraints(
+        self,
+        holder: etree._Element,
+        context: Context,
+        read: Callable[[etree._Element, Context], Constraint | None],
+    ) -> tuple[Constraint, ...]:
+        constraints = []
+        for container in holder.iterchildren("constraints"):
+            with self._report.at(line(container)):
+                check_count(container, "nbConstraints", len(container))
+            for element in container:
+                with self._report.at(line(element)):
+                    constraint = read(element, context)
+                    if constraint:
+                        constraints.append(constraint)
+        return tuple(constraints)
+
+    def _agents(self, side: str) -> Iterator[etree._Element]:
+        return self._instance.iterfind(f"agents_neighbours/{side}/agent")
+
+    def _parents(self, context: Context) -> Iterator[Parent]:
+        for agent in self._agents("agents_parent"):
+            yield Parent(attribute(agent, "name"), self._constraints(agent, context, read_shared), line(agent))
+
+    def _children(self, context: Context, copies: dict[str, tuple[Constraint, ...]]) -> Iterator[Child]:
+        """The children, with this robot's part of PKCs only; what it repeats of TKCs goes into `copies`."""
+        for agent in self._agents("agents_children"):
+            name = attribute(agent, "name")
+            held = self._constraints(agent, context, read_shared)
+            parts = tuple(constraint for constraint in held if constraint.model is Model.PKC)
+            repeated = tuple(constraint for constraint in held if constraint.model is Model.TKC)
+            if repeated:
+                copies[name] = repeated
+            scopes = {variable for constraint in held for variable in constraint.variables}
+            told = tuple(variable for variable in self._own if variable in scopes)
+            if agent.get("variable") is not None:
+                told = tuple((agent.get("variable") or "").split())
+                with self._report.at(line(agent)):
+                    self._check_told(told)
+            yield Child(name, told, parts, line(agent))
+
+    def _check_told(self, told: tuple[str, ...]) -> None:
+        for index, variable in enumerate(told):
+            if variable not in self._own:
+                hint = suggestion(variable, self._own, "own variables")
+                raise MistakeError(
+                    f"the child is to be told '{shortened(variable)}', which is not the robot's own", hint
+                )
+            if variable in told[:index]:
+                raise MistakeError(f"the child is to be told '{shortened(variable)}' twice", "name it once")
+
+    def _check_neighbours(self, parents: tuple[Parent, ...], children: tuple[Child, ...]) -> None:
+        seen: dict[str, str] = {self._name: "the robot itself"}
+        for role, neighbours in (("parent", parents), ("child", children)):
+            for neighbour in neighbours:
+                if neighbour.name in seen:
+                    message = f"the {role} '{shortened(neighbour.name)}' is {seen[neighbour.name]}"
+                    self._report.add(neighbour.line, message, "list every neighbour once, as parent or as child")
+                seen.setdefault(neighbour.name, f"listed as {role} already")
+
+    def _check_unique(self, what: str, name: str, known: Mapping[str, object]) -> None:
+        if name in known:
+            raise MistakeError(f"a second {what} '{shortened(name)}'", "names are unique in a file: rename one of them")

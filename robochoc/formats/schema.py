@@ -1,0 +1,111 @@
+"""The second layer: the XSD schemas, and libxml2's messages in plain words."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Protocol, cast
+
+from lxml import etree
+
+from robochoc.formats.diagnostics import Report, shortened
+
+_SCHEMAS = {"instance": "robot.xsd", "scenario": "scenario.xsd"}
+_OPTIONAL = {"topics", "relations", "predicates", "constraints"}
+"""Of the elements that libxml2 offers where one is missing, those that need not be there."""
+
+_PARTS = (
+    re.compile(r"Element '(?P<element>[^']*)'(?:, attribute '(?P<attribute>[^']*)')?: "),
+    re.compile(r"The attribute '(?P<missing>[^']*)' is required but missing"),
+    re.compile(
+        r"(?s)The value '(?P<value>.*)' is not (?:an element of the set|accepted by the pattern) (?P<rule>.*)\.$"
+    ),
+    re.compile(r"Expected is (?:one of )?\( (?P<expected>.*) \)\.$"),
+)
+"""What libxml2's messages are made of."""
+
+_PHRASES = (
+    ("[duplicate]", "a second <{element}>", "it may stand once: put the two together"),
+    ("This element is not expected. Expected", "<{element}> does not belong in <{parent}>", "expected {expected}"),
+    ("This element is not expected", "<{element}> does not belong in <{parent}>", "mend its spelling or delete it"),
+    ("Missing child element", "<{element}> lacks {lacking}", "add it, even if it is empty"),
+    ("is required but missing", "<{element}> lacks its attribute '{missing}'", 'write <{element} {missing}="...">'),
+    ("' is not allowed.", "<{element}> has no attribute '{attribute}'", "mend its spelling or delete it"),
+    ("[facet", '{attribute}="{value}" in <{element}> is not allowed', "expected {rule}"),
+    ("Element content is not allowed", "an element inside <{element}>, which holds text only", "delete it"),
+    ("Character content", "text inside <{element}>, where none belongs", "delete it"),
+    ("", "{message}", "see the schemas in xsd/"),
+)
+"""What each kind of message says in plain words, and the next step; the first that fits."""
+
+_PATTERNS = {
+    "'[A-Za-z][A-Za-z0-9_.]*'": "a name: a letter, then letters, digits, '.' and '_'",
+    r"'\S+'": "a name without blanks",
+    "'[0-9]{1,18}'": "a number of at most 18 digits, 0 or more",
+    r"'[+\-]?[0-9]{1,18}'": "an integer of at most 18 digits",
+    "'solved|[0-9]{1,18} messages'": "'solved', or a number and 'messages': 200 messages",
+}
+
+
+class LogEntry(Protocol):
+    """One of libxml2's messages."""
+
+    line: int
+    message: str
+    path: str | None
+    type: int
+
+
+def entries(error_log: object) -> list[LogEntry]:
+    """The messages in an lxml `error_log`, which the stubs leave opaque."""
+    return list(cast("Iterable[LogEntry]", error_log))
+
+
+def check_schema(tree: etree._Element, file: str, root: str) -> None:
+    """Raise `InvalidInput` unless `tree`, read from `file`, is valid by the schema for `root` elements."""
+    schema = _schema(_SCHEMAS[root])
+    if schema.validate(tree):
+        return
+    report = Report(file)
+    unknown: dict[str | None, list[str]] = {}
+    for entry in entries(schema.error_log):
+        parts = _parts(entry)
+        if difflib.get_close_matches(parts["missing"], unknown.get(entry.path, [])):
+            continue  # one slip of the pen is one mistake: `typ` is unknown, and so `type` is missing
+        if parts["attribute"]:
+            unknown.setdefault(entry.path, []).append(parts["attribute"])
+        message, hint = next(phrase for sign, *phrase in _PHRASES if sign in parts["message"])
+        report.add(entry.line, message.format_map(parts), hint.format_map(parts))
+    report.finish()
+
+
+@cache
+def _schema(name: str) -> etree.XMLSchema:
+    """Compiled once, when the first file is read. Schemas lie in the wheel's package, or at the checkout's top."""
+    here = Path(__file__).resolve()
+    inside, outside = here.parents[1] / "xsd" / name, here.parents[2] / "xsd" / name
+    return etree.XMLSchema(file=str(inside if inside.is_file() else outside))
+
+
+def _parts(entry: LogEntry) -> dict[str, str]:
+    """The parts of one message, by the names that the phrases use."""
+    parts = dict.fromkeys(("element", "attribute", "missing", "value", "rule", "expected"), "")
+    for part in _PARTS:
+        found = part.search(entry.message)
+        parts |= {name: text or "" for name, text in found.groupdict().items()} if found else {}
+    children = parts["expected"].split(", ")
+    path = entry.path or ""
+    again = parts["element"] not in children and re.search(r"\[(?!1\])\d+\]$", path)
+    required = [name for name in children if name not in _OPTIONAL] or children
+    return {
+        **parts,
+        "message": f"[duplicate] {entry.message}" if again and "not expected" in entry.message else entry.message,
+        "parent": re.sub(r"\[\d+\]", "", path).rpartition("/")[0].rpartition("/")[2],
+        "value": shortened(parts["value"]),
+        "rule": _PATTERNS.get(parts["rule"], f"one of {parts['rule'].strip('{}')}"),
+        "expected": " or ".join(f"<{name}>" for name in children),
+        "lacking": " and ".join(f"<{name}>" for name in required),
+    }

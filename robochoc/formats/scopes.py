@@ -1,0 +1,84 @@
+"""Shared constraints and the robots of their scopes (FORMAT.md, "One robot" on n-ary constraints, and "The team")."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from robochoc.formats.diagnostics import Diagnostic, shortened, suggestion
+from robochoc.formats.members import Members
+from robochoc.problem import Constraint, Model, Parent, Robot
+
+
+def misplaced(members: Members) -> Iterator[Diagnostic]:
+    """Constraints with parents whose scopes do not fit the place where they stand."""
+    for robot in members.robots:
+        if members.has_all_parents(robot.name):
+            for parent in robot.parents:
+                for constraint in parent.constraints:
+                    mistake = _foreign(members, robot, parent, constraint) or _place(members, robot, parent, constraint)
+                    if mistake:
+                        yield Diagnostic(robot.file, constraint.line, *mistake)
+
+
+def _foreign(members: Members, robot: Robot, parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
+    """A variable in the scope that is no parent's, if there is one."""
+    for name in constraint.variables:
+        owners = members.owners.get(name, [])
+        if not owners and not members.broken:
+            known = members.files[parent.name].lines
+            hint = f"{suggestion(name, known, 'variables')} ({members.place(parent.name)})"
+            return f"no robot has the variable '{shortened(name)}'", hint
+        if len(owners) == 1 and owners[0] not in {robot.name, *members.agreed[robot.name]}:
+            message = f"the variable '{name}' belongs to '{owners[0]}', which is no parent of '{robot.name}'"
+            hint = "a constraint stands with the lowest robot of its scope, and the others are parents of that"
+            return message, f"{hint} ({members.place(owners[0], name)})"
+    return None
+
+
+def _place(members: Members, robot: Robot, parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
+    """Why the constraint should not stand under `parent`, if so."""
+    found = [members.owners.get(name, []) for name in constraint.variables]
+    if any(len(owners) != 1 for owners in found):
+        return None  # the mistake is another one, and told elsewhere
+    others = {owners[0] for owners in found} - {robot.name}
+    if parent.name not in others:
+        message = f"the scope has no variable of the parent '{parent.name}', under which it stands"
+        return message, f"move it to '{min(others)}'; '{parent.name}' is {members.place(parent.name)}"
+    if constraint.model is Model.PKC and len(others) > 1:
+        message = "a PKC constraint over more than two robots"
+        return message, f"only '{robot.name}' and '{parent.name}' ({members.place(parent.name)}) can share its parts"
+    if members.rank:
+        lowest = max(others, key=members.rank.__getitem__)
+        if lowest != parent.name:
+            message = f"the constraint stands under '{parent.name}', the lowest parent of its scope is '{lowest}'"
+            return message, f"move it to '{lowest}' ({members.place(lowest)})"
+    return None
+
+
+def misplaced_parts(members: Members) -> Iterator[Diagnostic]:
+    """Parents' parts of PKC constraints over variables that are neither the parent's nor the child's."""
+    for robot in members.robots:
+        for child in robot.children:
+            if members.is_parent(robot.name, child.name):
+                known = {**members.files[robot.name].lines, **members.files[child.name].lines}
+                for part in child.constraints:
+                    for variable in part.variables:
+                        if variable not in known:
+                            message = f"'{shortened(variable)}' is no variable of '{robot.name}' or '{child.name}'"
+                            hint = f"{suggestion(variable, known, 'variables')} ({members.place(child.name)})"
+                            yield Diagnostic(robot.file, part.line, message, hint)
+                            break
+
+
+def untold(members: Members) -> Iterator[Diagnostic]:
+    """Variables that a child's constraints need, and that its parent's file does not name for it."""
+    for robot in members.robots:
+        for child in robot.children:
+            if members.is_parent(robot.name, child.name) and child.name not in members.files[robot.name].unsaid:
+                needed = members.needed(robot.name, child.name)
+                lacking = [name for name in needed if name not in child.variables]
+                if lacking:
+                    message = f"the child '{child.name}' must also be told {' '.join(lacking)}"
+                    where = f"{members.files[child.name].robot.file}:{needed[lacking[0]]}"
+                    hint = f'write variable="{" ".join([*child.variables, *lacking])}", as {where} needs it'
+                    yield Diagnostic(robot.file, child.line, message, hint)

@@ -1,0 +1,120 @@
+"""A folder of robots as a team: finding it, reading it, and the fourth layer's verdict on the whole."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from robochoc.formats.copies import differing_copies
+from robochoc.formats.diagnostics import Diagnostic, InvalidInput
+from robochoc.formats.members import Members
+from robochoc.formats.neighbours import cycles, disagreements, missing_files, mixed_kinds, shared_variables
+from robochoc.formats.robot import RobotFile, read_robot_file
+from robochoc.formats.scenario import SCENARIO, check_scenario
+from robochoc.formats.scopes import misplaced, misplaced_parts, untold
+from robochoc.problem import Robot, Team, natural, priority_order
+
+_NEXT_STEP = "give a folder with one XML file per robot; 'robochoc generate queens3d --n 4' writes one"
+
+
+def find_teams(path: Path | str) -> list[Path]:
+    """The folders of teams at `path` or below, in natural order.
+
+    A folder with XML files in it is a team, and nothing is looked for below it; other folders are searched, hidden
+    ones and symbolic links left out. Raises `InvalidInput` when there is no team, or a folder cannot be read.
+    """
+    teams = list(_teams(Path(path)))
+    if not teams:
+        raise _invalid(path, "there is no team here: no XML file in any folder", _NEXT_STEP)
+    return teams
+
+
+def read_team(folder: Path | str) -> Team:
+    """The team whose robots are the XML files in `folder`, in priority order.
+
+    Raises `InvalidInput` with the mistakes of all its files, and of all pairs of files (FORMAT.md, "The team").
+    """
+    folder = Path(folder)
+    paths = [folder / name for name in _xml_files(_listing(folder)) if name != SCENARIO]
+    if not paths:
+        raise _invalid(folder, "there is no robot here: no XML file", _NEXT_STEP)
+    found: list[Diagnostic] = []
+    files: dict[str, RobotFile] = {}
+    for path in paths:
+        try:
+            files[path.stem] = read_robot_file(path)
+        except InvalidInput as invalid:
+            found.extend(invalid.diagnostics)
+    dynamic = False
+    try:
+        dynamic = check_scenario(folder)
+    except InvalidInput as invalid:
+        found.extend(invalid.diagnostics)
+    members = Members(folder, files, frozenset(path.stem for path in paths) - files.keys())
+    found.extend(_mistakes(members))
+    if found:
+        raise InvalidInput(found)
+    order = priority_order(members.agreed)
+    return Team(folder.resolve().name, tuple(_informed(members, name) for name in order), dynamic)
+
+
+def _mistakes(members: Members) -> Iterator[Diagnostic]:
+    """Everything that two files of a team can get wrong between them."""
+    yield from missing_files(members)
+    yield from disagreements(members)
+    yield from cycles(members)
+    yield from mixed_kinds(members)
+    yield from shared_variables(members)
+    scopes = list(misplaced(members))
+    yield from scopes
+    yield from misplaced_parts(members)
+    yield from untold(members)
+    yield from differing_copies(members, {mistake.file for mistake in scopes})
+
+
+def _informed(members: Members, name: str) -> Robot:
+    """The robot `name`; where its file does not say what a child must be told, the constraints do."""
+    file = members.files[name]
+    children = []
+    for child in file.robot.children:
+        variables = child.variables
+        if child.name in file.unsaid:
+            needed = {*variables, *members.needed(name, child.name)}
+            variables = tuple(variable.name for variable in file.robot.variables if variable.name in needed)
+        children.append(replace(child, variables=variables))
+    return replace(file.robot, children=tuple(children))
+
+
+def _teams(folder: Path) -> Iterator[Path]:
+    entries = _listing(folder)
+    if any(_xml_files(entries)):
+        yield folder
+        return
+    for entry in entries:
+        if not entry.name.startswith(".") and entry.is_dir(follow_symlinks=False):
+            yield from _teams(folder / entry.name)
+
+
+def _xml_files(entries: Iterable[os.DirEntry[str]]) -> Iterator[str]:
+    """Names of what claims to be an XML file; whether it is one, its reader says."""
+    return (entry.name for entry in entries if entry.name.endswith(".xml") and not entry.name.startswith("."))
+
+
+def _listing(folder: Path) -> list[os.DirEntry[str]]:
+    """What is in `folder`, in natural order. Raises `InvalidInput`."""
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entries, key=lambda entry: natural(entry.name))
+    except NotADirectoryError:
+        raise _invalid(folder, "is not a folder", _NEXT_STEP) from None
+    except FileNotFoundError:
+        raise _invalid(folder, "does not exist", _NEXT_STEP) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise _invalid(folder, f"cannot be read: {reason}", "check the path and its permissions") from None
+
+
+def _invalid(path: Path | str, message: str, hint: str) -> InvalidInput:
+    return InvalidInput([Diagnostic(str(path), 0, message, hint)])

@@ -1,0 +1,155 @@
+"""Writes a robot as Figure 2 does: its order of elements, its counts, two spaces a level."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeVar
+
+from lxml import etree
+
+from robochoc.expression import text
+from robochoc.formats.intension import PREDEFINED
+from robochoc.problem import (
+    INFINITE,
+    Constraint,
+    Domain,
+    Predicate,
+    Relation,
+    Robot,
+    Semantics,
+    Term,
+    Topic,
+)
+
+
+def robot_xml(robot: Robot) -> bytes:
+    """`robot` as the content of its XML file: what `read_robot` reads back.
+
+    Raises `ValueError` when the robot cannot be written: two of its domains or definitions have one name, or a cost
+    is no integer.
+    """
+    instance = etree.Element("instance")
+    etree.SubElement(instance, "presentation", type=robot.kind)
+    _write_domains(instance, robot)
+    variables = etree.SubElement(instance, "variables", nbVariables=str(len(robot.variables)))
+    for variable in robot.variables:
+        etree.SubElement(variables, "variable", name=variable.name, domain=variable.domain.name)
+    _write_topics(instance, robot.topics)
+    _write_definitions(instance, robot)
+    _write_constraints(instance, robot.private)
+    _write_neighbours(instance, robot)
+    body = etree.tostring(instance, pretty_print=True, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{body}'.encode()
+
+
+def _write_domains(instance: etree._Element, robot: Robot) -> None:
+    domains = _by_name(variable.domain for variable in robot.variables)
+    section = etree.SubElement(instance, "domains", nbDomains=str(len(domains)))
+    for domain in domains.values():
+        element = etree.SubElement(section, "domain", name=domain.name, nbValues=str(len(domain)))
+        element.text = " ".join(map(_range, domain.ranges))
+
+
+def _range(part: range) -> str:
+    return f"{part[0]}..{part[-1]}" if len(part) > 1 else str(part[0])
+
+
+def _write_topics(instance: etree._Element, topics: Sequence[Topic]) -> None:
+    if not topics:
+        return
+    section = etree.SubElement(instance, "topics", nbTopics=str(len(topics)))
+    for topic in topics:
+        element = etree.SubElement(section, "topic", name=topic.name)
+        if topic.type != Topic.type:
+            element.set("type", topic.type)
+        for axis, expression in (("x", topic.x), ("y", topic.y), ("z", topic.z)):
+            if expression is not None:
+                element.set(axis, text(expression))
+
+
+def _write_definitions(instance: etree._Element, robot: Robot) -> None:
+    parts = itertools.chain.from_iterable(child.constraints for child in robot.children)
+    constraints = itertools.chain(robot.private, robot.shared, parts)
+    definitions = _by_name(constraint.definition for constraint in constraints)
+    relations = [one for one in definitions.values() if isinstance(one, Relation)]
+    predicates = [one for one in definitions.values() if isinstance(one, Predicate) and one != PREDEFINED.get(one.name)]
+    if relations:
+        section = etree.SubElement(instance, "relations", nbRelations=str(len(relations)))
+        for relation in relations:
+            _write_relation(section, relation)
+    if predicates:
+        section = etree.SubElement(instance, "predicates", nbPredicates=str(len(predicates)))
+        for predicate in predicates:
+            _write_predicate(section, predicate)
+
+
+def _write_relation(section: etree._Element, relation: Relation) -> None:
+    element = etree.SubElement(section, "relation", name=relation.name, arity=str(relation.arity))
+    element.set("nbTuples", str(len(relation.tuples)))
+    element.set("semantics", relation.semantics)
+    tuples = [" ".join(map(str, values)) for values in relation.tuples]
+    if relation.semantics is Semantics.SOFT:
+        element.set("defaultCost", _cost(relation.default_cost))
+        tuples = [f"{_cost(cost)}:{values}" for cost, values in zip(relation.costs, tuples, strict=True)]
+    element.text = "|".join(tuples)
+
+
+def _write_predicate(section: etree._Element, predicate: Predicate) -> None:
+    element = etree.SubElement(section, "predicate", name=predicate.name)
+    etree.SubElement(element, "parameters").text = " ".join(f"int {name}" for name in predicate.parameters)
+    expression = etree.SubElement(element, "expression")
+    etree.SubElement(expression, "functional").text = text(predicate.body)
+
+
+def _write_constraints(holder: etree._Element, constraints: Sequence[Constraint]) -> None:
+    if not constraints:
+        return
+    section = etree.SubElement(holder, "constraints", nbConstraints=str(len(constraints)))
+    for constraint in constraints:
+        element = etree.SubElement(section, "constraint")
+        if constraint.model:
+            element.set("model", constraint.model)
+        element.set("name", constraint.name)
+        element.set("reference", constraint.definition.name)
+        element.set("scope", _terms(constraint.scope))
+        if constraint.cost != INFINITE:
+            element.set("cost", _cost(constraint.cost))
+        if isinstance(constraint.definition, Predicate):
+            etree.SubElement(element, "parameters").text = _terms(constraint.parameters)
+
+
+def _write_neighbours(instance: etree._Element, robot: Robot) -> None:
+    neighbours = etree.SubElement(instance, "agents_neighbours")
+    section = etree.SubElement(neighbours, "agents_parent")
+    for parent in robot.parents:
+        _write_constraints(etree.SubElement(section, "agent", name=parent.name), parent.constraints)
+    section = etree.SubElement(neighbours, "agents_children")
+    for child in robot.children:
+        agent = etree.SubElement(section, "agent", name=child.name)
+        if child.variables or child.constraints:
+            agent.set("variable", " ".join(child.variables))
+        _write_constraints(agent, child.constraints)
+
+
+_Named = TypeVar("_Named", Domain, Relation | Predicate)
+
+
+def _by_name(things: Iterable[_Named]) -> Mapping[str, _Named]:
+    named: dict[str, _Named] = {}
+    for thing in things:
+        if named.setdefault(thing.name, thing) != thing:
+            raise ValueError(f"two different definitions are called '{thing.name}': rename one of them")
+    return named
+
+
+def _terms(terms: Sequence[Term]) -> str:
+    return " ".join(map(str, terms))
+
+
+def _cost(cost: float) -> str:
+    if cost == INFINITE:
+        return "infinity"
+    if cost != int(cost):
+        raise ValueError(f"the cost {cost} is no integer")
+    return str(int(cost))

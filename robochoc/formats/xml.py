@@ -1,0 +1,127 @@
+"""From a file to a checked XML tree: the first two layers, well-formedness and schema.
+
+What a file may do to the reader ends here: no entities, no DTD, no network, no size beyond the limit, and nothing
+that is not a regular file is waited for.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from pathlib import Path
+from typing import cast
+
+from lxml import etree
+
+from robochoc.formats.diagnostics import Diagnostic, InvalidInput
+from robochoc.formats.schema import check_schema, entries
+
+MAX_BYTES = 16 * 1024 * 1024
+
+_BLANKS = " \t\r\n"
+_DOCTYPE = re.compile(rb"(?>\xef\xbb\xbf)?(?>[ \t\r\n]|<\?.*?\?>|<!--.*?-->)*+<!DOCTYPE", re.DOTALL)
+_HINTS = {
+    etree.ErrorTypes.ERR_ATTRIBUTE_NOT_STARTED: 'write name="value"',
+    etree.ErrorTypes.ERR_ATTRIBUTE_REDEFINED: "an attribute stands once in an element",
+    etree.ErrorTypes.ERR_ATTRIBUTE_WITHOUT_VALUE: 'write name="value"',
+    etree.ErrorTypes.ERR_DOCUMENT_EMPTY: "an XML file begins with <",
+    etree.ErrorTypes.ERR_DOCUMENT_END: "one root element holds everything",
+    etree.ErrorTypes.ERR_ENTITYREF_SEMICOL_MISSING: "write &amp; for the character &",
+    etree.ErrorTypes.ERR_GT_REQUIRED: "end the tag with >; is the file complete?",
+    etree.ErrorTypes.ERR_LT_IN_ATTRIBUTE: "is the quote before it missing? Write &lt; for the character <",
+    etree.ErrorTypes.ERR_NAME_REQUIRED: "end the tag with >; write &lt; and &amp; for the characters < and &",
+    etree.ErrorTypes.ERR_RESOURCE_LIMIT: "a robot's file has few levels and short texts",
+    etree.ErrorTypes.ERR_SPACE_REQUIRED: "end the tag with >",
+    etree.ErrorTypes.ERR_TAG_NAME_MISMATCH: "close every element by its own end tag",
+    etree.ErrorTypes.ERR_TAG_NOT_FINISHED: "close every element by its own end tag; is the file complete?",
+    etree.ErrorTypes.ERR_UNDECLARED_ENTITY: "only &lt; &gt; &amp; &quot; &apos; are known: write the character itself",
+}
+"""What to do about libxml2's more frequent messages."""
+
+
+def read_xml(path: Path, root: str) -> etree._Element:
+    """The root element of the XML file `path`, which must be a `root` and valid by its schema.
+
+    Raises `InvalidInput` with every mistake that the failing layer shows.
+    """
+    content = _content(path)
+    doctype = _DOCTYPE.match(content)
+    if doctype:
+        raise _invalid(path, doctype[0].count(b"\n") + 1, "a DOCTYPE is not accepted", "delete it, and every entity")
+    parser = _parser()
+    try:
+        tree = etree.fromstring(content, parser)
+    except etree.XMLSyntaxError as error:
+        raise _malformed(path, error, parser) from None
+    if tree.tag != root:
+        what = f"the root element is <{etree.QName(tree).localname}>"
+        if tree.tag.endswith(f"}}{root}"):
+            what = f"<{root}> stands in an XML namespace"
+        raise _invalid(path, line(tree), what, f"expected <{root}>, without any xmlns")
+    check_schema(tree, str(path), root)
+    return tree
+
+
+def attribute(element: etree._Element, name: str) -> str:
+    """An attribute's text without blanks around it; empty where it is left out."""
+    return (element.get(name) or "").strip(_BLANKS)
+
+
+def line(element: etree._Element) -> int:
+    """Where `element` stands in its file."""
+    return cast("int | None", element.sourceline) or 0
+
+
+def _parser() -> etree.XMLParser:
+    """Comments and processing instructions are read over; the encoding is UTF-8 whatever the file declares."""
+    return etree.XMLParser(
+        encoding="utf-8",
+        resolve_entities=False,
+        load_dtd=False,
+        no_network=True,
+        huge_tree=False,
+        remove_comments=True,
+        remove_pis=True,
+    )
+
+
+def _content(path: Path) -> bytes:
+    try:
+        content = _bytes(path)
+    except OSError as error:
+        raise _invalid(path, 0, f"cannot be read: {error.strerror}", "check the path and its permissions") from None
+    if len(content) > MAX_BYTES:
+        raise _invalid(path, 0, f"is larger than {MAX_BYTES // 2**20} MiB", "a robot's file is a few kB; split it")
+    if not content.strip():
+        raise _invalid(path, 0, "is empty", "see 'robochoc generate' for a file that is not")
+    try:
+        content.decode()
+    except UnicodeDecodeError as error:
+        number = content.count(b"\n", 0, error.start) + 1
+        raise _invalid(path, number, "is not UTF-8", "save it in UTF-8, as the XML declaration says") from None
+    return content
+
+
+def _bytes(path: Path) -> bytes:
+    """At most one byte more than is allowed. A FIFO is opened without waiting for its writer, and refused."""
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise _invalid(path, 0, "is not a regular file", "what is called .xml here must be an XML file: move it away")
+    with os.fdopen(descriptor, "rb") as file:
+        return file.read(MAX_BYTES + 1)
+
+
+def _malformed(path: Path, error: etree.XMLSyntaxError, parser: etree.XMLParser) -> InvalidInput:
+    """Only the first of the parser's messages (the error's own log has older ones too): others follow from it."""
+    for first in entries(parser.error_log):
+        what = re.split(r", (?:use|try) XML_PARSE_HUGE", first.message.strip())[0]
+        return _invalid(
+            path, first.line, f"is not well-formed XML: {what}", _HINTS.get(first.type, "mend the XML there")
+        )
+    return _invalid(path, 0, f"is not well-formed XML: {error}", "mend the XML")
+
+
+def _invalid(path: Path, number: int, message: str, hint: str) -> InvalidInput:
+    return InvalidInput([Diagnostic(str(path), number, message, hint)])

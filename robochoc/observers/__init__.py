@@ -1,0 +1,1 @@
+"""Watching from outside: events, the journal, metrics, and the checker. Protocols do not know."""

@@ -1,0 +1,72 @@
+"""What can be seen of a run. Runtimes report these events to whoever observes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+
+
+class Event(msgspec.Struct, frozen=True, tag=True, tag_field="event", kw_only=True):
+    """Base of all events. `t`: in processes seconds since the start of the run, in the simulator steps."""
+
+    t: float
+
+
+class Began(Event, frozen=True):
+    """A run of `protocol` begins; times start again from 0. Withdrawing is a run of its own after the search."""
+
+    protocol: str
+
+
+class Registered(Event, frozen=True):
+    """A robot has confirmed that it is there."""
+
+    robot: str
+
+
+class Sent(Event, frozen=True):
+    """`sender` has said a message; `clock` is its NCCC clock, `content` the message's fields."""
+
+    sender: str
+    receiver: str
+    type: str
+    content: dict[str, Any]
+    bytes: int
+    clock: int
+
+
+class Received(Event, frozen=True):
+    """`receiver` has taken a message in; `clock` is its NCCC clock afterwards."""
+
+    sender: str
+    receiver: str
+    type: str
+    clock: int
+
+
+class Decided(Event, frozen=True):
+    """A robot has changed its value; an empty `assignment` means that it has none."""
+
+    robot: str
+    assignment: dict[str, int]
+    clock: int
+
+
+class Concluded(Event, frozen=True):
+    """A robot alone could tell how the search ends."""
+
+    robot: str
+    verdict: str
+
+
+class Lost(Event, frozen=True):
+    """A robot's process has ended before the run did."""
+
+    robot: str
+    why: str
+
+
+Observer = Callable[[Event], None]
+AnyEvent = Began | Registered | Sent | Received | Decided | Concluded | Lost

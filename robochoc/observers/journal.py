@@ -1,0 +1,129 @@
+"""The journal: all events of a run, one JSON object a line, oldest first.
+
+The first line says what was run, the last one how it ended. Statistics, pictures and golden tests are computed
+from it; robots do not know that it is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import msgspec
+
+from robochoc.observers.events import AnyEvent, Began, Decided, Event, Received, Sent
+from robochoc.outcome import Metrics, Outcome
+
+VERSION = 1
+
+
+class BadJournal(ValueError):  # noqa: N818 - named for what was found
+    """The file is no journal, or one of another version."""
+
+
+class Header(Event, frozen=True, kw_only=True, tag="Journal"):
+    """What was run, and the version of this format."""
+
+    t: float = 0
+    team: str
+    protocol: str
+    runtime: str
+    seed: int
+    version: int = VERSION
+
+
+class Ended(Event, frozen=True, kw_only=True):
+    """How it ended; absent in the journal of a run that broke off."""
+
+    t: float = 0
+    outcome: Outcome
+
+
+Line = AnyEvent | Header | Ended
+
+
+class Recorder:
+    """An observer that keeps events, and makes a journal of them."""
+
+    outcome: Outcome | None = None
+    """How the run ended; None: not yet, or it broke off."""
+
+    def __init__(self, header: Header) -> None:
+        self._header = header
+        self._runs: list[list[Event]] = []
+
+    def __call__(self, event: Event) -> None:
+        """Take in one event. `Began` opens a run; times are compared within a run only."""
+        if isinstance(event, Began):
+            self._runs.append([])
+        self._runs[-1].append(event)
+
+    def content(self) -> bytes:
+        """The journal as bytes.
+
+        Robots report their events in bundles, so each run's are put in the order of their times; events of equal
+        times stay in the order in which they came, which is each robot's own.
+        """
+        events = (event for run in self._runs for event in sorted(run, key=lambda event: event.t))
+        lines: list[object] = [self._header, *events]
+        if self.outcome:
+            lines.append(Ended(outcome=self.outcome))
+        encode = msgspec.json.Encoder().encode
+        return b"".join(encode(line) + b"\n" for line in lines)
+
+
+@dataclass(frozen=True)
+class Journal:
+    """A journal that has been read. `outcome` is None when the run broke off."""
+
+    header: Header
+    events: tuple[AnyEvent, ...]
+    outcome: Outcome | None
+
+
+def is_journal(content: bytes) -> bool:
+    """Whether `content` begins as a journal does."""
+    return content.startswith(b'{"event":"Journal"')
+
+
+def read_journal(content: bytes) -> Journal:
+    """Read what `Recorder` has written. Raises `BadJournal`, with the line that is wrong."""
+    events: list[AnyEvent] = []
+    outcome: Outcome | None = None
+    header: Header | None = None
+    decode = msgspec.json.Decoder(Line).decode
+    for number, line in enumerate(content.splitlines(), start=1):
+        try:
+            entry = decode(line)
+        except msgspec.MsgspecError as error:
+            raise BadJournal(f"line {number}: {error}") from error
+        if number == 1:
+            if not isinstance(entry, Header) or entry.version != VERSION:
+                raise BadJournal(f"line 1: expected the header of a journal of version {VERSION}")
+            header = entry
+        elif isinstance(entry, Header):
+            raise BadJournal(f"line {number}: a second header")
+        elif isinstance(entry, Ended):
+            outcome = entry.outcome
+        else:
+            events.append(entry)
+    if header is None:
+        raise BadJournal("it is empty")
+    return Journal(header, tuple(events), outcome)
+
+
+def metrics_of(events: Iterable[AnyEvent]) -> Metrics:
+    """Messages by type, bytes and NCCCs as the journal has them. Checks and times are not in it: 0."""
+    total, run = Metrics(), Metrics()
+    for event in events:
+        match event:
+            case Began():
+                total, run = total + run, Metrics()
+            case Sent(type=kind, bytes=size):
+                messages = {**run.messages, kind: run.messages.get(kind, 0) + 1}
+                run = replace(run, messages=messages, bytes=run.bytes + size, ncccs=max(run.ncccs, event.clock))
+            case Received(clock=clock) | Decided(clock=clock):
+                run = replace(run, ncccs=max(run.ncccs, clock))
+            case _:
+                pass
+    return total + run

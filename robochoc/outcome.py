@@ -1,0 +1,59 @@
+"""What a run comes to: the typed form of the JSON result (FORMAT.md, "What comes out")."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+
+class Verdict(StrEnum):
+    """The answer to a problem; `UNKNOWN` when a limit was reached first."""
+
+    SOLUTION = "solution"
+    OPTIMAL = "optimal"
+    NO_SOLUTION = "no-solution"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """What a run cost. Definitions: `docs/metrics.md`.
+
+    `messages`: protocol messages sent, by type; `bytes`: of their encoded contents; `ncccs`: non-concurrent
+    constraint checks; `checks`: constraint checks of all robots; `wall_s`: seconds of wall-clock time.
+    """
+
+    messages: dict[str, int] = field(default_factory=dict)
+    bytes: int = 0
+    ncccs: int = 0
+    checks: int = 0
+    wall_s: float = 0.0
+
+    def __add__(self, other: Metrics) -> Metrics:
+        """The cost of two runs, one after the other."""
+        types = sorted({*self.messages, *other.messages})
+        return Metrics(
+            messages={name: self.messages.get(name, 0) + other.messages.get(name, 0) for name in types},
+            bytes=self.bytes + other.bytes,
+            ncccs=self.ncccs + other.ncccs,
+            checks=self.checks + other.checks,
+            wall_s=self.wall_s + other.wall_s,
+        )
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One team, one run. `assignment` maps every variable of the robots that fly to its value."""
+
+    team: str
+    protocol: str
+    runtime: str
+    seed: int
+    verdict: Verdict
+    assignment: dict[str, int] = field(default_factory=dict)
+    cost: float | None = None
+    withdrawn: tuple[str, ...] = ()
+    metrics: Metrics = field(default_factory=Metrics)
+    verified: bool = False
+    witness: str | None = None
+    """Who ended the search: for `no-solution`, the robot that derived the empty nogood."""

@@ -1,0 +1,177 @@
+"""Asynchronous Backtracking.
+
+Yokoo, Durfee, Ishida, Kuwabara: "Distributed constraint satisfaction for formalizing distributed problem
+solving", ICDCS 1992; here the ABT kernel with links added during search of Bessiere, Maestre, Brito, Meseguer:
+"Asynchronous backtracking without adding links: a new member in the ABT family", AIJ 161 (2005), Figure 1, whose
+names the methods bear:
+
+    CheckAgentView   `_check_agent_view`     ProcessInfo      `_process_info`
+    ChooseValue      `_choose_value`         ResolveConflict  `_resolve_conflict`
+    Backtrack        `_backtrack`            SetLink          `_set_link`
+    CheckAddLink     `_check_add_link`       Update           `_update`
+
+Complete, asynchronous, for satisfaction. Three things the paper leaves open: constraints may be n-ary (the lowest
+robot of the scope checks them, once it knows all the others); of several nogoods for a value the one with the
+highest possible lowest variable is kept (Hirayama and Yokoo 2000); messages are read by packets, and the view is
+checked once the inbox has been drained. That nobody speaks any more, and so a solution stands, is for the runtime
+to see (`communication/quiescence.py`).
+
+>>> from robochoc.generators.queens3d import queens3d
+>>> from robochoc.run import Options, Runtime, solve
+>>> outcome = solve(queens3d(4), Options(protocol="abt", runtime=Runtime.SIMULATOR))
+>>> outcome.verdict.value, outcome.witness
+('no-solution', 'Robot1.1')
+"""
+
+from __future__ import annotations
+
+from typing import assert_never, cast
+
+from robochoc.message import Message, Value
+from robochoc.outcome import Verdict
+from robochoc.protocols.nogood import NogoodStore
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled import LocalProblem
+
+
+class Ok(Message):
+    """The sender's value, told to lower-priority neighbours (`ok?`)."""
+
+    value: Value
+
+
+class Nogood(Message):
+    """While all of `lhs` stands, the receiver cannot take `value` (`ngd`)."""
+
+    lhs: dict[str, Value]
+    value: Value
+
+
+class AddLink(Message):
+    """The sender, lower in the order, asks to be told the receiver's value from now on (`adl`)."""
+
+
+class ABT(Protocol):
+    """One agent of ABT. State: `view` (myAgentView), `store` (myNogoodStore), Gamma- and Gamma+."""
+
+    messages = Ok | Nogood | AddLink
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.view: dict[str, Value] = {}
+        self.store = NogoodStore(order, len(problem.values))
+        self.higher = set(problem.parents)
+        self.lower = list(problem.children)
+
+    def start(self) -> None:
+        """Choose a first value and tell it."""
+        self._check_agent_view()
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        if self.verdict is not None:
+            return
+        match cast("Ok | Nogood | AddLink", message):
+            case Ok(value):
+                self._process_info(sender, value)
+            case Nogood() as nogood:
+                self._resolve_conflict(sender, nogood)
+            case AddLink():
+                self._set_link(sender)
+            case never:
+                assert_never(never)
+
+    def settle(self) -> None:
+        """The inbox is empty: check the view."""
+        if self.verdict is None:
+            self._check_agent_view()
+
+    # What the messages do
+
+    def _process_info(self, sender: str, value: Value) -> None:
+        self._update(sender, value)
+
+    def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
+        """Accept a nogood about the present value that agrees with the view; otherwise it is obsolete."""
+        current = self._current()
+        if current != nogood.value:
+            return
+        if self._coherent(nogood):
+            self._check_add_link(nogood)
+            self.store.add(cast("int", self.value), nogood.lhs)
+            self.value = None
+        else:
+            # The sender's picture of others was old, and it has forgotten my value: say it again.
+            self.send(sender, Ok(current))
+
+    def _set_link(self, sender: str) -> None:
+        if sender not in self.lower:
+            self.lower.append(sender)
+        current = self._current()
+        if current is not None:
+            self.send(sender, Ok(current))
+
+    # The search
+
+    def _check_agent_view(self) -> None:
+        """Keep the value if the view allows it, else choose another, else backtrack until one is found."""
+        while self.verdict is None:
+            if self.value is not None and self._consistent(self.value):
+                return
+            self.value = self._choose_value()
+            if self.value is None:
+                self._backtrack()
+                continue
+            for child in self.lower:
+                self.send(child, Ok(self.problem.values[self.value]))
+            return
+
+    def _choose_value(self) -> int | None:
+        """The first value of the domain that no nogood rules out."""
+        return next((index for index in range(len(self.problem.values)) if self._consistent(index)), None)
+
+    def _backtrack(self) -> None:
+        """Resolve the stored nogoods, one for each value, and tell the lowest robot among their causes."""
+        lhs = self.store.resolve()
+        if not lhs:
+            self.conclude(Verdict.NO_SOLUTION)
+            return
+        culprit = self.order.lowest(lhs)
+        value = lhs.pop(culprit)
+        self.send(culprit, Nogood(lhs, value))
+        self._update(culprit, None)
+
+    def _consistent(self, index: int) -> bool:
+        """Whether the view allows the value at `index`; if a constraint does not, its nogood is stored."""
+        if self.store[index] is not None:
+            return False
+        conflict = self.problem.conflict(index, self.view)
+        if conflict is None:
+            return True
+        self.store.add(index, conflict)
+        return False
+
+    # The view
+
+    def _update(self, agent: str, value: Value | None) -> None:
+        """Take in a new value of `agent` (None: unknown); nogoods that rest on another value go."""
+        if value is None:
+            self.view.pop(agent, None)
+        else:
+            self.view[agent] = value
+        self.store.forget(agent, value)
+
+    def _coherent(self, nogood: Nogood) -> bool:
+        return all(self.view.get(agent) == value for agent, value in nogood.lhs.items() if agent in self.higher)
+
+    def _check_add_link(self, nogood: Nogood) -> None:
+        """Ask robots of the left side that do not tell me their values yet to do so."""
+        for agent, value in nogood.lhs.items():
+            if agent not in self.higher:
+                self.higher.add(agent)
+                self.send(agent, AddLink())
+                self._update(agent, value)
+
+    def _current(self) -> Value | None:
+        return None if self.value is None else self.problem.values[self.value]

@@ -1,0 +1,56 @@
+"""First fit: robots that cannot be placed step aside, in priority order.
+
+Paper, Section 5.2: "the robots who can't belonging to the solution will be taken from the operational scene. Thus
+only robots that will satisfy all constraints will fly to take their positions." Each robot waits until all its
+parents have said where they fly, or that they do not; then it takes the first value that its constraints with the
+flying ones allow, or steps aside, and tells its children. One message an edge; nobody who stepped aside could
+still be added, as all that ruled it out flies. Which *fewest* robots must leave is an optimisation problem, and
+another protocol's.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+from robochoc.message import Message, Value
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled import LocalProblem
+
+
+class Placed(Message):
+    """Where the sender flies; None: it has stepped aside."""
+
+    value: Value | None
+
+
+class FirstFit(Protocol):
+    """One robot. `view` holds the values of the parents that fly, `awaited` the parents not yet heard."""
+
+    messages = Placed
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.view: dict[str, Value] = {}
+        self.awaited = set(problem.parents)
+
+    def start(self) -> None:
+        """Robots without parents decide at once."""
+        self.settle()
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Note what a parent has decided."""
+        value = cast("Placed", message).value
+        self.awaited.discard(sender)
+        if value is not None:
+            self.view[sender] = value
+
+    def settle(self) -> None:
+        """With the last parent heard, decide and tell: each robot does so exactly once."""
+        if self.awaited:
+            return
+        places = range(len(self.problem.values))
+        self.value = next((index for index in places if self.problem.conflict(index, self.view) is None), None)
+        placed = Placed(None if self.value is None else self.problem.values[self.value])
+        for child in self.problem.children:
+            self.send(child, placed)

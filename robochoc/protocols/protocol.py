@@ -1,0 +1,61 @@
+"""What every protocol is: a state machine that is told messages and says messages.
+
+A host (see `communication/host.py`) drives it: `start` once, then for each packet of waiting messages `receive`
+one by one and `settle` when the inbox has been drained. What it says collects in `outbox`, which the host
+empties. A protocol never asks the time, draws a lot, or knows whether it runs in a simulator or on a robot.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+from robochoc.message import Message
+from robochoc.outcome import Verdict
+from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.compiled import LocalProblem
+
+
+class Protocol(ABC):
+    """One robot's side of a protocol.
+
+    Subclasses declare `messages`, the union of the message types that they receive, and what they can take:
+    `partially_known` (PKC) constraints, and `costs` (a DisWCSP).
+    """
+
+    messages: ClassVar[Any]
+    partially_known: ClassVar[bool] = False
+    costs: ClassVar[bool] = False
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        self.problem = problem
+        self.order = order
+        self.outbox: list[tuple[str, Message]] = []
+        self.value: int | None = None
+        """The own value, as its place in the compiled domain; None: unassigned."""
+        self.verdict: Verdict | None = None
+        """Set when this robot alone can tell how the search ends, such as by deriving the empty nogood."""
+
+    @abstractmethod
+    def start(self) -> None:
+        """The search begins; called once, before any message."""
+
+    @abstractmethod
+    def receive(self, sender: str, message: Message) -> None:
+        """Take in one message."""
+
+    def settle(self) -> None:  # noqa: B027 - a protocol that answers each message at once needs no settling
+        """The inbox has been drained: the time to look at the whole view and to decide."""
+
+    def send(self, receiver: str, message: Message) -> None:
+        """Say `message` to `receiver`."""
+        self.outbox.append((receiver, message))
+
+    def conclude(self, verdict: Verdict) -> None:
+        """End the search of the whole team with `verdict`."""
+        self.verdict = verdict
+
+    @property
+    def assignment(self) -> dict[str, int]:
+        """The own variables' values as decided; empty while unassigned."""
+        return {} if self.value is None else self.problem.solution(self.value)

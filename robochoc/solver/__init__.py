@@ -1,0 +1,1 @@
+"""Constraint Solver unit: a robot's own problem, made ready for protocols."""

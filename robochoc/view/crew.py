@@ -1,0 +1,98 @@
+"""Who takes part: one craft per robot, or one per place where a robot decides about several.
+
+A craft's cell and level come from the first of these that fits: the coordinates of its topic under the assignment;
+the two numbers its name ends in (`Robot3.1`, `V3.1`), with its first value for the level; its first value alone.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from robochoc.expression import Expression, Undefined, evaluate
+from robochoc.outcome import Outcome, Verdict
+from robochoc.problem import Assignment, Robot, Team, Topic, natural
+
+Cell = tuple[int, int]
+"""Row and column, or the x and y that a topic gives."""
+
+# Longer numbers are dates or serial numbers, not rows.
+_ROW_AND_COLUMN = re.compile(r"(?<![0-9])([0-9]{1,4})[._,:;-]([0-9]{1,4})$")
+
+
+@dataclass(frozen=True)
+class Craft:
+    """A drone before the layout: what is known of where it belongs. It flies when it has a level."""
+
+    name: str
+    cell: Cell | None = None
+    level: int | None = None
+    withdrew: bool = False
+
+
+def crew_of(outcome: Outcome, team: Team | None = None) -> tuple[Craft, ...]:
+    """Every craft of `outcome`, in natural order of their names.
+
+    Without `team`, all that is known are the variables assigned and the names of the robots that withdrew.
+    """
+    withdrawn = frozenset(outcome.withdrawn)
+    values: Assignment = {} if outcome.verdict is Verdict.NO_SOLUTION else outcome.assignment
+    if team is None:
+        crew = [_craft(name, [name], None, values) for name in values]
+        crew += [Craft(name, numbers(name), withdrew=True) for name in withdrawn]
+    else:
+        crew = [craft for robot in team.robots for craft in _crafts(robot, values, withdrew=robot.name in withdrawn)]
+    return tuple(sorted(crew, key=lambda craft: (natural(craft.name), craft.name)))
+
+
+def numbers(name: str) -> Cell | None:
+    """The row and the column that a name such as `Robot3.1` ends in."""
+    found = _ROW_AND_COLUMN.search(name)
+    return (int(found[1]), int(found[2])) if found else None
+
+
+def _crafts(robot: Robot, values: Assignment, *, withdrew: bool) -> list[Craft]:
+    """One craft per topic that has coordinates, or per variable that names a cell, or one for the robot."""
+    own = [variable.name for variable in robot.variables]
+    topics = [topic for topic in robot.topics if topic.x is not None and topic.y is not None]
+    if len(topics) > 1:
+        named = zip(_short_names(topics), topics, strict=True)
+        return [_craft(name, own, topic, values, withdrew=withdrew) for name, topic in named]
+    if not topics and len(own) > 1 and all(numbers(name) for name in own):
+        return [_craft(name, [name], None, values, withdrew=withdrew) for name in own]
+    return [_craft(robot.name, own, topics[0] if topics else None, values, withdrew=withdrew)]
+
+
+def _craft(
+    name: str, variables: Sequence[str], topic: Topic | None, values: Assignment, *, withdrew: bool = False
+) -> Craft:
+    """The craft `name`, whose cell is its topic's, or else the one that its own or its first variable's name says."""
+    cells = [_sent(topic, values) if topic else None, numbers(name), *(numbers(first) for first in variables[:1])]
+    known = [values[own] for own in variables if own in values]
+    level = None
+    if known and not withdrew:
+        height = _value(topic.z, values) if topic else None
+        level = known[0] if height is None else height
+    return Craft(name, next(filter(None, cells), None), level, withdrew)
+
+
+def _sent(topic: Topic, values: Assignment) -> Cell | None:
+    x, y = _value(topic.x, values), _value(topic.y, values)
+    return None if x is None or y is None else (x, y)
+
+
+def _value(expression: Expression | None, values: Assignment) -> int | None:
+    """What `expression` comes to, or nothing: it may be undefined, or about variables without a value."""
+    if expression is None:
+        return None
+    try:
+        return evaluate(expression, values)
+    except (Undefined, KeyError):
+        return None
+
+
+def _short_names(topics: Sequence[Topic]) -> list[str]:
+    """`drone3.1` for `/drone3.1/waypoint3.1`, unless that is no name of its own."""
+    first = [topic.name.strip("/").partition("/")[0] for topic in topics]
+    return first if len(set(first)) == len(topics) else [topic.name for topic in topics]

@@ -1,0 +1,57 @@
+"""A scene as one self-contained HTML page: meshcat's viewer, the commands that fill it, and a caption.
+
+Team and robot names come from files of strangers. Here they reach HTML as escaped text only, and the page's
+Content-Security-Policy lets no other script run than the two it was made with, and nothing be loaded from anywhere.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from html import escape
+from importlib.resources import files
+from string import Template
+
+from robochoc.view.label import printable
+from robochoc.view.recorder import viewer_script
+from robochoc.view.scene import Scene
+from robochoc.view.stage import commands
+
+
+def page(scene: Scene) -> bytes:
+    """The page, UTF-8. It plays by itself once, needs no server and no network, and is the same for equal scenes."""
+    return _filled(scene, "\n".join(base64.b64encode(command).decode() for command in commands(scene)), "'none'")
+
+
+def live_page(scene: Scene, port: int) -> bytes:
+    """The same page without its commands: it asks the server that it came from for them, on this machine's `port`."""
+    return _filled(scene, "", f"ws://127.0.0.1:{port} ws://localhost:{port}")
+
+
+def _filled(scene: Scene, embedded: str, connections: str) -> bytes:
+    here = files(__package__)
+    viewer, player = viewer_script(), (here / "page.js").read_text(encoding="utf-8")
+    policy = (
+        f"default-src 'none'; script-src {_hashed(viewer)} {_hashed(player)}; style-src 'unsafe-inline';"
+        f" img-src data: blob:; connect-src {connections}; base-uri 'none'; form-action 'none'"
+    )
+    return (
+        Template((here / "page.html").read_text(encoding="utf-8"))
+        .substitute(
+            policy=policy,
+            title=_text(scene.title),
+            facts="".join(f"<dt>{_text(name)}</dt><dd>{_text(fact)}</dd>" for name, fact in scene.facts),
+            commands=embedded,
+            viewer=viewer,
+            player=player,
+        )
+        .encode()
+    )
+
+
+def _text(text: str) -> str:
+    return escape(printable(text))
+
+
+def _hashed(script: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"

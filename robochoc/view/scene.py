@@ -1,0 +1,68 @@
+"""What there is to see of an outcome, as data: the drones, where each begins and ends, and the box around them.
+
+Lengths are in cells: one cell is one row, one column or one level. Nothing here draws; `stage` does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from robochoc.outcome import Outcome, Verdict
+from robochoc.problem import Team
+from robochoc.view.crew import crew_of
+from robochoc.view.layout import Axis, Drone, lay_out
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One run, ready to be drawn. `facts` is the caption: pairs of a label and what it says, in plain text."""
+
+    title: str
+    facts: tuple[tuple[str, str], ...]
+    drones: tuple[Drone, ...]
+    axes: tuple[Axis, Axis, Axis]
+
+    @property
+    def ground(self) -> float:
+        """The height on which drones stand: one level below the lowest place."""
+        return self.axes[2].ground
+
+
+def scene_of(outcome: Outcome, team: Team | None = None) -> Scene:
+    """The scene of `outcome`. With its `team` also robots that stay behind are shown, and topics say where to fly.
+
+    Never raises for want of a place: a robot whose coordinates are missing or undefined is placed by the two
+    numbers its name ends in (row and column), and failing that in a tidy grid, at the height of its first value.
+    """
+    layout = lay_out(crew_of(outcome, team))
+    flying = sum(drone.place is not None for drone in layout.drones)
+    return Scene(f"{outcome.team}: {_ending(outcome, flying)}", _facts(outcome, flying), layout.drones, layout.axes)
+
+
+def _ending(outcome: Outcome, flying: int) -> str:
+    if outcome.withdrawn and flying:
+        others = "no larger team could" if outcome.verdict is Verdict.OPTIMAL else f"{len(outcome.withdrawn)} withdrew"
+        return f"{flying} fly, {others}"
+    match outcome.verdict:
+        case Verdict.SOLUTION:
+            return "a solution"
+        case Verdict.OPTIMAL:
+            return "an optimal solution"
+        case Verdict.NO_SOLUTION:
+            return "no solution, everybody stays on the ground"
+        case Verdict.UNKNOWN:
+            return "a limit was reached without a verdict"
+
+
+def _facts(outcome: Outcome, flying: int) -> tuple[tuple[str, str], ...]:
+    facts = [
+        ("verdict", outcome.verdict + (", verified" if outcome.verified else "")),
+        ("protocol", outcome.protocol),
+        ("fly", str(flying)),
+    ]
+    if outcome.withdrawn:
+        facts.append(("withdrew", str(len(outcome.withdrawn))))
+    if outcome.cost:
+        facts.append(("cost", f"{outcome.cost:,g}"))
+    facts.append(("messages", f"{sum(outcome.metrics.messages.values()):,}"))
+    return tuple(facts)
