@@ -213,15 +213,15 @@ class Robot:
     @cached_property
     def interface(self) -> tuple[str, ...]:
         """The own variables that neighbours see: those in shared constraints, in the order of `variables`."""
-        held = (parts.variables for neighbour in (*self.parents, *self.children) for parts in neighbour.constraints)
-        seen = {name for names in held for name in names}
+        parts = (constraint for child in self.children for constraint in child.constraints)
+        seen = {name for constraint in (*self.shared, *parts) for name in constraint.variables}
         seen.update(name for child in self.children for name in child.variables)
         return tuple(variable.name for variable in self.variables if variable.name in seen)
 
     @property
     def neighbours(self) -> tuple[str, ...]:
         """Names of parents and children."""
-        return tuple(neighbour.name for neighbour in (*self.parents, *self.children))
+        return (*(parent.name for parent in self.parents), *(child.name for child in self.children))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import msgspec
 
 from robochoc.message import Envelope, Message, encode
-from robochoc.observers.events import Concluded, Decided, Observer, Received, Sent
+from robochoc.observers.events import Concluded, Decided, Observer, Received, Sent, Settled
 from robochoc.outcome import Metrics, Verdict
 from robochoc.protocols.protocol import Protocol
 
@@ -80,6 +80,8 @@ class Host:
             self._report_state(self._observer)
         said = [self._wrap(receiver, message) for receiver, message in self.protocol.outbox]
         self.protocol.outbox.clear()
+        if self._observer:
+            self._observer(Settled(t=self._now(), robot=self.name, clock=self.clock, checks=self._checks))
         return said
 
     def _wrap(self, receiver: str, message: Message) -> Envelope:

@@ -51,7 +51,7 @@ def queens3d(n: int, model: QueensModel | str = QueensModel.PLANAR) -> Team:
     levels = Domain("D1", (range(1, n + 1),))
     cells = [(row, column) for row in range(1, n + 1) for column in range(1, n + 1)]
     robots = tuple(_robot(cell, n, levels, model) for cell in cells)
-    return Team(f"queens3d-{n}" if model is QueensModel.PLANAR else f"queens3d-{n}-{model}", robots)
+    return Team(f"queens3d-{n}", robots)
 
 
 def _robot(cell: Cell, n: int, levels: Domain, model: QueensModel) -> Robot:

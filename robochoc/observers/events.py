@@ -54,6 +54,14 @@ class Decided(Event, frozen=True):
     clock: int
 
 
+class Settled(Event, frozen=True):
+    """A robot has dealt with its packet: its NCCC clock, and its constraint checks since the start of the run."""
+
+    robot: str
+    clock: int
+    checks: int
+
+
 class Concluded(Event, frozen=True):
     """A robot alone could tell how the search ends."""
 
@@ -68,5 +76,5 @@ class Lost(Event, frozen=True):
     why: str
 
 
-Observer = Callable[[Event], None]
-AnyEvent = Began | Registered | Sent | Received | Decided | Concluded | Lost
+AnyEvent = Began | Registered | Sent | Received | Decided | Settled | Concluded | Lost
+Observer = Callable[[AnyEvent], None]

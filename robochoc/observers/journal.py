@@ -6,12 +6,13 @@ from it; robots do not know that it is kept.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import msgspec
 
-from robochoc.observers.events import AnyEvent, Began, Decided, Event, Received, Sent
+from robochoc.observers.events import AnyEvent, Began, Event, Sent, Settled
 from robochoc.outcome import Metrics, Outcome
 
 VERSION = 1
@@ -50,9 +51,9 @@ class Recorder:
 
     def __init__(self, header: Header) -> None:
         self._header = header
-        self._runs: list[list[Event]] = []
+        self._runs: list[list[AnyEvent]] = []
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, event: AnyEvent) -> None:
         """Take in one event. `Began` opens a run; times are compared within a run only."""
         if isinstance(event, Began):
             self._runs.append([])
@@ -113,17 +114,28 @@ def read_journal(content: bytes) -> Journal:
 
 
 def metrics_of(events: Iterable[AnyEvent]) -> Metrics:
-    """Messages by type, bytes and NCCCs as the journal has them. Checks and times are not in it: 0."""
-    total, run = Metrics(), Metrics()
+    """What the events say of messages, bytes, NCCCs and checks. Wall-clock time is not in them: 0."""
+    total = Metrics()
+    messages: Counter[str] = Counter()
+    size = ncccs = 0
+    checks: dict[str, int] = {}
+
+    def run() -> Metrics:
+        return Metrics(dict(messages), size, ncccs, sum(checks.values()))
+
     for event in events:
         match event:
             case Began():
-                total, run = total + run, Metrics()
-            case Sent(type=kind, bytes=size):
-                messages = {**run.messages, kind: run.messages.get(kind, 0) + 1}
-                run = replace(run, messages=messages, bytes=run.bytes + size, ncccs=max(run.ncccs, event.clock))
-            case Received(clock=clock) | Decided(clock=clock):
-                run = replace(run, ncccs=max(run.ncccs, clock))
+                total += run()
+                messages.clear()
+                checks.clear()
+                size = ncccs = 0
+            case Sent():
+                messages[event.type] += 1
+                size += event.bytes
+            case Settled():
+                ncccs = max(ncccs, event.clock)
+                checks[event.robot] = event.checks
             case _:
                 pass
-    return total + run
+    return total + run()

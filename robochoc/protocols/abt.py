@@ -35,20 +35,20 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled import LocalProblem
 
 
-class Ok(Message):
+class Ok(Message, frozen=True):
     """The sender's value, told to lower-priority neighbours (`ok?`)."""
 
     value: Value
 
 
-class Nogood(Message):
+class Nogood(Message, frozen=True):
     """While all of `lhs` stands, the receiver cannot take `value` (`ngd`)."""
 
     lhs: dict[str, Value]
     value: Value
 
 
-class AddLink(Message):
+class AddLink(Message, frozen=True):
     """The sender, lower in the order, asks to be told the receiver's value from now on (`adl`)."""
 
 

@@ -18,7 +18,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled import LocalProblem
 
 
-class Placed(Message):
+class Placed(Message, frozen=True):
     """Where the sender flies; None: it has stepped aside."""
 
     value: Value | None

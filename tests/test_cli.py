@@ -1,0 +1,307 @@
+"""The command line as a user meets it: what it prints, what it writes, and its exit status."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from problems import team_of
+
+from robochoc.cli.commands import cli
+from robochoc.formats import read_team, write_team
+from robochoc.generators.queens3d import queens3d
+from robochoc.problem import Constraint, Model, Relation, Semantics
+
+PROGRAM = str(Path(sys.executable).parent / "robochoc")
+ROOT = Path(__file__).parents[1]
+RESULT_KEYS = {
+    "team", "protocol", "runtime", "seed", "verdict", "assignment", "cost", "withdrawn", "epochs", "metrics",
+    "verified",
+}  # fmt: skip
+METRIC_KEYS = {"messages", "bytes", "ncccs", "checks", "wall_s"}
+
+
+def robochoc(*words: object, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run the program; no run prints a traceback."""
+    done = subprocess.run(
+        [PROGRAM, *map(str, words)], cwd=folder, capture_output=True, text=True, timeout=100, check=False
+    )
+    assert "Traceback" not in done.stderr, done.stderr
+    return done
+
+
+@pytest.fixture
+def four(tmp_path: Path) -> Path:
+    folder = tmp_path / "queens3d-4"
+    write_team(queens3d(4), folder)
+    return folder
+
+
+# generate
+
+
+def test_generate_writes_where_it_says(tmp_path: Path) -> None:
+    done = robochoc("generate", "queens3d", "--n", 3, folder=tmp_path)
+    assert done.returncode == 0
+    assert sorted(path.name for path in (tmp_path / "instances" / "queens3d-3").iterdir())[:2] == [
+        "Robot1.1.xml",
+        "Robot1.2.xml",
+    ]
+    assert read_team(tmp_path / "instances" / "queens3d-3") == queens3d(3)
+
+
+def test_generate_does_not_overwrite_unless_forced(four: Path) -> None:
+    again = ("generate", "queens3d", "--n", 3, "-o", four)
+    done = robochoc(*again)
+    assert done.returncode == 1
+    assert "--force" in done.stderr
+    assert len(list(four.iterdir())) == 16
+    assert robochoc(*again, "--force").returncode == 0
+    assert len(list(four.iterdir())) == 9
+    assert [path.name for path in four.parent.iterdir()] == [four.name]
+
+
+def test_force_does_not_replace_a_folder_that_is_no_team(tmp_path: Path) -> None:
+    (tmp_path / "home").mkdir()
+    (tmp_path / "home" / "thesis.tex").write_text("years of work")
+    done = robochoc("generate", "queens3d", "--n", 3, "-o", tmp_path / "home", "--force")
+    assert done.returncode == 1
+    assert "thesis.tex" in done.stderr
+    assert (tmp_path / "home" / "thesis.tex").exists()
+
+
+@pytest.mark.parametrize("n", ["0", "65", "four", "-1"])
+def test_generate_refuses_absurd_sizes_as_wrong_usage(tmp_path: Path, n: str) -> None:
+    assert robochoc("generate", "queens3d", "--n", n, folder=tmp_path).returncode == 2
+
+
+# validate
+
+
+def test_validate_says_one_line_a_team(four: Path) -> None:
+    done = robochoc("validate", folder=ROOT)
+    assert done.returncode == 0
+    assert done.stdout.splitlines() == [
+        "instances/queens3d-4: 16 robots, 16 variables, 76 constraints: ok",
+        "instances/queens3d-7: 49 robots, 49 variables, 476 constraints: ok",
+    ]
+    assert robochoc("validate", four / "Robot1.1.xml").stdout.endswith("1 robot, 1 variable, 0 constraints: ok\n")
+
+
+def test_validate_tells_every_mistake_of_every_file(four: Path) -> None:
+    for name, old, new in (
+        ("Robot1.1.xml", 'nbValues="4"', 'nbValues="5"'),
+        ("Robot3.1.xml", 'reference="neq"', 'reference="nope"'),
+        ("Robot4.4.xml", "</instance>", ""),
+    ):
+        path = four / name
+        path.write_text(path.read_text().replace(old, new))
+    done = robochoc("validate", four)
+    assert done.returncode == 1
+    assert "queens3d-4: 4 errors" in done.stdout
+    for name in ("Robot1.1.xml:5:", "Robot3.1.xml:", "Robot4.4.xml:"):
+        assert name in done.stdout
+    assert robochoc("solve", four).returncode == 1
+
+
+def test_validate_json(four: Path) -> None:
+    good = json.loads(robochoc("validate", four, "--json").stdout)
+    assert good == {"path": str(four), "valid": True, "robots": 16, "variables": 16, "constraints": 76, "errors": []}
+    (four / "Robot1.1.xml").unlink()
+    bad = json.loads(robochoc("validate", four, "--json").stdout)
+    assert bad["valid"] is False
+    assert all({"file", "line", "message", "hint"} <= error.keys() for error in bad["errors"])
+
+
+def test_an_empty_place_says_what_to_do(tmp_path: Path) -> None:
+    for command in ("validate", "solve"):
+        done = robochoc(command, tmp_path)
+        assert done.returncode == 1
+        assert "robochoc generate queens3d --n 4" in done.stdout + done.stderr
+
+
+# solve
+
+
+@pytest.mark.parametrize("runtime", ["processes", "simulator"])
+def test_solve_json_is_the_contract(runtime: str) -> None:
+    done = robochoc("solve", "instances/", "--json", "--runtime", runtime, folder=ROOT)
+    assert done.returncode == 0
+    assert done.stderr == ""
+    four, seven = map(json.loads, done.stdout.splitlines())
+    assert four.keys() == seven.keys() == RESULT_KEYS
+    assert four["metrics"].keys() >= METRIC_KEYS
+    assert (four["team"], four["verdict"], four["assignment"], four["cost"]) == ("queens3d-4", "no-solution", {}, None)
+    assert (seven["team"], seven["verdict"], seven["cost"], seven["verified"]) == ("queens3d-7", "solution", 0, True)
+    assert len(seven["assignment"]) == 49
+    assert sum(seven["metrics"]["messages_by_type"].values()) == seven["metrics"]["messages"]
+
+
+@pytest.mark.parametrize("words", [["--withdraw"], ["--withdraw", "maximal"], ["--withdraw=maximal"]])
+def test_withdraw_may_stand_alone_even_before_the_path(four: Path, words: list[str]) -> None:
+    done = robochoc("solve", *words, four, "--json", "--runtime", "simulator")
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert (result["verdict"], result["verified"]) == ("solution", True)
+    assert len(result["withdrawn"]) + len(result["assignment"]) == 16
+
+
+def test_solve_tells_people_what_happened(four: Path) -> None:
+    words = robochoc("solve", four, "--withdraw", "--runtime", "simulator").stdout
+    assert "no solution (Robot" in words
+    assert "has derived the empty nogood" in words
+    assert "9 robots fly, 7 step aside" in words
+    assert re.search(r"row\\column +1 +2 +3 +4", words)
+
+
+def test_a_seed_repeats_a_run(four: Path) -> None:
+    first, again, other = (
+        json.loads(robochoc("solve", four, "--json", "--runtime", "simulator", "--seed", seed).stdout)
+        for seed in (1, 1, 2)
+    )
+    for result in (first, again, other):
+        del result["metrics"]["wall_s"]
+    assert first == again
+    assert first["metrics"] != other["metrics"]
+
+
+@pytest.mark.parametrize("runtime", ["processes", "simulator"])
+def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
+    write_team(queens3d(9), tmp_path / "nine")
+    done = robochoc("solve", tmp_path / "nine", "--timeout", "0.3", "--json", "--runtime", runtime)
+    assert done.returncode == 3
+    assert json.loads(done.stdout)["verdict"] == "unknown"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--protocol", "abd"], "did you mean 'abt'"),
+        (["--runtime", "network"], "network"),
+        (["--seed", "-1"], "--seed"),
+        (["--timeout", "0"], "--timeout"),
+        (["--withdraw=fewest"], "fewest"),
+        (["--nonsense"], "--nonsense"),
+    ],
+)
+def test_wrong_usage_is_status_2(four: Path, words: list[str], said: str) -> None:
+    done = robochoc("solve", four, *words)
+    assert done.returncode == 2
+    assert said in done.stderr
+
+
+def test_one_file_cannot_hold_several_teams(tmp_path: Path) -> None:
+    done = robochoc("solve", "instances/", "--html", tmp_path / "page.html", folder=ROOT)
+    assert done.returncode == 2
+    assert "2 were found" in done.stderr
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_what_this_version_cannot_solve_is_said_in_one_sentence(tmp_path: Path) -> None:
+    differ = Relation("R", 2, Semantics.CONFLICTS, ((1, 1),))
+    part = Constraint("C", differ, ("A", "B"), ("A", "B"), model=Model.PKC)
+    write_team(team_of({"A": (1, 2), "B": (1, 2)}, [part]), tmp_path / "private")
+    done = robochoc("solve", tmp_path / "private")
+    assert done.returncode == 2
+    assert "PKC" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_robots_with_several_variables_are_said_to_be_the_next_step() -> None:
+    done = robochoc("solve", ROOT / "tests" / "data" / "complex")
+    assert done.returncode == 2
+    assert "variables; this version" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_the_jchoc_originals_load_and_are_said_to_be_the_next_step() -> None:
+    originals = ROOT.parent / "shared" / "data" / "jchoc"
+    if not originals.is_dir():
+        pytest.skip("the original files are not part of this repository")
+    assert "3 robots, 12 variables" in robochoc("validate", originals).stdout
+    done = robochoc("solve", originals)
+    assert done.returncode == 2
+    assert "A1 has 4 variables" in done.stderr
+
+
+def test_progress_is_shown_on_a_terminal_only(tmp_path: Path) -> None:
+    write_team(queens3d(8), tmp_path / "eight")
+    words = [PROGRAM, "solve", str(tmp_path / "eight"), "--timeout", "1.5"]
+    assert subprocess.run(words, capture_output=True, check=False).stderr == b""
+    ours, theirs = pty.openpty()
+    with subprocess.Popen(words, stderr=theirs, stdout=subprocess.DEVNULL) as running:
+        os.close(theirs)
+        shown = b""
+        while True:
+            try:
+                chunk = os.read(ours, 4096)
+            except OSError:
+                break
+            shown += chunk
+        running.wait(timeout=30)
+    os.close(ours)
+    assert re.search(rb"eight: [0-9,]+ messages", shown)
+
+
+# journal, page, animate
+
+
+def test_a_journal_and_a_result_give_the_page_that_solve_gives(four: Path) -> None:
+    folder = four.parent
+    done = robochoc(
+        "solve", four, "--withdraw", "--json", "--journal", folder / "run.jsonl", "--html", folder / "solve.html"
+    )
+    (folder / "result.json").write_text(done.stdout)
+    for saved in ("run.jsonl", "result.json"):
+        page = folder / f"{saved}.html"
+        assert robochoc("animate", folder / saved, "--team", four, "-o", page).returncode == 0
+        assert page.read_bytes() == (folder / "solve.html").read_bytes()
+    assert robochoc("animate", folder / "result.json", "-o", folder / "alone.html").returncode == 0
+
+
+@pytest.mark.parametrize(
+    "content", ["", "{}", "nonsense", '{"event":"Journal"}', '{"event":"Journal","team":"x"}\n{', "[" * 100_000, "\xff"]
+)
+def test_animate_refuses_what_is_neither(tmp_path: Path, content: str) -> None:
+    saved = tmp_path / "saved"
+    saved.write_text(content, encoding="latin-1")
+    done = robochoc("animate", saved, "-o", tmp_path / "page.html")
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_animate_says_what_is_missing(tmp_path: Path) -> None:
+    assert robochoc("animate", tmp_path / "nothing", "-o", tmp_path / "page.html").returncode == 1
+    assert robochoc("animate", tmp_path / "nothing").returncode == 2
+
+
+def test_an_output_that_cannot_be_written_is_one_message(four: Path) -> None:
+    for option in ("--html", "--journal"):
+        done = robochoc("solve", four, "--runtime", "simulator", option, four / "no" / "such" / "folder")
+        assert done.returncode == 1
+        assert "no/such" in done.stderr
+
+
+# the whole
+
+
+def test_every_command_has_help_and_is_in_the_readme() -> None:
+    readme = (ROOT / "README.md").read_text()
+    for name, command in cli.commands.items():
+        assert command.help, name
+        assert f"robochoc {name}" in readme, name
+    assert robochoc("--help").returncode == 0
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = "import sys, robochoc.cli.commands; print(*sys.modules)"
+    modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    heavy = {"numpy", "meshcat", "lxml", "rich", "msgspec", "multiprocessing", "tornado", "pycsp3", "zenoh"}
+    assert not heavy & set(modules)

@@ -1,0 +1,113 @@
+"""Every registered protocol, on every runtime, over random problems and schedules, against brute force."""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from problems import random_team, solutions, teams
+
+from robochoc.communication.run_result import RunResult
+from robochoc.observers.checker import objections
+from robochoc.outcome import Outcome, Verdict
+from robochoc.problem import Team
+from robochoc.registry import protocol_names
+from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
+
+BATCHES, PER_BATCH = 10, 300
+EVERY_PROTOCOL = pytest.mark.parametrize("protocol", protocol_names())
+
+
+def agrees(team: Team, options: Options) -> Verdict:
+    """Solve `team`; the verdict must be brute force's. `solve` itself has the solution checked."""
+    outcome = solve(team, options)
+    truth = next(solutions(team), None)
+    expected = Verdict.NO_SOLUTION if truth is None else Verdict.SOLUTION
+    assert outcome.verdict is expected, (team, options)
+    assert outcome.verified is (truth is not None)
+    return outcome.verdict
+
+
+def random_schedule(chance: Random) -> Options:
+    """Any channel next, or time in checks with delays from none to long ones."""
+    schedule = chance.choice(list(ScheduleName))
+    return Options(
+        runtime=Runtime.SIMULATOR,
+        schedule=schedule,
+        delay=chance.choice((0, 3, 20, 200)) if schedule is ScheduleName.CONCURRENT else 0,
+        seed=chance.getrandbits(32),
+        timeout=60,
+    )
+
+
+@EVERY_PROTOCOL
+@pytest.mark.parametrize("batch", range(BATCHES))
+def test_simulator_agrees_with_brute_force(protocol: str, batch: int) -> None:
+    chance = Random(f"{protocol} {batch}")
+    seen = {Verdict.SOLUTION: 0, Verdict.NO_SOLUTION: 0}
+    for _ in range(PER_BATCH):
+        options = random_schedule(chance)
+        seen[agrees(random_team(chance), Options(**{**vars(options), "protocol": protocol}))] += 1
+    assert min(seen.values()) > PER_BATCH // 4, f"the problems are one-sided: {seen}"
+
+
+@EVERY_PROTOCOL
+@given(team=teams, chance=st.randoms(use_true_random=False))
+@settings(max_examples=150, deadline=None)
+def test_simulator_agrees_with_brute_force_and_shrinks(protocol: str, team: Team, chance: Random) -> None:
+    agrees(team, Options(**{**vars(random_schedule(chance)), "protocol": protocol}))
+
+
+@EVERY_PROTOCOL
+@pytest.mark.parametrize("batch", range(4))
+def test_processes_agree_with_brute_force(protocol: str, batch: int) -> None:
+    chance = Random(f"processes {protocol} {batch}")
+    for _ in range(25):
+        agrees(random_team(chance), Options(protocol=protocol, timeout=60))
+
+
+@pytest.mark.parametrize("runtime", list(Runtime))
+def test_withdrawing_leaves_a_placement_that_nobody_could_join(runtime: Runtime) -> None:
+    chance = Random(f"withdraw {runtime}")
+    wanted = 200 if runtime is Runtime.SIMULATOR else 15
+    while wanted:
+        team = random_team(chance)
+        if next(solutions(team), None):
+            continue
+        wanted -= 1
+        outcome = solve(team, Options(runtime=runtime, withdraw=Withdrawal.MAXIMAL, timeout=60))
+        assert outcome.verdict is Verdict.SOLUTION
+        assert outcome.withdrawn
+        assert not joinable(team, outcome)
+
+
+def joinable(team: Team, outcome: Outcome) -> list[str]:
+    """By brute force: robots that stepped aside although one of their values fits those that fly."""
+    fitting = []
+    for name in outcome.withdrawn:
+        (variable,) = team[name].variables
+        for value in variable.domain:
+            larger = {**outcome.assignment, variable.name: value}
+            met = (c for c in team.constraints() if all(seen in larger for seen in c.variables))
+            if all(constraint.allows(larger) for constraint in met):
+                fitting.append(name)
+    return fitting
+
+
+def test_withdrawing_is_not_asked_of_a_team_that_has_a_solution() -> None:
+    chance = Random(0)
+    while not next(solutions(team := random_team(chance)), None):
+        pass
+    outcome = solve(team, Options(runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL))
+    assert outcome.withdrawn == ()
+    assert not list(objections(team, outcome.assignment))
+
+
+def test_a_result_joins_clocks_by_the_largest() -> None:
+    from robochoc.outcome import Metrics  # noqa: PLC0415
+
+    parts = [Metrics({"Ok": 2}, 10, 5, 7), Metrics({"Ok": 1, "Nogood": 1}, 20, 3, 4)]
+    joined = RunResult.of(Verdict.SOLUTION, None, {}, parts, 1.5).metrics
+    assert joined == Metrics({"Nogood": 1, "Ok": 3}, 30, 5, 11, 1.5)

@@ -1,0 +1,83 @@
+"""Termination detection: never too early, whatever the order of things; and at last, when all is quiet."""
+
+from __future__ import annotations
+
+from collections import deque
+from random import Random
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robochoc.communication.quiescence import Counts, FourCounters
+
+ROBOTS = ("A", "B", "C", "D")
+
+
+class Network:
+    """Robots that pass on messages for a while; reports and waves take as long as they like, in FIFO channels."""
+
+    def __init__(self, chance: Random, budget: int) -> None:
+        self.chance = chance
+        self.budget = budget
+        self.counts = dict.fromkeys(ROBOTS, Counts(0, 0))
+        self.flying: list[str] = []
+        self.orders: dict[str, deque[int]] = {name: deque() for name in ROBOTS}
+        self.answers: dict[str, deque[tuple[int, Counts]]] = {name: deque() for name in ROBOTS}
+        for name in ROBOTS:
+            self.speak(name, chance.randint(0, 2))
+
+    def speak(self, name: str, messages: int) -> None:
+        messages = min(messages, self.budget)
+        self.budget -= messages
+        self.flying += self.chance.choices(ROBOTS, k=messages)
+        self.counts[name] = self.counts[name]._replace(sent=self.counts[name].sent + messages)
+
+    def step(self, counters: FourCounters) -> None:
+        """One thing happens: a message arrives, a robot reports, hears of a wave, or is heard."""
+        name = self.chance.choice(ROBOTS)
+        match self.chance.randrange(4):
+            case 0 if self.flying:
+                receiver = self.flying.pop(self.chance.randrange(len(self.flying)))
+                self.speak(receiver, self.chance.choice((0, 0, 1, 2)))
+                self.counts[receiver] = self.counts[receiver]._replace(received=self.counts[receiver].received + 1)
+            case 1:
+                self.answers[name].append((0, self.counts[name]))
+            case 2 if self.orders[name]:
+                self.answers[name].append((self.orders[name].popleft(), self.counts[name]))
+            case 3 if self.answers[name]:
+                counters.answer(name, *self.answers[name].popleft())
+            case _:
+                pass
+        if counters.due and not counters.quiescent:
+            wave = counters.begin_wave()
+            for orders in self.orders.values():
+                orders.append(wave)
+
+
+@given(seed=st.integers(0, 2**32), budget=st.integers(0, 40))
+@settings(max_examples=500, deadline=None)
+def test_quiet_is_declared_when_it_is_true_and_only_then(seed: int, budget: int) -> None:
+    network, counters = Network(Random(seed), budget), FourCounters(ROBOTS)
+    for _ in range(20_000):
+        network.step(counters)
+        if counters.quiescent:
+            assert not network.flying
+            return
+    raise AssertionError("quiet, and not noticed")
+
+
+def test_nobody_is_quiet_before_all_have_been_heard() -> None:
+    counters = FourCounters(("A", "B"))
+    counters.hear("A", Counts(0, 0))
+    assert not counters.due
+
+
+def test_one_balanced_wave_is_not_enough() -> None:
+    counters = FourCounters(("A", "B"))
+    counters.hear("A", Counts(1, 0))
+    counters.hear("B", Counts(0, 1))
+    wave = counters.begin_wave()
+    counters.answer("A", wave, Counts(1, 0))
+    counters.answer("B", wave, Counts(1, 1))  # it has spoken since
+    assert not counters.quiescent
+    assert not counters.due
