@@ -278,8 +278,9 @@ class CycleError(ValueError):
 
 
 def natural(name: str) -> tuple[tuple[int, str], ...]:
-    """A key for natural order: `Robot2.1` before `Robot10.1`."""
-    return tuple((int(part), "") if part.isdecimal() else (0, part) for part in re.split(r"([0-9]+)", name))
+    """A key for natural order: `Robot2.1` before `Robot10.1`. Numbers compare by length first, however long."""
+    parts = re.split(r"0*([0-9]+)", name)
+    return tuple((len(part) if place % 2 else 0, part) for place, part in enumerate(parts))
 
 
 def priority_order(parents: Mapping[str, Iterable[str]]) -> tuple[str, ...]:

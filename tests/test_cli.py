@@ -11,6 +11,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from broken import CASES
+from broken_case import Broken
 from problems import team_of
 
 from robochoc.cli.commands import cli
@@ -124,6 +126,19 @@ def test_an_empty_place_says_what_to_do(tmp_path: Path) -> None:
         done = robochoc(command, tmp_path)
         assert done.returncode == 1
         assert "robochoc generate queens3d --n 4" in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("command", ["validate", "solve"])
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_broken_input_is_status_1_and_one_clear_message(case: Broken, command: str, tmp_path: Path) -> None:
+    if (case.name, command) == ("a file for a folder", "validate"):
+        return  # a single robot's file may be validated
+    case.write(tmp_path)
+    done = robochoc(command, tmp_path / case.target)
+    assert done.returncode == 1
+    told = done.stdout.splitlines()[1:] if command == "validate" else done.stderr.splitlines()
+    assert len(told) == len(case.expected(tmp_path))
+    assert done.stdout == "" or command == "validate"
 
 
 # solve

@@ -298,7 +298,7 @@ def _nearest(word: str, known: Collection[str]) -> str:
 
 
 def _listed(known: Collection[str]) -> str:
-    return _shortened(" ".join(known))
+    return _shortened(" ".join(itertools.islice(known, 20)))
 
 
 def _shortened(text: str) -> str:

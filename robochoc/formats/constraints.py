@@ -118,11 +118,14 @@ def _check_application(definition: Relation | Predicate, scope: tuple[Term, ...]
             f"{shortened(definition.name)} takes {takes} terms, but '{_shown(parameters)}' has {len(parameters)}",
             "give it as many as it takes",
         )
+    if parameters == scope:
+        return
+    in_scope, passed = set(scope), set(parameters)
     for term in parameters:
-        if isinstance(term, str) and term not in scope:
+        if isinstance(term, str) and term not in in_scope:
             raise MistakeError(f"the parameter '{shortened(term)}' is not in the scope", "add it to the scope")
     for term in scope:
-        if term not in parameters:
+        if term not in passed:
             raise MistakeError(
                 f"'{shortened(str(term))}' is in the scope but not among the parameters",
                 "delete it there, or add it to the parameters",

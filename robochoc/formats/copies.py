@@ -14,7 +14,7 @@ from itertools import product
 from robochoc.expression import Apply, Constant, Expression, Name, Undefined, compiled
 from robochoc.formats.diagnostics import Diagnostic, shortened
 from robochoc.formats.members import Members
-from robochoc.problem import Constraint, Domain, Model, Relation, Robot
+from robochoc.problem import INFINITE, Constraint, Domain, Model, Relation, Robot
 
 MAX_COMPARED = 1_000_000
 """So many tuples are tried at most to find a difference."""
@@ -97,16 +97,20 @@ def _difference(
     """Where the two say different things; empty where they nowhere do."""
     if any(variable not in domains for variable in variables):
         return ""  # of a robot whose file is broken
-    size = math.prod(len(domains[variable]) for variable in variables)
-    if size > MAX_COMPARED:
-        return f"is written differently from the child's, and {size} tuples are too many to compare"
+    if math.prod(len(domains[variable]) for variable in variables) > MAX_COMPARED:
+        return f"is written differently from the child's, and more than {MAX_COMPARED} tuples are not compared"
     left = [_price(constraint, variables) for constraint in copies]
     right = [_price(constraint, variables) for constraint in originals]
     for values in product(*(domains[variable] for variable in variables)):
         here, there = sum(price(values) for price in left), sum(price(values) for price in right)
         if here != there:
-            return f"gives the tuple '{shortened(' '.join(map(str, values)))}' the cost {here}, the child's {there}"
+            shown = shortened(" ".join(map(str, values)))
+            return f"has the tuple '{shown}' {_said(here)}, and the child has it {_said(there)}"
     return ""
+
+
+def _said(cost: float) -> str:
+    return {0: "allowed", INFINITE: "forbidden"}.get(cost, f"at a cost of {cost}")
 
 
 def _price(constraint: Constraint, variables: tuple[str, ...]) -> Callable[[tuple[int, ...]], float]:

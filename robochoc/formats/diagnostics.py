@@ -78,8 +78,9 @@ def suggestion(word: str, known: Collection[str], what: str) -> str:
     """A hint for an unknown name: the known one that looks like it, or all of them; `what` is their plural."""
     if not known:
         return f"there are no {what}"
-    close = difflib.get_close_matches(word[:40], list(itertools.islice(known, 100)), n=1)
-    return f"did you mean '{close[0]}'?" if close else f"known {what}: {shortened(' '.join(known))}"
+    some = list(itertools.islice(known, 100))
+    close = difflib.get_close_matches(word[:40], some, n=1)
+    return f"did you mean '{close[0]}'?" if close else f"known {what}: {shortened(' '.join(some))}"
 
 
 def shortened(text: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection
 from functools import lru_cache
 
@@ -13,6 +14,7 @@ from robochoc.formats.xml import attribute, line
 from robochoc.problem import Predicate, Topic
 
 _OPERATORS = {"eq": "eq", "ne": "ne", "neq": "ne", "lt": "lt", "le": "le", "gt": "gt", "ge": "ge"}
+_PARAMETER = re.compile(r"[A-Za-z_][A-Za-z0-9_.]*")
 
 PREDEFINED: dict[str, Predicate] = {
     name: Predicate(name, ("X", "Y"), Apply(operator, (Name("X"), Name("Y")))) for name, operator in _OPERATORS.items()
@@ -27,7 +29,7 @@ def read_predicate(element: etree._Element) -> Predicate:
     functional = element.find("expression/functional")
     body = (functional.text if functional is not None else None) or ""
     try:
-        return Predicate(name, parameters, _expression(body, parameters, Type.BOOLEAN))
+        return Predicate(name, parameters, _body(body, parameters))
     except ExpressionError as error:
         below = body[: error.position].count("\n")
         start = line(element if functional is None else functional)
@@ -36,13 +38,12 @@ def read_predicate(element: etree._Element) -> Predicate:
 
 def read_topic(element: etree._Element, variables: Collection[str]) -> Topic:
     """A topic, whose `x`, `y` and `z` are expressions over the robot's own `variables`. Raises `MistakeError`."""
-    known = tuple(variables)
     given: dict[str, Expression] = {}
     for axis in ("x", "y", "z"):
         body = element.get(axis)
         if body is not None:
             try:
-                given[axis] = _expression(body, known, Type.INTEGER)
+                given[axis] = parse(body, variables, Type.INTEGER)
             except ExpressionError as error:
                 raise _mistake(f"{axis} of the topic", error) from None
     kind = attribute(element, "type") or Topic.type
@@ -55,18 +56,20 @@ def _formal(text: str) -> tuple[str, ...]:
     names = tuple(words[1::2])
     if len(words) % 2 or any(word != "int" for word in words[::2]):
         raise MistakeError(f"the parameters '{shortened(' '.join(words))}' cannot be read", "write int X int Y")
-    for index, name in enumerate(names):
-        if not (name.isascii() and name.replace(".", "_").isidentifier()):
+    seen: set[str] = set()
+    for name in names:
+        if not _PARAMETER.fullmatch(name):
             raise MistakeError(f"'{shortened(name)}' is no name for a parameter", "write int X int Y")
-        if name in names[:index]:
+        if name in seen:
             raise MistakeError(f"two parameters are called '{shortened(name)}'", "rename one of them")
+        seen.add(name)
     return names
 
 
 @lru_cache(maxsize=256)
-def _expression(text: str, names: tuple[str, ...], wanted: Type) -> Expression:
+def _body(text: str, parameters: tuple[str, ...]) -> Expression:
     """The robots of a team mostly say the same: equal texts are parsed once and share one tree."""
-    return parse(text, names, wanted)
+    return parse(text, parameters, Type.BOOLEAN)
 
 
 def _mistake(what: str, error: ExpressionError, number: int = 0) -> MistakeError:

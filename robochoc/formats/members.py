@@ -98,15 +98,21 @@ class Members:
             return None
         return {name: place for place, name in enumerate(order)}
 
+    @cached_property
+    def _used(self) -> dict[str, dict[str, int]]:
+        """For each robot the variables in the constraints it holds, and the first line that uses each."""
+        used: dict[str, dict[str, int]] = {}
+        for robot in self.robots:
+            lines = used[robot.name] = {}
+            for constraint in robot.shared:
+                for variable in constraint.variables:
+                    lines.setdefault(variable, constraint.line)
+        return used
+
     def needed(self, parent: str, child: str) -> dict[str, int]:
         """The variables of `parent` in constraints that `child` holds, with the line that needs each."""
-        own = self.files[parent].lines
-        needed: dict[str, int] = {}
-        for constraint in self.files[child].robot.shared:
-            for variable in constraint.variables:
-                if variable in own:
-                    needed.setdefault(variable, constraint.line)
-        return needed
+        used = self._used[child]
+        return {variable: used[variable] for variable in self.files[parent].lines if variable in used}
 
     def place(self, robot: str, variable: str = "") -> str:
         """File and line of a robot, or of a variable of its, for a message about two robots."""

@@ -12,13 +12,12 @@ from robochoc.problem import CycleError, priority_order
 
 def missing_files(members: Members) -> Iterator[Diagnostic]:
     """Neighbours that have no file."""
-    known = {*members.files, *members.broken}
+    known = dict.fromkeys([*members.files, *sorted(members.broken)])
     for entry in members.entries.values():
         if entry.other not in known:
             name = shortened(entry.other)
             message = f"the {entry.role} '{name}' has no file: there is no {members.folder / name}.xml"
-            others = suggestion(name, sorted(known - {entry.robot.name}), "other robots")
-            hint = f"write that file or delete this agent; {others}"
+            hint = f"write that file or delete this agent; {suggestion(name, known, 'robots')}"
             yield Diagnostic(entry.robot.file, entry.line, message, hint)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -115,7 +116,7 @@ class _Reader:
                 if domain not in domains:
                     raise MistakeError(f"unknown domain '{shortened(domain)}'", suggestion(domain, domains, "domains"))
                 values = domains[domain]
-                if values:
+                if values is not None:
                     variables.append(Variable(name, values))
         if not self._own:
             element = next(self._instance.iterchildren("variables"))
@@ -190,8 +191,8 @@ class _Reader:
             repeated = tuple(constraint for constraint in held if constraint.model is Model.TKC)
             if repeated:
                 copies[name] = repeated
-            scopes = {variable for constraint in held for variable in constraint.variables}
-            told = tuple(variable for variable in self._own if variable in scopes)
+            scopes = itertools.chain.from_iterable(constraint.variables for constraint in held)
+            told = tuple(dict.fromkeys(variable for variable in scopes if variable in self._own))
             if agent.get("variable") is not None:
                 told = tuple((agent.get("variable") or "").split())
                 with self._report.at(line(agent)):
@@ -199,14 +200,16 @@ class _Reader:
             yield Child(name, told, parts, line(agent))
 
     def _check_told(self, told: tuple[str, ...]) -> None:
-        for index, variable in enumerate(told):
+        seen: set[str] = set()
+        for variable in told:
             if variable not in self._own:
                 hint = suggestion(variable, self._own, "own variables")
                 raise MistakeError(
                     f"the child is to be told '{shortened(variable)}', which is not the robot's own", hint
                 )
-            if variable in told[:index]:
+            if variable in seen:
                 raise MistakeError(f"the child is to be told '{shortened(variable)}' twice", "name it once")
+            seen.add(variable)
 
     def _check_neighbours(self, parents: tuple[Parent, ...], children: tuple[Child, ...]) -> None:
         seen: dict[str, str] = {self._name: "the robot itself"}

@@ -64,9 +64,19 @@ def entries(error_log: object) -> list[LogEntry]:
     return list(cast("Iterable[LogEntry]", error_log))
 
 
-def check_schema(tree: etree._Element, file: str, root: str) -> None:
-    """Raise `InvalidInput` unless `tree`, read from `file`, is valid by the schema for `root` elements."""
-    schema = _schema(_SCHEMAS[root])
+@cache
+def schema_for(root: str) -> etree.XMLSchema:
+    """The schema of files with that root element, compiled when the first of them is read.
+
+    Schemas lie in the wheel's package, or at the checkout's top.
+    """
+    name, here = _SCHEMAS[root], Path(__file__).resolve()
+    inside, outside = here.parents[1] / "xsd" / name, here.parents[2] / "xsd" / name
+    return etree.XMLSchema(file=str(inside if inside.is_file() else outside))
+
+
+def check_schema(tree: etree._Element, file: str, schema: etree.XMLSchema) -> None:
+    """Raise `InvalidInput` unless `tree`, read from `file`, is valid."""
     if schema.validate(tree):
         return
     report = Report(file)
@@ -80,14 +90,6 @@ def check_schema(tree: etree._Element, file: str, root: str) -> None:
         message, hint = next(phrase for sign, *phrase in _PHRASES if sign in parts["message"])
         report.add(entry.line, message.format_map(parts), hint.format_map(parts))
     report.finish()
-
-
-@cache
-def _schema(name: str) -> etree.XMLSchema:
-    """Compiled once, when the first file is read. Schemas lie in the wheel's package, or at the checkout's top."""
-    here = Path(__file__).resolve()
-    inside, outside = here.parents[1] / "xsd" / name, here.parents[2] / "xsd" / name
-    return etree.XMLSchema(file=str(inside if inside.is_file() else outside))
 
 
 def _parts(entry: LogEntry) -> dict[str, str]:

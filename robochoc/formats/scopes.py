@@ -13,23 +13,24 @@ def misplaced(members: Members) -> Iterator[Diagnostic]:
     """Constraints with parents whose scopes do not fit the place where they stand."""
     for robot in members.robots:
         if members.has_all_parents(robot.name):
+            near = {robot.name, *members.agreed[robot.name]}
             for parent in robot.parents:
                 for constraint in parent.constraints:
-                    mistake = _foreign(members, robot, parent, constraint) or _place(members, robot, parent, constraint)
+                    mistake = _foreign(members, near, parent, constraint) or _place(members, robot, parent, constraint)
                     if mistake:
                         yield Diagnostic(robot.file, constraint.line, *mistake)
 
 
-def _foreign(members: Members, robot: Robot, parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
-    """A variable in the scope that is no parent's, if there is one."""
+def _foreign(members: Members, near: set[str], parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
+    """A variable in the scope that belongs to no robot in `near` (itself and its parents), if there is one."""
     for name in constraint.variables:
         owners = members.owners.get(name, [])
         if not owners and not members.broken:
             known = members.files[parent.name].lines
             hint = f"{suggestion(name, known, 'variables')} ({members.place(parent.name)})"
             return f"no robot has the variable '{shortened(name)}'", hint
-        if len(owners) == 1 and owners[0] not in {robot.name, *members.agreed[robot.name]}:
-            message = f"the variable '{name}' belongs to '{owners[0]}', which is no parent of '{robot.name}'"
+        if len(owners) == 1 and owners[0] not in near:
+            message = f"the variable '{name}' belongs to '{owners[0]}', which is no parent of this robot"
             hint = "a constraint stands with the lowest robot of its scope, and the others are parents of that"
             return message, f"{hint} ({members.place(owners[0], name)})"
     return None
@@ -60,14 +61,13 @@ def misplaced_parts(members: Members) -> Iterator[Diagnostic]:
     for robot in members.robots:
         for child in robot.children:
             if members.is_parent(robot.name, child.name):
-                known = {**members.files[robot.name].lines, **members.files[child.name].lines}
+                own, others = members.files[robot.name].lines, members.files[child.name].lines
                 for part in child.constraints:
-                    for variable in part.variables:
-                        if variable not in known:
-                            message = f"'{shortened(variable)}' is no variable of '{robot.name}' or '{child.name}'"
-                            hint = f"{suggestion(variable, known, 'variables')} ({members.place(child.name)})"
-                            yield Diagnostic(robot.file, part.line, message, hint)
-                            break
+                    foreign = [name for name in part.variables if name not in own and name not in others]
+                    if foreign:
+                        message = f"'{shortened(foreign[0])}' is no variable of '{robot.name}' or '{child.name}'"
+                        hint = f"{suggestion(foreign[0], others, 'variables')} ({members.place(child.name)})"
+                        yield Diagnostic(robot.file, part.line, message, hint)
 
 
 def untold(members: Members) -> Iterator[Diagnostic]:
@@ -78,7 +78,7 @@ def untold(members: Members) -> Iterator[Diagnostic]:
                 needed = members.needed(robot.name, child.name)
                 lacking = [name for name in needed if name not in child.variables]
                 if lacking:
-                    message = f"the child '{child.name}' must also be told {' '.join(lacking)}"
+                    message = f"the child '{child.name}' must also be told {shortened(' '.join(lacking))}"
                     where = f"{members.files[child.name].robot.file}:{needed[lacking[0]]}"
-                    hint = f'write variable="{" ".join([*child.variables, *lacking])}", as {where} needs it'
+                    hint = f'write variable="{shortened(" ".join([*child.variables, *lacking]))}", as {where} needs it'
                     yield Diagnostic(robot.file, child.line, message, hint)

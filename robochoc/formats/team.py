@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 from robochoc.formats.copies import differing_copies
@@ -17,6 +18,9 @@ from robochoc.formats.scopes import misplaced, misplaced_parts, untold
 from robochoc.problem import Robot, Team, natural, priority_order
 
 _NEXT_STEP = "give a folder with one XML file per robot; 'robochoc generate queens3d --n 4' writes one"
+
+MAX_BETWEEN = 1000
+"""So many mistakes between the files of one team are told."""
 
 
 def find_teams(path: Path | str) -> list[Path]:
@@ -53,7 +57,7 @@ def read_team(folder: Path | str) -> Team:
     except InvalidInput as invalid:
         found.extend(invalid.diagnostics)
     members = Members(folder, files, frozenset(path.stem for path in paths) - files.keys())
-    found.extend(_mistakes(members))
+    found.extend(islice(_mistakes(members), MAX_BETWEEN))
     if found:
         raise InvalidInput(found)
     order = priority_order(members.agreed)
@@ -81,8 +85,7 @@ def _informed(members: Members, name: str) -> Robot:
     for child in file.robot.children:
         variables = child.variables
         if child.name in file.unsaid:
-            needed = {*variables, *members.needed(name, child.name)}
-            variables = tuple(variable.name for variable in file.robot.variables if variable.name in needed)
+            variables = tuple(dict.fromkeys([*variables, *members.needed(name, child.name)]))
         children.append(replace(child, variables=variables))
     return replace(file.robot, children=tuple(children))
 

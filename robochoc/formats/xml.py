@@ -14,10 +14,12 @@ from typing import cast
 
 from lxml import etree
 
-from robochoc.formats.diagnostics import Diagnostic, InvalidInput
-from robochoc.formats.schema import check_schema, entries
+from robochoc.formats.diagnostics import MAX_PER_FILE, Diagnostic, InvalidInput
+from robochoc.formats.schema import check_schema, entries, schema_for
 
 MAX_BYTES = 16 * 1024 * 1024
+_SMALL = 64 * 1024
+_CHUNK = 1024
 
 _BLANKS = " \t\r\n"
 _DOCTYPE = re.compile(rb"(?>\xef\xbb\xbf)?(?>[ \t\r\n]|<\?.*?\?>|<!--.*?-->)*+<!DOCTYPE", re.DOTALL)
@@ -59,7 +61,10 @@ def read_xml(path: Path, root: str) -> etree._Element:
         if tree.tag.endswith(f"}}{root}"):
             what = f"<{root}> stands in an XML namespace"
         raise _invalid(path, line(tree), what, f"expected <{root}>, without any xmlns")
-    check_schema(tree, str(path), root)
+    schema = schema_for(root)
+    if len(content) > _SMALL:
+        tree = _with_few_mistakes(tree, content, schema)
+    check_schema(tree, str(path), schema)
     return tree
 
 
@@ -73,7 +78,7 @@ def line(element: etree._Element) -> int:
     return cast("int | None", element.sourceline) or 0
 
 
-def _parser() -> etree.XMLParser:
+def _parser(schema: etree.XMLSchema | None = None, *, recover: bool = False) -> etree.XMLParser:
     """Comments and processing instructions are read over; the encoding is UTF-8 whatever the file declares."""
     return etree.XMLParser(
         encoding="utf-8",
@@ -83,7 +88,23 @@ def _parser() -> etree.XMLParser:
         huge_tree=False,
         remove_comments=True,
         remove_pis=True,
+        recover=recover,
+        schema=schema,
     )
+
+
+def _with_few_mistakes(tree: etree._Element, content: bytes, schema: etree.XMLSchema) -> etree._Element:
+    """`tree`, cut off where so many mistakes are found that no more are told.
+
+    For each mistake lxml counts the siblings before it, and a million of them take it hours. A parser that validates
+    while it reads does not, but knows no lines either: it only says how much to look at.
+    """
+    counting = _parser(schema)
+    for start in range(0, len(content), _CHUNK):
+        counting.feed(content[start : start + _CHUNK])
+        if len(entries(counting.feed_error_log)) > MAX_PER_FILE:
+            return etree.fromstring(content[: start + _CHUNK], _parser(recover=True))
+    return tree
 
 
 def _content(path: Path) -> bytes:

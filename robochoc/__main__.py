@@ -1,0 +1,5 @@
+"""`python -m robochoc` is `robochoc`."""
+
+from robochoc.cli.main import main
+
+main()
