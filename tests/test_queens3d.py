@@ -61,7 +61,8 @@ def test_constraints_say_who_attacks_whom(n: int, model: QueensModel) -> None:
         constraint = shared.get(names)
         for levels in itertools.product(range(1, n + 1), repeat=2):
             allows = constraint is None or constraint.allows(dict(zip(names, levels, strict=True)))
-            assert allows is not attacks(model, (*one, levels[0]), (*other, levels[1]))
+            queens = ((one[0], one[1], levels[0]), (other[0], other[1], levels[1]))
+            assert allows is not attacks(model, *queens)
 
 
 def test_priority_is_lexicographic() -> None:

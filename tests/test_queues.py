@@ -24,7 +24,8 @@ def ends() -> Iterator[tuple[QueueReader, QueueWriter]]:
 @given(bodies=st.lists(st.binary(max_size=300)), cuts=st.lists(st.integers(1, 50)))
 def test_bodies_survive_any_cutting(bodies: list[bytes], cuts: list[int]) -> None:
     stream = b"".join(len(body).to_bytes(4, "big") + body for body in bodies)
-    buffer, got = bytearray(), []
+    buffer = bytearray()
+    got: list[bytes] = []
     for cut in [*cuts, len(stream)]:
         buffer += stream[:cut]
         stream = stream[cut:]

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robochoc.cli.failure import INVALID, fail, invalid_input_fails
+from robochoc.cli.failure import BadInput, invalid_input_fails
 
 if TYPE_CHECKING:
     from robochoc.outcome import Outcome
 
 LARGEST_FILE = 1 << 30
 """1 GiB: a journal of millions of messages."""
+NEXT_STEP = "give what 'robochoc solve --json' or '--journal' wrote"
 
 
 @click.command(short_help="Make the 3D scene of a saved result or journal.")
@@ -59,13 +60,13 @@ def _outcome(saved: Path) -> Outcome:
         with saved.open("rb") as file:
             content = file.read(LARGEST_FILE)
     except OSError as error:
-        fail(f"{saved}: {error.strerror} (give what 'robochoc solve --json' or '--journal' wrote)", INVALID)
+        raise BadInput(f"{saved}: {error.strerror} ({NEXT_STEP})") from error
     try:
         if not is_journal(content):
             return read_result(content)
         outcome = read_journal(content).outcome
     except (BadJournal, BadResult) as wrong:
-        fail(f"{saved}: {wrong} (give what 'robochoc solve --json' or '--journal' wrote)", INVALID)
+        raise BadInput(f"{saved}: {wrong} ({NEXT_STEP})") from wrong
     if outcome is None:
-        fail(f"{saved}: the run broke off before an outcome, so there is nothing to show", INVALID)
+        raise BadInput(f"{saved}: the run broke off before an outcome, so there is nothing to show")
     return outcome

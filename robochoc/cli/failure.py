@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from typing import NoReturn, ParamSpec, TypeVar
+from typing import IO, Any, ParamSpec, TypeVar
 
 import click
 
@@ -14,21 +14,14 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-class Failure(click.ClickException):
-    """A message on stderr, as it is, and an exit status."""
+class BadInput(click.ClickException):
+    """The input is invalid: the message goes to stderr as it is."""
 
-    def __init__(self, message: str, exit_code: int) -> None:
-        super().__init__(message)
-        self.exit_code = exit_code
+    exit_code = INVALID
 
-    def show(self, file: object = None) -> None:  # noqa: ARG002 - click's signature
+    def show(self, file: IO[Any] | None = None) -> None:  # noqa: ARG002 - click's signature
         """Say it on stderr."""
         click.echo(self.message, err=True)
-
-
-def fail(message: str, exit_code: int) -> NoReturn:
-    """End the command."""
-    raise Failure(message, exit_code)
 
 
 def invalid_input_fails(command: Callable[P, R]) -> Callable[P, R]:
@@ -41,6 +34,6 @@ def invalid_input_fails(command: Callable[P, R]) -> Callable[P, R]:
         try:
             return command(*args, **kwargs)
         except InvalidInput as invalid:
-            fail(str(invalid), INVALID)
+            raise BadInput(str(invalid)) from invalid
 
     return guarded

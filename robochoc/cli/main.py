@@ -1,71 +1,91 @@
-"""`robochoc`: the group of commands, and how it ends."""
+"""`robochoc`: where the program begins, and how signals end it.
+
+Ctrl-C and SIGTERM end it as exceptions do, so that every `finally` has its say: exit status 130 or 143, no process
+left, no file half written. Handlers are set before anything else is imported.
+"""
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
+import time
 from types import FrameType
 from typing import NoReturn
 
-import click
-
-from robochoc import __version__
-from robochoc.cli.animate import animate
-from robochoc.cli.generate import generate
-from robochoc.cli.solve import solve
-from robochoc.cli.validate import validate
-
-EXIT_STATUS = """\b
-Exit status:
-  0  a verdict was reached (no-solution is one)
-  1  the input is invalid
-  2  wrong usage, or more than this version can do
-  3  a limit was reached without a verdict
-  4  robots were lost, or the answer was refuted
-"""
-
-
-@click.group(context_settings={"help_option_names": ["-h", "--help"]}, epilog=EXIT_STATUS)
-@click.version_option(__version__, prog_name="robochoc")
-def cli() -> None:
-    """Teams of robots that solve constraint problems together.
-
-    Each robot knows only its own XML file, runs as its own OS process, and talks to its neighbours by messages of
-    a distributed protocol until the team has a solution, or a proof that there is none.
-
-    \b
-    robochoc generate queens3d --n 4
-    robochoc validate
-    robochoc solve instances/
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-
-
-for command in (solve, validate, generate, animate):
-    cli.add_command(command)
+PATIENCE_S = 1.0
+"""So long after the first signal others mean the same one (two Ctrl-C, `timeout` and a shell); later, force."""
+_RETRY_S = 0.01
+_STOPPING = (signal.SIGINT, signal.SIGTERM)
 
 
 def main() -> NoReturn:
-    """Run the command line, and leave with the exit status that FORMAT.md promises; never with a traceback."""
-    signal.signal(signal.SIGTERM, _terminated)
+    """Run the command line, and leave with its exit status."""
+    ending = _Ending()
     try:
-        status = cli.main(standalone_mode=False)
-    except click.ClickException as error:
-        error.show()
-        status = error.exit_code
-    except (click.Abort, KeyboardInterrupt):
-        click.echo("robochoc: interrupted", err=True)
+        ending.listen()
+        from robochoc.cli.commands import run
+
+        status = run()
+        ending.ignore()
+    except KeyboardInterrupt:
+        sys.stderr.write("robochoc: interrupted\n")
         status = 128 + signal.SIGINT
-    except BrokenPipeError:
-        # Whoever read our output has gone; what is left to say goes nowhere.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        status = 128 + signal.SIGPIPE
-    except OSError as error:
-        click.echo(f"robochoc: {error}", err=True)
-        status = 1
-    sys.exit(status if isinstance(status, int) else 0)
+    sys.exit(status)
 
 
-def _terminated(signum: int, _frame: FrameType | None) -> NoReturn:
-    """End as an exception does, so that every `finally` has its say."""
-    sys.exit(128 + signum)
+class _Ending:
+    """What SIGINT and SIGTERM do: the first one raises `KeyboardInterrupt` or `SystemExit` where the program is.
+
+    Not within an import: half of Python's modules print or swallow what is raised while they load.
+    """
+
+    def __init__(self) -> None:
+        self._signum = 0
+        self._since: float | None = None
+
+    def listen(self) -> None:
+        """From now on signals end the program; those that the caller has it ignore (`nohup`, `&`) stay ignored."""
+        signal.signal(signal.SIGALRM, self._again)
+        sys.unraisablehook = self._swallowed
+        for signum in _STOPPING:
+            if signal.getsignal(signum) is not signal.SIG_IGN:
+                signal.signal(signum, self._hear)
+
+    def ignore(self) -> None:
+        """All is done, and nothing is left to undo."""
+        for signum in _STOPPING:
+            signal.signal(signum, signal.SIG_IGN)
+
+    def _hear(self, signum: int, frame: FrameType | None) -> None:
+        if self._since is not None:
+            if time.monotonic() - self._since > PATIENCE_S:
+                signal.signal(signum, signal.SIG_DFL)
+                signal.raise_signal(signum)
+            return
+        self._signum = signum
+        if _importing(frame):
+            signal.setitimer(signal.ITIMER_REAL, _RETRY_S)
+            return
+        self._since = time.monotonic()
+        if signum == signal.SIGINT:
+            raise KeyboardInterrupt
+        sys.exit(128 + signum)
+
+    def _again(self, _signum: int, frame: FrameType | None) -> None:
+        self._hear(self._signum, frame)
+
+    def _swallowed(self, unraisable: sys.UnraisableHookArgs) -> None:
+        """Raise again what Python has dropped because it was raised within a finaliser or a callback."""
+        if isinstance(unraisable.exc_value, KeyboardInterrupt | SystemExit):
+            self._since = None
+            signal.raise_signal(self._signum)
+        else:
+            sys.__unraisablehook__(unraisable)
+
+
+def _importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False

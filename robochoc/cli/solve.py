@@ -101,6 +101,7 @@ class Products:
 @click.pass_context
 def solve(
     context: click.Context,
+    /,
     paths: tuple[Path, ...],
     *,
     as_json: bool,
@@ -148,7 +149,7 @@ def _teams(paths: tuple[Path, ...]) -> tuple[list[Path], list[int]]:
 
 def _solve_one(folder: Path, options: Options, products: Products, *, as_json: bool) -> int:
     """Solve the team in `folder`, tell the outcome, and return the exit status."""
-    from robochoc.communication.processes import RobotsLost
+    from robochoc.communication.robot_link import RobotsLost
     from robochoc.formats import InvalidInput, read_team
     from robochoc.registry import UnknownProtocol
     from robochoc.run import Refuted

@@ -10,21 +10,14 @@ Why fork, why queues are opened on demand, and what was measured: docs/design.md
 
 from __future__ import annotations
 
-import errno
 import multiprocessing
 import multiprocessing.connection
-import resource
 import selectors
-import signal
 import socket
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Collection
 from multiprocessing.context import ForkContext, ForkServerContext
-from multiprocessing.process import BaseProcess
-from typing import Literal, assert_never
-
-import msgspec
+from typing import Literal, assert_never, cast
 
 from robochoc.communication.control import (
     Conclusion,
@@ -42,87 +35,30 @@ from robochoc.communication.control import (
     Stop,
     Wave,
 )
-from robochoc.communication.queues import QueueReader
 from robochoc.communication.quiescence import Counts, FourCounters
+from robochoc.communication.robot_link import RobotLink, RobotsLost
 from robochoc.communication.robot_process import robot_process
 from robochoc.communication.run_result import Progress, RunResult
-from robochoc.observers.events import Lost, Observer, Registered
+from robochoc.communication.system import allow_descriptors, signals_held
+from robochoc.observers.events import AnyEvent, Lost, Observer, Registered
 from robochoc.outcome import Verdict
-from robochoc.problem import Team
+from robochoc.problem import Robot, Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.compiled import Unsupported, interfaces
+from robochoc.solver.compiled import Interfaces, Unsupported, interfaces
 
 StartMethod = Literal["fork", "forkserver"]
+_CONTEXTS: dict[StartMethod, type[ForkContext | ForkServerContext]] = {
+    "fork": ForkContext,
+    "forkserver": ForkServerContext,
+}
 TICK_S = 0.2
-"""Between two looks at the counters for those who watch the progress."""
+"""Between two looks at the counters for those who watch the progress, and at who is dying."""
 LAST_WORDS_S = 5.0
 """How long the parent waits for reports after it has said stop."""
 FAREWELL_S = 0.5
 """How long processes may take to end by themselves before they are killed."""
 _FDS_PER_ROBOT = 4
 _FDS_SPARE = 128
-_DEAF_S = 10.0
-_STOPPING = {signal.SIGINT, signal.SIGTERM}
-
-
-class RobotsLost(Exception):  # noqa: N818 - named for what happened
-    """Robots whose processes ended, or failed, before the run did: `robots` says why, by name."""
-
-    def __init__(self, robots: Mapping[str, str]) -> None:
-        super().__init__("; ".join(f"{name} was lost: {why}" for name, why in robots.items()))
-        self.robots = dict(robots)
-
-
-class _Robot:
-    """The parent's side of one robot: its process, its control pipe, and what it reported."""
-
-    def __init__(self, name: str, process: BaseProcess, control: socket.socket) -> None:
-        self.name = name
-        self.process = process
-        self.control = control
-        self.report: Report | None = None
-        self._reader = QueueReader(control.fileno())
-        self._decoder = msgspec.msgpack.Decoder(FromRobot)
-        self._encoder = msgspec.msgpack.Encoder()
-
-    def words(self) -> list[FromRobot]:
-        """All that has come over the control pipe. `hung_up` tells afterwards whether its other end is closed."""
-        return [self._decoder.decode(body) for body in self._reader.get_all()]
-
-    @property
-    def hung_up(self) -> bool:
-        return self._reader.ended
-
-    def tell(self, order: FromParent, fd: int | None = None) -> None:
-        """Send `order`, with the end of a queue if one is given. To a robot that is gone: nothing.
-
-        Raises `RobotsLost` when the robot does not read for `_DEAF_S` seconds.
-        """
-        body = self._encoder.encode(order)
-        frame = len(body).to_bytes(4, "big") + body
-        deadline = time.monotonic() + _DEAF_S
-        while frame:
-            try:
-                sent = socket.send_fds(self.control, [frame], [] if fd is None else [fd])
-            except (BrokenPipeError, ConnectionResetError):
-                return
-            except OSError as error:
-                # Full, or the kernel holds as many descriptors under way as it allows: the robot has to read first.
-                if error.errno not in {errno.EAGAIN, errno.ETOOMANYREFS}:
-                    raise
-                if time.monotonic() > deadline:
-                    raise RobotsLost({self.name: "it does not answer"}) from error
-                multiprocessing.connection.wait([self.process.sentinel], 0.001)
-                continue
-            frame, fd = frame[sent:], None
-
-    def fate(self) -> str:
-        """How the process ended, in words."""
-        self.process.join(FAREWELL_S)
-        code = self.process.exitcode
-        if code is not None and code < 0:
-            return f"its process was killed by {signal.Signals(-code).name}"
-        return f"its process ended with status {code}"
 
 
 class ProcessesRun:
@@ -144,16 +80,18 @@ class ProcessesRun:
         self._protocol = protocol
         self._observer = observer
         self._progress = progress
-        self._context: ForkContext | ForkServerContext = multiprocessing.get_context(start_method)
-        self._robots: dict[str, _Robot] = {}
+        self._context = _CONTEXTS[start_method]()
+        self._robots: dict[str, RobotLink] = {}
         self._selector = selectors.DefaultSelector()
+        self._ends = selectors.DefaultSelector()
         self._counters = FourCounters(team.order)
         self._absent = set(team.order)
         self._lost: dict[str, str] = {}
         self._verdict: Verdict | None = None
         self._witness: str | None = None
         self._searching = False
-        self._shown = 0.0
+        self._stopped = False
+        self._shown = self._looked = 0.0
         self._began = time.monotonic()
 
     def run(self, timeout: float | None = None) -> RunResult:
@@ -173,33 +111,54 @@ class ProcessesRun:
                 self._wait_until(lambda: self._verdict is not None, deadline)
                 self._searching = False
             return self._finish()
+        except RobotsLost as lost:
+            for name, why in lost.robots.items():
+                self._observe(Lost(t=self._now(), robot=name, why=why))
+            raise
         finally:
             self._end_all()
 
     # Beginning
 
     def _launch(self) -> None:
-        """Start the processes. Signals wait until a robot has set its own handlers, and until all are known here."""
-        _allow_descriptors(len(self._team.robots) * _FDS_PER_ROBOT + _FDS_SPARE)
+        """Start the processes. Raises `Unsupported` when the system does not allow so many."""
+        robots = self._team.robots
+        allow_descriptors(len(robots) * _FDS_PER_ROBOT + _FDS_SPARE)
         shown = interfaces(self._team)
-        with _signals_held():
-            for robot in self._team.robots:
-                ours, theirs = socket.socketpair()
-                forked = self._context.get_start_method() == "fork"
-                inherited = [other.control for other in self._robots.values()] + [ours] if forked else []
-                process = self._context.Process(  # type: ignore[union-attr]
-                    target=robot_process,
-                    name=robot.name,
-                    args=(robot, self._team.order, shown, self._protocol, theirs, inherited),
-                    kwargs={"observed": self._observer is not None},
-                    daemon=True,
-                )
-                process.start()
-                theirs.close()
-                self._robots[robot.name] = _Robot(robot.name, process, ours)
+        for robot in robots:
+            try:
+                # One by one, so that a signal waits for the start of one robot, and not of a large team.
+                with signals_held():
+                    self._start(robot, shown)
+            except OSError as error:
+                raise Unsupported(
+                    f"the system lets only {len(self._robots)} of {len(robots)} robots have a process: {error.strerror}"
+                    " (raise its limits, see 'ulimit -n' and 'ulimit -u', or use the simulator)"
+                ) from error
+        self._selector.register(self._ends.fileno(), selectors.EVENT_READ)
         for known in self._robots.values():
-            self._selector.register(known.control, selectors.EVENT_READ, (self._listen, known))
-            self._selector.register(known.process.sentinel, selectors.EVENT_READ, (self._see_end, known))
+            self._selector.register(known.control, selectors.EVENT_READ, known)
+            self._ends.register(known.process.sentinel, selectors.EVENT_READ, known)
+
+    def _start(self, robot: Robot, shown: Interfaces) -> None:
+        """Start one process. Signals are to wait until it has set its own handlers, and until it is known here."""
+        ours, theirs = socket.socketpair()
+        forked = self._context.get_start_method() == "fork"
+        inherited = [other.control for other in self._robots.values()] + [ours] if forked else []
+        process = self._context.Process(
+            target=robot_process,
+            name=robot.name,
+            args=(robot, self._team.order, shown, self._protocol, theirs, inherited),
+            kwargs={"observed": self._observer is not None},
+            daemon=True,
+        )
+        with theirs:
+            try:
+                process.start()
+            except BaseException:
+                ours.close()
+                raise
+        self._robots[robot.name] = RobotLink(robot.name, process, ours)
 
     # The loop
 
@@ -209,34 +168,54 @@ class ProcessesRun:
             now = time.monotonic()
             if deadline is not None and now >= deadline:
                 return
-            patience = None if deadline is None else deadline - now
-            if self._progress:
-                patience = TICK_S if patience is None else min(TICK_S, patience)
+            patience = TICK_S if deadline is None else min(TICK_S, deadline - now)
             for key, _ in self._selector.select(patience):
-                serve, robot = key.data
-                serve(robot)
-            if self._lost:
-                raise RobotsLost(self._lost)
+                if key.data is not None:
+                    self._listen(key.data)
+                self._see_ends()  # after each, as robots may have much to say, and the machine may be busy
+            if not self._stopped and now - self._looked >= TICK_S:
+                self._looked = now
+                self._give_up([robot for robot in self._robots.values() if robot.is_dying])
             if self._searching:
                 self._ask_around(now)
 
-    def _listen(self, robot: _Robot) -> None:
+    def _listen(self, robot: RobotLink) -> None:
         for word in robot.words():
             self._hear(robot, word)
-        if robot.hung_up:  # its process is about to end, which its sentinel will tell
-            self._selector.unregister(robot.control)
+        if robot.hung_up:  # its process is about to end, which its sentinel tells: soon, or in this same round before
+            self._unwatch(robot)
 
-    def _see_end(self, robot: _Robot) -> None:
-        """The process has ended: without last words, the robot is lost."""
-        for word in robot.words():
-            self._hear(robot, word)
-        self._selector.unregister(robot.process.sentinel)
+    def _see_ends(self) -> None:
+        """Some processes have ended: without a report, a robot is lost."""
+        ended: list[RobotLink] = [key.data for key, _ in self._ends.select(0)]
+        for robot in ended:
+            for word in robot.last_words():
+                self._hear(robot, word)
+            self._ends.unregister(robot.process.sentinel)
+            self._unwatch(robot)
+        self._give_up([robot for robot in ended if robot.report is None])
+
+    def _give_up(self, dead: Collection[RobotLink]) -> None:
+        """End the run if robots are `dead`, or have failed: raise `RobotsLost`."""
+        if dead:
+            # To be gone takes a turn of the processor, which a busy machine gives late; the others make room.
+            for robot in self._robots.values():
+                if robot not in dead:
+                    robot.process.kill()
+        for robot in dead:
+            fate = robot.fate()
+            for word in robot.last_words():
+                self._hear(robot, word)
+            if robot.name not in self._lost:
+                self._lose(robot, fate)
+        if self._lost:
+            raise RobotsLost(self._lost)
+
+    def _unwatch(self, robot: RobotLink) -> None:
         if robot.control in self._selector.get_map():
             self._selector.unregister(robot.control)
-        if robot.report is None and robot.name not in self._lost:
-            self._lose(robot, robot.fate())
 
-    def _hear(self, robot: _Robot, word: FromRobot) -> None:
+    def _hear(self, robot: RobotLink, word: FromRobot) -> None:
         match word:
             case Ready():
                 self._absent.discard(robot.name)
@@ -259,7 +238,7 @@ class ProcessesRun:
             case never:
                 assert_never(never)
 
-    def _open_queue(self, sender: _Robot, receiver: str) -> None:
+    def _open_queue(self, sender: RobotLink, receiver: str) -> None:
         """Make the queue from `sender` to `receiver`: the one gets the write end, the other the read end."""
         other = self._robots.get(receiver)
         if other is None:
@@ -287,6 +266,7 @@ class ProcessesRun:
     def _finish(self) -> RunResult:
         """Say stop, and collect everybody's last words."""
         wall_s = self._now()
+        self._stopped = True
         self._tell_all(Stop())
         deadline = time.monotonic() + LAST_WORDS_S
         self._wait_until(lambda: not self._silent(), deadline)
@@ -306,54 +286,40 @@ class ProcessesRun:
         return [name for name, robot in self._robots.items() if robot.report is None]
 
     def _end_all(self) -> None:
-        """Hang up, give the processes a moment to end by themselves, then kill what is left."""
-        with _signals_held():
+        """Hang up; robots that have reported get a moment to end by themselves, others are killed at once.
+
+        They lose nothing by it, and on a busy machine the turns that they would need to end by themselves take time.
+        """
+        with signals_held():
             self._selector.close()
+            self._ends.close()
             for robot in self._robots.values():
+                if robot.report is None:
+                    robot.process.kill()
                 robot.control.close()
             deadline = time.monotonic() + FAREWELL_S
-            alive = {robot.process.sentinel: robot.process for robot in self._robots.values()}
+            alive = {robot.process.sentinel for robot in self._robots.values()}
             while alive and time.monotonic() < deadline:
                 ended = multiprocessing.connection.wait(list(alive), max(0.0, deadline - time.monotonic()))
-                for sentinel in ended:
-                    del alive[sentinel]  # type: ignore[arg-type]
-            for process in alive.values():
-                process.kill()
+                alive.difference_update(cast("list[int]", ended))
             for robot in self._robots.values():
+                # Also one that seems to have ended: a sentinel is a pipe, and a process can close it and live on.
+                robot.process.kill()
                 robot.process.join()
                 robot.process.close()
 
     # Small things
 
-    def _lose(self, robot: _Robot, why: str) -> None:
+    def _lose(self, robot: RobotLink, why: str) -> None:
         self._lost[robot.name] = why
-        self._observe(Lost(t=self._now(), robot=robot.name, why=why))
 
     def _tell_all(self, order: FromParent) -> None:
         for robot in self._robots.values():
             robot.tell(order)
 
-    def _observe(self, event: object) -> None:
+    def _observe(self, event: AnyEvent) -> None:
         if self._observer:
-            self._observer(event)  # type: ignore[arg-type]
+            self._observer(event)
 
     def _now(self) -> float:
         return time.monotonic() - self._began
-
-
-def _allow_descriptors(needed: int) -> None:
-    """Raise the soft limit of open files towards the hard one where the team needs it."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if soft != resource.RLIM_INFINITY and soft < needed:
-        limit = needed if hard == resource.RLIM_INFINITY else min(needed, hard)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (limit, hard))
-
-
-@contextmanager
-def _signals_held() -> Iterator[None]:
-    """Ctrl-C and SIGTERM wait meanwhile: what is half done would be lost."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -49,20 +49,30 @@ class QueueReader:
         self._buffer = bytearray()
         os.set_blocking(fd, False)
 
-    def get_all(self) -> list[bytes]:
-        """All bodies that have come so far. `ended` tells afterwards whether the writer is gone."""
-        try:
-            while chunk := os.read(self.fd, READ_BYTES):
-                self._buffer += chunk
-                if len(chunk) < READ_BYTES:
-                    break
-            else:
-                self.ended = True
-        except BlockingIOError:
-            pass
-        except ConnectionResetError:
-            self.ended = True
+    def get(self) -> list[bytes]:
+        """What one read brings: a writer that never pauses must not keep the reader from others.
+
+        `ended` tells afterwards whether the writer is gone.
+        """
+        self._read()
         return list(unpack(self._buffer))
+
+    def get_all(self) -> list[bytes]:
+        """All bodies that are left once the writer has ended."""
+        while self._read():
+            pass
+        return list(unpack(self._buffer))
+
+    def _read(self) -> int:
+        try:
+            chunk = os.read(self.fd, READ_BYTES)
+        except BlockingIOError:
+            return 0
+        except ConnectionResetError:
+            chunk = b""
+        self.ended = not chunk
+        self._buffer += chunk
+        return len(chunk)
 
     def close(self) -> None:
         """Close the own end."""

@@ -1,0 +1,17 @@
+"""The `robochoc` command with robots that all have the same priority for the scheduler: a benchmark's switch only."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from robochoc.cli.main import main
+from robochoc.communication import robot_process
+
+
+def _take_no_place(name: str, order: Sequence[str]) -> None:
+    """Stay as you are."""
+
+
+if __name__ == "__main__":
+    robot_process._take_place = _take_no_place  # noqa: SLF001 - what is being switched off
+    main()

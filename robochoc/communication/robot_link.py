@@ -1,0 +1,114 @@
+"""The parent's side of one robot: its process, the control pipe to it, and how the process ended."""
+
+from __future__ import annotations
+
+import errno
+import multiprocessing.connection
+import re
+import signal
+import socket
+import time
+from collections.abc import Mapping
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+import msgspec
+
+from robochoc.communication.control import FromParent, FromRobot, Report
+from robochoc.communication.queues import QueueReader
+
+_DEAF_S = 10.0
+_EXIT_CODE_S = 1.0
+_EXIT_CODE_POLL_S = 0.001
+_AWAITS = re.compile(r"^SigPnd:\s*([0-9a-f]+)$", re.MULTILINE)
+_SIGKILL_BIT = 1 << (signal.SIGKILL - 1)
+
+
+class RobotsLost(Exception):  # noqa: N818 - named for what happened
+    """Robots whose processes ended, or failed, before the run did: `robots` says why, by name."""
+
+    def __init__(self, robots: Mapping[str, str]) -> None:
+        super().__init__("; ".join(f"{name} was lost: {why}" for name, why in robots.items()))
+        self.robots = dict(robots)
+
+
+class RobotLink:
+    """The parent's side of one robot: its process, its control pipe, and what it reported."""
+
+    def __init__(self, name: str, process: BaseProcess, control: socket.socket) -> None:
+        self.name = name
+        self.process = process
+        self.control = control
+        self.report: Report | None = None
+        self._reader = QueueReader(control.fileno())
+        self._decoder = msgspec.msgpack.Decoder(FromRobot)
+        self._encoder = msgspec.msgpack.Encoder()
+
+    def words(self) -> list[FromRobot]:
+        """What comes over the control pipe. `hung_up` tells afterwards whether its other end is closed."""
+        return [self._decoder.decode(body) for body in self._reader.get()]
+
+    def last_words(self) -> list[FromRobot]:
+        """All that is left in the control pipe of a process that has ended."""
+        return [self._decoder.decode(body) for body in self._reader.get_all()]
+
+    @property
+    def hung_up(self) -> bool:
+        """Whether the other end of the control pipe is closed."""
+        return self._reader.ended
+
+    def tell(self, order: FromParent, fd: int | None = None) -> None:
+        """Send `order`, with the end of a queue if one is given. To a robot that is gone: nothing.
+
+        Raises `RobotsLost` when the robot does not read for `_DEAF_S` seconds.
+        """
+        body = self._encoder.encode(order)
+        frame = len(body).to_bytes(4, "big") + body
+        deadline = time.monotonic() + _DEAF_S
+        while frame:
+            try:
+                sent = socket.send_fds(self.control, [frame], [] if fd is None else [fd])
+            except (BrokenPipeError, ConnectionResetError):
+                return
+            except OSError as error:
+                # Full, or the kernel holds as many descriptors under way as it allows: the robot has to read first.
+                if error.errno not in {errno.EAGAIN, errno.ETOOMANYREFS}:
+                    raise
+                if time.monotonic() > deadline:
+                    raise RobotsLost({self.name: "it does not answer"}) from error
+                multiprocessing.connection.wait([self.process.sentinel], 0.001)
+                continue
+            frame, fd = frame[sent:], None
+
+    @property
+    def is_dying(self) -> bool:
+        """Whether the process ends with its next turn (Linux): SIGKILL awaits it, or it has no memory any more.
+
+        One that gives way to others (`nice`) gets that turn late on a busy machine, up to seconds after it was killed.
+        """
+        try:
+            status = Path(f"/proc/{self.process.pid}/status").read_text()
+        except OSError:
+            return False
+        awaits = _AWAITS.search(status)
+        return "VmSize:" not in status or (awaits is not None and bool(int(awaits[1], 16) & _SIGKILL_BIT))
+
+    def fate(self) -> str:
+        """How the process ended, in words. Its sentinel has told; the exit code comes a moment later."""
+        deadline = time.monotonic() + _EXIT_CODE_S
+        # Not `join`, whose time limit ends with the sentinel: a process can close all its files and live on.
+        while (code := self.process.exitcode) is None:
+            if time.monotonic() > deadline:
+                return "its process cannot be reached any more"
+            time.sleep(_EXIT_CODE_POLL_S)
+        if code < 0:
+            return f"its process was killed by {_name_of(-code)}"
+        return f"its process ended with status {code}"
+
+
+def _name_of(signum: int) -> str:
+    """Of most signals: SIGKILL. Those in the real-time range have none."""
+    try:
+        return signal.Signals(signum).name
+    except ValueError:
+        return f"signal {signum}"

@@ -1,0 +1,421 @@
+"""Whatever dies, whenever it dies: the run ends, says who was lost, and leaves nothing behind.
+
+Runs of the whole program are struck at random moments (the seed of a repetition is its number). `make test` repeats
+each kind of strike 5 times, `make test-slow` 50 times.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import random
+import re
+import signal
+import socket
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from faults import GONE_WITHIN_S, PROGRAM, Run, open_descriptors, running, wait_until
+from faulty_protocols import (
+    FLOOD,
+    TEAM,
+    AsksForStranger,
+    Floods,
+    HangsUp,
+    Leaves,
+    Raises,
+    RaisesAtOnce,
+    SaysMuch,
+    Speaks,
+    Spins,
+    TalksNonsense,
+)
+
+from robochoc.communication import processes
+from robochoc.communication.processes import ProcessesRun
+from robochoc.communication.robot_link import RobotsLost
+from robochoc.formats import write_team
+from robochoc.generators.queens3d import queens3d
+from robochoc.observers.events import AnyEvent, Lost
+from robochoc.observers.journal import read_journal
+from robochoc.outcome import Verdict
+from robochoc.protocols.protocol import Protocol
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+
+LONG_RUN = queens3d(8)
+"""64 robots that search for some seconds."""
+NAMES = [robot.name for robot in LONG_RUN.robots]
+MIDDLE_S = 0.3
+"""So long after the last robot's process is there the search is well under way."""
+STARTING_S = 0.7
+"""In so much time the program begins, imports, reads the team, and starts most robots."""
+FEW, MANY = 5, 50
+OLD = b"what was here before"
+
+
+@pytest.fixture(scope="module")
+def team(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("team") / "long"
+    write_team(LONG_RUN, folder)
+    return folder
+
+
+def solving(team: Path, *options: str, timeout_s: float = 60) -> list[str]:
+    return [PROGRAM, "solve", str(team), "--timeout", str(timeout_s), *options]
+
+
+def faulty(team: str, protocol: str) -> list[str]:
+    return [sys.executable, str(Path(__file__).with_name("faulty_protocols.py")), team, protocol]
+
+
+def observed(team: Path, home: Path, *options: str) -> list[str]:
+    """A run with all its outputs, which replace something older."""
+    home.mkdir()
+    outputs = {"--journal": home / "run.jsonl", "--html": home / "scene.html"}
+    for path in outputs.values():
+        path.write_bytes(OLD)
+    return solving(team, *(word for option, path in outputs.items() for word in (option, str(path))), *options)
+
+
+# The strikes: each returns the names of robots that it kills
+
+
+def a_robot_at_the_start(run: Run, chance: random.Random) -> list[str]:
+    place = chance.randrange(len(NAMES))
+    run.strike(signal.SIGKILL, run.wait_for_robots(place + 1)[place])
+    return [NAMES[place]]
+
+
+def a_robot_in_the_middle(run: Run, chance: random.Random) -> list[str]:
+    place = chance.randrange(len(NAMES))
+    robots = in_the_middle(run, chance)
+    run.strike(signal.SIGKILL, robots[place])
+    return [NAMES[place]]
+
+
+def the_parent(run: Run, chance: random.Random) -> list[str]:
+    sometime(run, chance)
+    run.strike(signal.SIGKILL)
+    return []
+
+
+def interrupt(run: Run, chance: random.Random) -> list[str]:
+    sometime(run, chance)
+    run.strike(signal.SIGINT, group=chance.random() < 0.5)
+    return []
+
+
+def terminate(run: Run, chance: random.Random) -> list[str]:
+    sometime(run, chance)
+    run.strike(signal.SIGTERM)
+    return []
+
+
+def sometime(run: Run, chance: random.Random) -> None:
+    """Half of the time while the team starts, half of the time in the middle of its search."""
+    if chance.random() < 0.5:
+        run.wait_until_listening()
+        time.sleep(chance.uniform(0, STARTING_S))
+    elif run.runs_in_processes:
+        in_the_middle(run, chance)
+    else:
+        run.wait_until_listening()
+        time.sleep(STARTING_S + chance.uniform(0, MIDDLE_S))
+
+
+def in_the_middle(run: Run, chance: random.Random) -> list[int]:
+    robots = run.wait_for_robots(len(NAMES))
+    time.sleep(chance.uniform(0.5, 1.5) * MIDDLE_S)
+    return robots
+
+
+Record = Callable[[str, object], None]
+Strike = Callable[[Run, random.Random], list[str]]
+STRIKES: dict[Strike, int] = {
+    a_robot_at_the_start: 4,
+    a_robot_in_the_middle: 4,
+    the_parent: -signal.SIGKILL,
+    interrupt: 128 + signal.SIGINT,
+    terminate: 128 + signal.SIGTERM,
+}
+"""And the exit status that follows."""
+
+
+def struck(strike: Strike, repetition: int, team: Path, home: Path, *options: str) -> float:
+    """Strike a run, hold what follows against all that is promised, and return in how many seconds all were gone."""
+    chance = random.Random(f"{strike.__name__} {repetition}")
+    watched = repetition % 2 == 1
+    with running(observed(team, home, *options) if watched else solving(team, *options), home) as run:
+        run.runs_in_processes = "simulator" not in options
+        lost = strike(run, chance)
+        took = run.end()
+        assert run.status() == STRIKES[strike], run.errors()
+        assert took < GONE_WITHIN_S
+        for name in lost:
+            assert f"{name} was lost: its process was killed by SIGKILL" in run.errors()
+        nothing_is_left(run)
+    if watched:
+        assert (home / "scene.html").read_bytes() == OLD
+        the_journal_is_whole((home / "run.jsonl").read_bytes(), lost, killed=strike is the_parent)
+    return took
+
+
+def nothing_is_left(run: Run) -> None:
+    assert "Traceback" not in run.errors()
+    assert "Exception ignored" not in run.errors()
+    assert len(run.errors().splitlines()) <= 2, run.errors()
+    assert run.left_behind() == []
+
+
+def the_journal_is_whole(content: bytes, lost: list[str], *, killed: bool) -> None:
+    """It tells who was lost; that of a killed parent is not written, that of one just begun need not be."""
+    if killed or (not lost and content == OLD):
+        assert content == OLD
+        return
+    journal = read_journal(content)
+    assert journal.outcome is None
+    assert [event.robot for event in journal.events if isinstance(event, Lost)] == lost
+
+
+@pytest.mark.parametrize("repetition", range(FEW))
+@pytest.mark.parametrize("strike", STRIKES)
+def test_a_strike_leaves_nothing(
+    strike: Strike, repetition: int, team: Path, tmp_path: Path, record_property: Record
+) -> None:
+    record_property("gone_after_s", struck(strike, repetition, team, tmp_path / "run"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("repetition", range(FEW, FEW + MANY))
+@pytest.mark.parametrize("strike", STRIKES)
+def test_fifty_strikes_leave_nothing(
+    strike: Strike, repetition: int, team: Path, tmp_path: Path, record_property: Record
+) -> None:
+    record_property("gone_after_s", struck(strike, repetition, team, tmp_path / "run"))
+
+
+@pytest.mark.parametrize("repetition", range(2))
+@pytest.mark.parametrize("strike", [the_parent, interrupt, terminate])
+def test_strikes_in_the_simulator(
+    strike: Strike, repetition: int, team: Path, tmp_path: Path, record_property: Record
+) -> None:
+    record_property("gone_after_s", struck(strike, repetition, team, tmp_path / "run", "--runtime", "simulator"))
+
+
+@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_before_the_program_has_begun(signum: signal.Signals, team: Path, tmp_path: Path) -> None:
+    """Python's own start is not ours: what it says then is its own too, but nothing is left."""
+    for repetition in range(5):
+        with running(solving(team), tmp_path / str(repetition)) as run:
+            time.sleep(repetition * 0.01)
+            run.strike(signum)
+            assert run.end() < GONE_WITHIN_S
+            assert run.status() in {-signum, 128 + signum, 1}
+            assert run.left_behind() == []
+
+
+@pytest.mark.parametrize("pause_s", [0, 0.02, 0.2])
+def test_ctrl_c_twice(pause_s: float, team: Path, tmp_path: Path) -> None:
+    with running(observed(team, tmp_path / "run"), tmp_path / "run") as run:
+        in_the_middle(run, random.Random(0))
+        run.strike(signal.SIGINT, group=True)
+        time.sleep(pause_s)
+        if not run.is_over:
+            run.strike(signal.SIGINT, group=True)
+        assert run.end() < GONE_WITHIN_S
+        assert run.status() == 128 + signal.SIGINT
+        nothing_is_left(run)
+    the_journal_is_whole((tmp_path / "run" / "run.jsonl").read_bytes(), [], killed=False)
+
+
+def test_many_robots_killed_at_once(team: Path, tmp_path: Path) -> None:
+    with running(observed(team, tmp_path / "run"), tmp_path / "run") as run:
+        robots = in_the_middle(run, random.Random(0))
+        run.strike(signal.SIGKILL, *robots[10:40:3])
+        assert run.end() < GONE_WITHIN_S
+        assert run.status() == 4
+        nothing_is_left(run)
+        named = re.findall(r"(\S+) was lost: its process was killed by SIGKILL", run.errors())
+        assert named
+        assert set(named) <= set(NAMES[10:40:3])
+    journal = read_journal((tmp_path / "run" / "run.jsonl").read_bytes())
+    assert [event.robot for event in journal.events if isinstance(event, Lost)] == named
+
+
+def test_all_robots_killed_at_once(team: Path, tmp_path: Path) -> None:
+    with running(solving(team), tmp_path / "run") as run:
+        run.strike(signal.SIGKILL, *in_the_middle(run, random.Random(0)))
+        assert run.end() < GONE_WITHIN_S
+        assert run.status() == 4
+        nothing_is_left(run)
+
+
+@pytest.mark.parametrize("signum", [signal.SIGTERM, signal.SIGABRT, signal.SIGRTMIN + 3])
+def test_a_robot_ended_by_another_signal(signum: int, team: Path, tmp_path: Path) -> None:
+    with running(solving(team), tmp_path / "run") as run:
+        robots = in_the_middle(run, random.Random(0))
+        run.strike(signum, robots[20])
+        assert run.end() < GONE_WITHIN_S
+        assert run.status() == 4
+        name = signum.name if isinstance(signum, signal.Signals) else f"signal {signum}"
+        assert run.errors() == f"{team}: {NAMES[20]} was lost: its process was killed by {name}\n"
+        nothing_is_left(run)
+
+
+def test_a_stopped_robot_does_not_outlive_the_time_limit(team: Path, tmp_path: Path) -> None:
+    with running(solving(team, timeout_s=2), tmp_path / "run") as run:
+        run.strike(signal.SIGSTOP, run.wait_for_robots(len(NAMES))[30])
+        assert run.end() < 2 + processes.LAST_WORDS_S + processes.FAREWELL_S + GONE_WITHIN_S
+        assert run.status() in {3, 4}
+        nothing_is_left(run)
+
+
+def test_a_stopped_robot_does_not_outlive_ctrl_c(team: Path, tmp_path: Path) -> None:
+    with running(solving(team), tmp_path / "run") as run:
+        run.strike(signal.SIGSTOP, in_the_middle(run, random.Random(0))[30])
+        run.strike(signal.SIGINT, group=True)
+        assert run.end() < GONE_WITHIN_S
+        assert run.status() == 128 + signal.SIGINT
+        nothing_is_left(run)
+
+
+def test_a_stopped_robot_does_not_outlive_a_killed_parent(team: Path, tmp_path: Path) -> None:
+    with running(solving(team), tmp_path / "run") as run:
+        run.strike(signal.SIGSTOP, in_the_middle(run, random.Random(0))[30])
+        run.strike(signal.SIGKILL)
+        assert run.end() < GONE_WITHIN_S
+
+
+def test_robots_that_compute_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
+    with running(faulty("TEAM", "Spins"), tmp_path / "run") as run:
+        run.wait_for_robots(len(TEAM.robots))
+        time.sleep(MIDDLE_S)
+        run.strike(signal.SIGKILL)
+        assert run.end() < GONE_WITHIN_S
+
+
+# Limits, and outputs that nobody reads
+
+
+def test_nobody_reads_the_output(tmp_path: Path) -> None:
+    write_team(queens3d(4), tmp_path / "team")
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        with running(solving(tmp_path / "team"), tmp_path / "run", stdout=writer) as run:
+            run.end()
+            assert run.status() == 128 + signal.SIGPIPE
+            assert run.errors() == ""
+            nothing_is_left(run)
+    finally:
+        os.close(writer)
+
+
+@pytest.mark.parametrize("open_files", [64, 100, 180])
+def test_too_few_open_files(open_files: int, team: Path, tmp_path: Path) -> None:
+    """At 180 the parent has more than half of the robots started, at 64 a few."""
+    with running(solving(team), tmp_path / "run", open_files=open_files) as run:
+        run.end()
+        assert run.status() == 2
+        assert re.search(r"only \d+ of 64 robots .* Too many open files .*ulimit -n", run.errors())
+        assert len(run.errors().splitlines()) == 1
+        nothing_is_left(run)
+
+
+def test_too_few_open_files_for_robots_that_talk(tmp_path: Path) -> None:
+    """The parent has enough; robots, which need two pipes for each robot they talk with, do not."""
+    with running(faulty("CROWD", "TalksToAll"), tmp_path / "run", open_files=96) as run:
+        run.end()
+        assert run.status() == 1
+        assert re.search(r"Unsupported: Robot\S+ needs more open files .*ulimit -n", run.errors())
+        assert run.left_behind() == []
+
+
+# The live scene
+
+
+@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_the_port_of_the_live_scene_is_free_again(signum: signal.Signals, tmp_path: Path) -> None:
+    write_team(queens3d(2), tmp_path / "team")
+    with running(solving(tmp_path / "team", "--withdraw", "--serve"), tmp_path / "run") as run:
+        wait_until(lambda: "http://" in run.errors(), "it never served")
+        (port,) = run.ports()
+        run.strike(signum)
+        assert run.end() < GONE_WITHIN_S
+        assert run.status() == {signal.SIGINT: 0, signal.SIGTERM: 143, signal.SIGKILL: -9}[signum]
+        nothing_is_left(run)
+    with socket.create_server(("127.0.0.1", port)):
+        pass
+
+
+def test_a_run_opens_no_port(team: Path, tmp_path: Path) -> None:
+    with running(solving(team), tmp_path / "run") as run:
+        in_the_middle(run, random.Random(0))
+        assert run.ports() == set()
+
+
+# Within one program
+
+
+def speaking(protocol: type[Protocol], *, timeout: float | None = None) -> tuple[Verdict, dict[str, int]]:
+    """Let a team of four speak `protocol`; whatever comes of it, nothing may be left in this process."""
+    before = open_descriptors()
+    try:
+        result = ProcessesRun(TEAM, protocol).run(timeout)
+    finally:
+        assert multiprocessing.active_children() == []
+        assert open_descriptors() == before
+    return result.verdict, dict(result.metrics.messages)
+
+
+FIRST, SECOND, *_ = (robot.name for robot in TEAM.robots)
+
+
+@pytest.mark.parametrize(
+    ("protocol", "lost", "why"),
+    [
+        (Raises, FIRST, r"ValueError: out of ideas \(.*faulty_protocols.py:\d+\)"),
+        (RaisesAtOnce, FIRST, r"ValueError: no ideas at all"),
+        (Leaves, FIRST, r"its process ended with status 7"),
+        (HangsUp, FIRST, r"its process cannot be reached any more"),
+        (AsksForStranger, FIRST, r"it wanted to talk to 'Robot9.9', which is no robot of the team"),
+        (TalksNonsense, SECOND, rf"BadMessage: {FIRST} sent {SECOND} what is no message"),
+    ],
+)
+def test_a_robot_that_fails_is_named(protocol: type[Protocol], lost: str, why: str) -> None:
+    with pytest.raises(RobotsLost) as caught:
+        speaking(protocol)
+    assert lost in caught.value.robots
+    assert re.search(why, caught.value.robots[lost])
+
+
+def test_observers_hear_who_was_lost() -> None:
+    events: list[AnyEvent] = []
+    with pytest.raises(RobotsLost) as caught:
+        ProcessesRun(TEAM, Leaves, observer=events.append).run()
+    assert {event.robot: event.why for event in events if isinstance(event, Lost)} == caught.value.robots
+
+
+def test_more_than_pipes_hold() -> None:
+    assert speaking(Floods) == (Verdict.SOLUTION, {"Word": 2 * FLOOD})
+
+
+def test_a_message_of_a_megabyte() -> None:
+    assert speaking(SaysMuch) == (Verdict.SOLUTION, {"Word": len(TEAM.robots)})
+
+
+def test_deaf_robots_do_not_outlive_the_time_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(processes, "LAST_WORDS_S", 0.2)
+    verdict, _ = speaking(Spins, timeout=0.5)
+    assert verdict is Verdict.UNKNOWN
+
+
+def test_a_hundred_runs_leave_nothing_open() -> None:
+    before = open_descriptors()
+    for _ in range(100):
+        speaking(Speaks)
+    assert open_descriptors() == before
