@@ -47,9 +47,11 @@ def say(what: str) -> None:
 
 
 def spread(values: Iterable[float], digits: int = 2) -> str:
-    """The median, and the smallest and largest value: `0.34 (0.31..0.40)`."""
+    """The median, and the smallest and largest value: `0.34 (0.31..0.40)`; one value alone if all are equal."""
     values = list(values)
     median, low, high = statistics.median(values), min(values), max(values)
+    if low == high:
+        return f"{median:,.{digits}f}"
     return f"{median:,.{digits}f} ({low:,.{digits}f}..{high:,.{digits}f})"
 
 

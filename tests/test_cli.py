@@ -297,11 +297,13 @@ def test_animate_says_what_is_missing(tmp_path: Path) -> None:
     assert robochoc("animate", tmp_path / "nothing").returncode == 2
 
 
-def test_an_output_that_cannot_be_written_is_one_message(four: Path) -> None:
+@pytest.mark.parametrize("place", ["no/such/folder/page", "queens3d-4", "queens3d-4/Robot1.1.xml/page"])
+def test_an_output_that_cannot_be_written_is_said_before_the_work(four: Path, place: str) -> None:
     for option in ("--html", "--journal"):
-        done = robochoc("solve", four, "--runtime", "simulator", option, four / "no" / "such" / "folder")
-        assert done.returncode == 1
-        assert "no/such" in done.stderr
+        done = robochoc("solve", four, option, four.parent / place)
+        assert done.returncode == 2
+        assert option in done.stderr
+        assert done.stdout == ""
 
 
 # the whole

@@ -218,6 +218,29 @@ def test_a_signal_before_the_program_has_begun(signum: signal.Signals, team: Pat
             assert run.left_behind() == []
 
 
+def test_a_signal_that_python_swallows_is_raised_again(tmp_path: Path) -> None:
+    """Python drops what is raised within the callback of a weak reference, and prints it."""
+    program = """
+import signal, sys, time, weakref
+from robochoc.cli.main import Ending
+
+class Thing: pass
+
+Ending().listen()
+thing = Thing()
+callback = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
+del thing
+try:
+    time.sleep(30)
+except KeyboardInterrupt:
+    sys.exit(3)
+"""
+    with running([sys.executable, "-c", program], tmp_path / "run") as run:
+        run.end()
+        assert run.status() == 3
+        assert run.errors() == ""
+
+
 @pytest.mark.parametrize("pause_s", [0, 0.02, 0.2])
 def test_ctrl_c_twice(pause_s: float, team: Path, tmp_path: Path) -> None:
     with running(observed(team, tmp_path / "run"), tmp_path / "run") as run:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from robochoc.cli.failure import BadInput, invalid_input_fails
+from robochoc.cli.output import OutputFile
 
 if TYPE_CHECKING:
     from robochoc.outcome import Outcome
@@ -19,9 +20,7 @@ NEXT_STEP = "give what 'robochoc solve --json' or '--journal' wrote"
 
 @click.command(short_help="Make the 3D scene of a saved result or journal.")
 @click.argument("saved", type=click.Path(path_type=Path), metavar="RESULT.json|JOURNAL")
-@click.option(
-    "-o", "--output", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE", help="The page to write."
-)
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="The page to write.")
 @click.option(
     "--team",
     "folder",

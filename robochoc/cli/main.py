@@ -20,7 +20,7 @@ _STOPPING = (signal.SIGINT, signal.SIGTERM)
 
 def main() -> NoReturn:
     """Run the command line, and leave with its exit status."""
-    ending = _Ending()
+    ending = Ending()
     try:
         ending.listen()
         from robochoc.cli.commands import run
@@ -33,7 +33,7 @@ def main() -> NoReturn:
     sys.exit(status)
 
 
-class _Ending:
+class Ending:
     """What SIGINT and SIGTERM do: the first one raises `KeyboardInterrupt` or `SystemExit` where the program is.
 
     Not within an import: half of Python's modules print or swallow what is raised while they load.
@@ -75,10 +75,10 @@ class _Ending:
         self._hear(self._signum, frame)
 
     def _swallowed(self, unraisable: sys.UnraisableHookArgs) -> None:
-        """Raise again what Python has dropped because it was raised within a finaliser or a callback."""
-        if isinstance(unraisable.exc_value, KeyboardInterrupt | SystemExit):
+        """Raise again, soon, what Python has dropped because it was raised within a finaliser or a callback."""
+        if self._since is not None and isinstance(unraisable.exc_value, KeyboardInterrupt | SystemExit):
             self._since = None
-            signal.raise_signal(self._signum)
+            signal.setitimer(signal.ITIMER_REAL, _RETRY_S)
         else:
             sys.__unraisablehook__(unraisable)
 

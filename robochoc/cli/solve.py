@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.failure import INVALID, LIMIT, LOST, USAGE
+from robochoc.cli.output import OutputFile
 
 if TYPE_CHECKING:
     from robochoc.observers.journal import Recorder
@@ -87,13 +88,13 @@ class Products:
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a team, and nothing else, on standard output.")
 @click.option(
     "--html",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=OutputFile(),
     metavar="FILE",
     help="Write the 3D scene: one page that needs no server.",
 )
 @click.option(
     "--journal",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=OutputFile(),
     metavar="FILE",
     help="Write down every message and decision, as JSON lines.",
 )

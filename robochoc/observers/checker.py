@@ -38,12 +38,13 @@ def cost(team: Team, assignment: Assignment) -> float:
 
 def could_join(team: Team, assignment: Assignment, withdrawn: Collection[str]) -> Iterator[str]:
     """Robots of one variable that stepped aside although they had a place beside those that fly."""
+    constraints = list(team.constraints())
     for name in withdrawn:
         for variable in team[name].variables[:1]:
-            others = [robot for robot in withdrawn if robot != name]
-            if any(
-                not any(objections(team, {**assignment, variable.name: value}, others)) for value in variable.domain
-            ):
+            known = {*assignment, variable.name}
+            own = [c for c in constraints if variable.name in c.variables and known.issuperset(c.variables)]
+            places = ({**assignment, variable.name: value} for value in variable.domain)
+            if any(all(price(constraint, place) < INFINITE for constraint in own) for place in places):
                 yield name
 
 
