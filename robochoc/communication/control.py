@@ -12,6 +12,9 @@ import msgspec
 from robochoc.observers.events import AnyEvent
 from robochoc.outcome import Metrics
 
+QUEUES_AT_ONCE = 16
+"""How many queues a robot asks for in one go. The parent holds so many descriptors more meanwhile."""
+
 
 class _Control(msgspec.Struct, frozen=True, tag=True, array_like=True):
     pass
@@ -24,10 +27,10 @@ class Ready(_Control, frozen=True):
     """I am there, with my problem compiled."""
 
 
-class OpenQueue(_Control, frozen=True):
-    """I want to put messages to `receiver`."""
+class OpenQueues(_Control, frozen=True):
+    """I want to put messages to `receivers`, at most `QUEUES_AT_ONCE` of them."""
 
-    receiver: str
+    receivers: list[str]
 
 
 class Counters(_Control, frozen=True):
@@ -73,10 +76,10 @@ class Start(_Control, frozen=True):
     began: float
 
 
-class QueueTo(_Control, frozen=True):
-    """The write end of the queue to `robot` comes with this."""
+class QueuesTo(_Control, frozen=True):
+    """The write ends of the queues to `robots` come with this, in their order."""
 
-    robot: str
+    robots: list[str]
 
 
 class QueueFrom(_Control, frozen=True):
@@ -95,5 +98,5 @@ class Stop(_Control, frozen=True):
     """The run is over: report and end."""
 
 
-FromRobot = Ready | OpenQueue | Counters | Conclusion | Events | Report | Failed
-FromParent = Start | QueueTo | QueueFrom | Wave | Stop
+FromRobot = Ready | OpenQueues | Counters | Conclusion | Events | Report | Failed
+FromParent = Start | QueuesTo | QueueFrom | Wave | Stop

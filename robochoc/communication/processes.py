@@ -15,7 +15,9 @@ import multiprocessing.connection
 import selectors
 import socket
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
+from contextlib import ExitStack
+from multiprocessing.connection import Connection
 from multiprocessing.context import ForkContext, ForkServerContext
 from typing import Literal, assert_never, cast
 
@@ -26,9 +28,9 @@ from robochoc.communication.control import (
     Failed,
     FromParent,
     FromRobot,
-    OpenQueue,
+    OpenQueues,
     QueueFrom,
-    QueueTo,
+    QueuesTo,
     Ready,
     Report,
     Start,
@@ -39,7 +41,7 @@ from robochoc.communication.quiescence import Counts, FourCounters
 from robochoc.communication.robot_link import RobotLink, RobotsLost
 from robochoc.communication.robot_process import robot_process
 from robochoc.communication.run_result import Progress, RunResult
-from robochoc.communication.system import allow_descriptors, signals_held
+from robochoc.communication.system import allow_descriptors, garbage_frozen, signals_held
 from robochoc.observers.events import AnyEvent, Lost, Observer, Registered
 from robochoc.outcome import Verdict
 from robochoc.problem import Robot, Team
@@ -124,21 +126,20 @@ class ProcessesRun:
         """Start the processes. Raises `Unsupported` when the system does not allow so many."""
         robots = self._team.robots
         allow_descriptors(len(robots) * _FDS_PER_ROBOT + _FDS_SPARE)
-        shown = interfaces(self._team)
-        for robot in robots:
-            try:
-                # One by one, so that a signal waits for the start of one robot, and not of a large team.
-                with signals_held():
-                    self._start(robot, shown)
-            except OSError as error:
-                raise Unsupported(
-                    f"the system lets only {len(self._robots)} of {len(robots)} robots have a process: {error.strerror}"
-                    " (raise its limits, see 'ulimit -n' and 'ulimit -u', or use the simulator)"
-                ) from error
         self._selector.register(self._ends.fileno(), selectors.EVENT_READ)
-        for known in self._robots.values():
-            self._selector.register(known.control, selectors.EVENT_READ, known)
-            self._ends.register(known.process.sentinel, selectors.EVENT_READ, known)
+        shown = interfaces(self._team)
+        with garbage_frozen():
+            for robot in robots:
+                try:
+                    # One by one, so that a signal waits for the start of one robot, and not of a large team.
+                    with signals_held():
+                        self._start(robot, shown)
+                except OSError as error:
+                    raise Unsupported(
+                        f"the system lets only {len(self._robots)} of {len(robots)} robots have a process:"
+                        f" {error.strerror} (raise its limits, see 'ulimit -n' and 'ulimit -u', or use the simulator)"
+                    ) from error
+                self._see_ends()
 
     def _start(self, robot: Robot, shown: Interfaces) -> None:
         """Start one process. Signals are to wait until it has set its own handlers, and until it is known here."""
@@ -158,7 +159,9 @@ class ProcessesRun:
             except BaseException:
                 ours.close()
                 raise
-        self._robots[robot.name] = RobotLink(robot.name, process, ours)
+        link = self._robots[robot.name] = RobotLink(robot.name, process, ours)
+        self._selector.register(link.control, selectors.EVENT_READ, link)
+        self._ends.register(process.sentinel, selectors.EVENT_READ, link)
 
     # The loop
 
@@ -220,8 +223,8 @@ class ProcessesRun:
             case Ready():
                 self._absent.discard(robot.name)
                 self._observe(Registered(t=self._now(), robot=robot.name))
-            case OpenQueue(receiver):
-                self._open_queue(robot, receiver)
+            case OpenQueues(receivers):
+                self._open_queues(robot, receivers)
             case Counters(wave, sent, received):
                 self._counters.answer(robot.name, wave, Counts(sent, received))
             case Conclusion(verdict):
@@ -238,16 +241,35 @@ class ProcessesRun:
             case never:
                 assert_never(never)
 
-    def _open_queue(self, sender: RobotLink, receiver: str) -> None:
-        """Make the queue from `sender` to `receiver`: the one gets the write end, the other the read end."""
-        other = self._robots.get(receiver)
-        if other is None:
-            self._lose(sender, f"it wanted to talk to {receiver!r}, which is no robot of the team")
+    def _open_queues(self, sender: RobotLink, receivers: Sequence[str]) -> None:
+        """Make the queues from `sender` to `receivers`: it gets the write ends, each of them its read end."""
+        strangers = [name for name in receivers if name not in self._robots]
+        if strangers:
+            self._lose(sender, f"it wanted to talk to {strangers[0]!r}, which is no robot of the team")
             return
-        reader, writer = self._context.Pipe(duplex=False)
-        with reader, writer:
-            other.tell(QueueFrom(sender.name), reader.fileno())
-            sender.tell(QueueTo(receiver), writer.fileno())
+        with ExitStack() as copies:
+            writers = []
+            for name in receivers:
+                try:
+                    reader, writer = self._pipe()
+                except OSError as error:
+                    raise Unsupported(
+                        f"the system does not let {sender.name} have a queue to {name}: {error.strerror}"
+                        " (raise its limits, see 'ulimit -n', or use the simulator)"
+                    ) from error
+                writers.append(copies.enter_context(writer))
+                with reader:
+                    self._robots[name].tell(QueueFrom(sender.name), [reader.fileno()])
+            sender.tell(QueuesTo(list(receivers)), [writer.fileno() for writer in writers])
+
+    def _pipe(self) -> tuple[Connection, Connection]:
+        try:
+            return self._context.Pipe(duplex=False)
+        except OSError as error:
+            raise Unsupported(
+                f"a queue between two robots could not be opened: {error.strerror}"
+                " (raise the limit, see 'ulimit -n', or use the simulator)"
+            ) from error
 
     def _ask_around(self, now: float) -> None:
         """Begin a wave when it could show that all is quiet, or when somebody waits for news."""

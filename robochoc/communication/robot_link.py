@@ -8,7 +8,7 @@ import re
 import signal
 import socket
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
@@ -57,8 +57,8 @@ class RobotLink:
         """Whether the other end of the control pipe is closed."""
         return self._reader.ended
 
-    def tell(self, order: FromParent, fd: int | None = None) -> None:
-        """Send `order`, with the end of a queue if one is given. To a robot that is gone: nothing.
+    def tell(self, order: FromParent, fds: Sequence[int] = ()) -> None:
+        """Send `order`, with the ends of queues if any are given. To a robot that is gone: nothing.
 
         Raises `RobotsLost` when the robot does not read for `_DEAF_S` seconds.
         """
@@ -67,7 +67,7 @@ class RobotLink:
         deadline = time.monotonic() + _DEAF_S
         while frame:
             try:
-                sent = socket.send_fds(self.control, [frame], [] if fd is None else [fd])
+                sent = socket.send_fds(self.control, [frame], fds)
             except (BrokenPipeError, ConnectionResetError):
                 return
             except OSError as error:
@@ -78,7 +78,7 @@ class RobotLink:
                     raise RobotsLost({self.name: "it does not answer"}) from error
                 multiprocessing.connection.wait([self.process.sentinel], 0.001)
                 continue
-            frame, fd = frame[sent:], None
+            frame, fds = frame[sent:], ()
 
     @property
     def is_dying(self) -> bool:

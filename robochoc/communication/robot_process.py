@@ -25,15 +25,16 @@ from typing import assert_never
 import msgspec
 
 from robochoc.communication.control import (
+    QUEUES_AT_ONCE,
     Conclusion,
     Counters,
     Events,
     Failed,
     FromParent,
     FromRobot,
-    OpenQueue,
+    OpenQueues,
     QueueFrom,
-    QueueTo,
+    QueuesTo,
     Ready,
     Report,
     Start,
@@ -53,8 +54,8 @@ IDLE_S = 0.002
 """A robot that has heard nothing for so long reports its counters. Only when to ask; never whether it is over."""
 LOWEST_NICE = 19
 EVENTS_AT_ONCE = 500
-FDS_AT_ONCE = 64
 _CLOCK = struct.Struct("!Q")
+_ROOM_FOR_FDS = socket.CMSG_SPACE(QUEUES_AT_ONCE * array.array("i").itemsize)
 _PR_SET_PDEATHSIG = 1
 _libc = ctypes.CDLL(None)
 """Loaded before the fork: once for all robots."""
@@ -140,7 +141,7 @@ class _ControlPipe:
     def orders(self) -> list[FromParent]:
         """All orders that have come. `ended` tells afterwards whether the parent is gone."""
         try:
-            chunk, ancillary, flags, _ = self._socket.recvmsg(READ_BYTES, socket.CMSG_SPACE(FDS_AT_ONCE * 4))
+            chunk, ancillary, flags, _ = self._socket.recvmsg(READ_BYTES, _ROOM_FOR_FDS)
         except BlockingIOError:
             return []
         except ConnectionResetError:
@@ -217,14 +218,17 @@ class _RobotLoop:
 
     def _send(self, envelopes: Sequence[Envelope]) -> None:
         touched = {}
+        strangers = []
         for envelope in envelopes:
             writer = self._writers.get(envelope.receiver)
             if writer is None:
                 writer = self._writers[envelope.receiver] = QueueWriter()
-                self._say(OpenQueue(envelope.receiver))
+                strangers.append(envelope.receiver)
             writer.put(_CLOCK.pack(envelope.clock) + envelope.content)
             touched[envelope.receiver] = writer
         self._sent += len(envelopes)
+        for start in range(0, len(strangers), QUEUES_AT_ONCE):
+            self._say(OpenQueues(strangers[start : start + QUEUES_AT_ONCE]))
         for writer in touched.values():
             self._flush(writer)
         verdict = self._host.protocol.verdict
@@ -273,10 +277,10 @@ class _RobotLoop:
                 self._began = began
                 self._told = (-1, -1)
                 self._send(self._host.start())
-            case QueueTo(robot):
-                writer = self._writers[robot]
-                writer.open(self._link.take_fd())
-                self._flush(writer)
+            case QueuesTo(robots):
+                for robot in robots:
+                    self._writers[robot].open(self._link.take_fd())
+                    self._flush(self._writers[robot])
             case QueueFrom(robot):
                 reader = QueueReader(self._link.take_fd())
                 self._selector.register(
