@@ -8,6 +8,7 @@ import pty
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -93,7 +94,7 @@ def test_validate_says_one_line_a_team(four: Path) -> None:
         "instances/queens3d-4: 16 robots, 16 variables, 76 constraints: ok",
         "instances/queens3d-7: 49 robots, 49 variables, 476 constraints: ok",
     ]
-    assert robochoc("validate", four / "Robot1.1.xml").stdout.endswith("1 robot, 1 variable, 0 constraints: ok\n")
+    assert robochoc("validate", four / "Robot1.1.xml").stdout.endswith(": ok by itself\n")
 
 
 def test_validate_tells_every_mistake_of_every_file(four: Path) -> None:
@@ -171,7 +172,7 @@ def test_solve_tells_people_what_happened(four: Path) -> None:
     words = robochoc("solve", four, "--withdraw", "--runtime", "simulator").stdout
     assert "no solution (Robot" in words
     assert "has derived the empty nogood" in words
-    assert "9 robots fly, 7 step aside" in words
+    assert "9 fly, 7 step aside" in words
     assert re.search(r"row\\column +1 +2 +3 +4", words)
 
 
@@ -203,6 +204,13 @@ def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
         (["--timeout", "0"], "--timeout"),
         (["--withdraw=fewest"], "fewest"),
         (["--nonsense"], "--nonsense"),
+        (["--timeout", "nan"], "--timeout"),
+        (["--html", ""], "--html"),
+        (["--html", "x", "--journal", "x"], "two files"),
+        ([""], "empty"),
+        (["--delay", "3"], "--runtime simulator"),
+        (["--schedule", "random"], "--runtime simulator"),
+        (["--runtime", "simulator", "--schedule", "random", "--delay", "3"], "--schedule concurrent"),
     ],
 )
 def test_wrong_usage_is_status_2(four: Path, words: list[str], said: str) -> None:
@@ -235,6 +243,13 @@ def test_robots_with_several_variables_are_said_to_be_the_next_step() -> None:
     assert len(done.stderr.splitlines()) == 1
 
 
+def test_the_example_of_the_documentation_is_solved(tmp_path: Path) -> None:
+    done = robochoc("solve", ROOT / "docs" / "examples" / "scouts", "--html", tmp_path / "page.html")
+    assert done.returncode == 0
+    assert "Relay: V2 = 3" in done.stdout
+    assert (ROOT / "docs" / "examples" / "scouts" / "Relay.xml").read_text() in (ROOT / "README.md").read_text()
+
+
 def test_the_jchoc_originals_load_and_are_said_to_be_the_next_step() -> None:
     originals = ROOT.parent / "shared" / "data" / "jchoc"
     if not originals.is_dir():
@@ -247,7 +262,7 @@ def test_the_jchoc_originals_load_and_are_said_to_be_the_next_step() -> None:
 
 def test_progress_is_shown_on_a_terminal_only(tmp_path: Path) -> None:
     write_team(queens3d(8), tmp_path / "eight")
-    words = [PROGRAM, "solve", str(tmp_path / "eight"), "--timeout", "1.5"]
+    words = [PROGRAM, "solve", str(tmp_path / "eight"), "--runtime", "simulator", "--timeout", "1.5"]
     assert subprocess.run(words, capture_output=True, check=False).stderr == b""
     ours, theirs = pty.openpty()
     with subprocess.Popen(words, stderr=theirs, stdout=subprocess.DEVNULL) as running:
@@ -292,6 +307,14 @@ def test_animate_refuses_what_is_neither(tmp_path: Path, content: str) -> None:
     assert not (tmp_path / "page.html").exists()
 
 
+def test_animate_refuses_another_team(four: Path) -> None:
+    saved = four.parent / "result.json"
+    saved.write_text(robochoc("solve", four, "--withdraw", "--json").stdout)
+    done = robochoc("animate", saved, "--team", ROOT / "docs" / "examples" / "scouts", "-o", four.parent / "page.html")
+    assert done.returncode == 1
+    assert "not the team" in done.stderr
+
+
 def test_animate_says_what_is_missing(tmp_path: Path) -> None:
     assert robochoc("animate", tmp_path / "nothing", "-o", tmp_path / "page.html").returncode == 1
     assert robochoc("animate", tmp_path / "nothing").returncode == 2
@@ -304,6 +327,58 @@ def test_an_output_that_cannot_be_written_is_said_before_the_work(four: Path, pl
         assert done.returncode == 2
         assert option in done.stderr
         assert done.stdout == ""
+
+
+def test_what_goes_to_standard_output_does_not_replace_it(four: Path) -> None:
+    log = four.parent / "log"
+    log.write_text("precious\n")
+    with log.open("a") as out:
+        words = [PROGRAM, "solve", str(four), "--json", "--runtime", "simulator", "--journal", "/dev/stdout"]
+        subprocess.run(words, stdout=out, check=True)
+    lines = log.read_text().splitlines()
+    assert lines[0] == "precious"
+    assert json.loads(lines[1])["verdict"] == "no-solution"
+    assert json.loads(lines[2])["event"] == "Journal"
+
+
+@pytest.mark.parametrize("closed", ["0<&-", "1>&-", "2>&-", "0<&- 1>&- 2>&-"])
+@pytest.mark.parametrize("runtime", ["processes", "simulator"])
+def test_closed_streams_do_no_harm(four: Path, closed: str, runtime: str) -> None:
+    journal = four.parent / "run.jsonl"
+    command = f"{PROGRAM} solve {four} --json --runtime {runtime} --journal {journal} {closed}"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=60, check=False)  # noqa: S602
+    assert done.returncode == 0
+    assert done.stderr == ""
+    assert "no-solution" in journal.read_text()
+
+
+def test_a_full_disk_is_said_after_the_verdict(four: Path) -> None:
+    done = robochoc("solve", four, "--runtime", "simulator", "--journal", "/dev/full")
+    assert done.returncode == 1
+    assert "No space left" in done.stderr
+    assert "no solution" in done.stdout
+
+
+def test_folders_whose_names_are_no_text(tmp_path: Path) -> None:
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff\xfe\n\x1b[31m"))
+    write_team(queens3d(2), folder)
+    for words in (["validate"], ["validate", "--json"], ["solve"], ["solve", "--json"]):
+        done = robochoc(*words, folder)
+        assert done.returncode == 0
+        assert "\x1b" not in done.stdout
+
+
+def test_deeply_nested_folders_are_searched(tmp_path: Path) -> None:
+    bottom = tmp_path.joinpath(*["d"] * 1200)
+    subprocess.run(["mkdir", "-p", str(bottom)], check=True)
+    write_team(queens3d(1), bottom / "team")
+    assert robochoc("validate", tmp_path).returncode == 0
+
+
+def test_generate_into_this_folder(tmp_path: Path) -> None:
+    done = robochoc("generate", "queens3d", "--n", 2, "-o", ".", "--force", folder=tmp_path)
+    assert done.returncode == 0
+    assert read_team(tmp_path) == replace(queens3d(2), name=tmp_path.name)
 
 
 # the whole

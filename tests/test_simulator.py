@@ -8,14 +8,14 @@ import golden
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from problems import teams
+from problems import team_of, teams
 
 from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.generators.queens3d import queens3d
 from robochoc.message import Envelope
 from robochoc.observers.journal import Header, Recorder, metrics_of, read_journal
 from robochoc.outcome import Verdict
-from robochoc.problem import Team
+from robochoc.problem import Constraint, Relation, Semantics, Team
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 
 
@@ -81,6 +81,14 @@ def test_a_timeout_is_an_unknown() -> None:
     assert outcome.verdict is Verdict.UNKNOWN
     assert not outcome.assignment
     assert not outcome.verified
+
+
+def test_a_timeout_holds_where_a_packet_takes_long() -> None:
+    never = Relation("R", 2, Semantics.SUPPORTS, ((-1, -1),))
+    team = team_of({"X": range(20_000), "Y": range(20_000)}, [Constraint("C", never, ("X", "Y"), ("X", "Y"))])
+    outcome = solve(team, Options(runtime=Runtime.SIMULATOR, timeout=0.5))
+    assert outcome.verdict is Verdict.UNKNOWN
+    assert outcome.metrics.wall_s < 5
 
 
 @given(

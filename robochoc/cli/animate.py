@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from robochoc.cli.failure import BadInput, invalid_input_fails
-from robochoc.cli.output import OutputFile
+from robochoc.cli.paths import InputPath, OutputFile
 
 if TYPE_CHECKING:
     from robochoc.outcome import Outcome
@@ -19,17 +19,17 @@ NEXT_STEP = "give what 'robochoc solve --json' or '--journal' wrote"
 
 
 @click.command(short_help="Make the 3D scene of a saved result or journal.")
-@click.argument("saved", type=click.Path(path_type=Path), metavar="RESULT.json|JOURNAL")
-@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="The page to write.")
+@click.argument("saved", type=InputPath(), metavar="RESULT.json|JOURNAL")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="The page to write; needed unless --serve.")
 @click.option(
     "--team",
     "folder",
-    type=click.Path(path_type=Path),
+    type=InputPath(),
     metavar="DIR",
-    help="The team's folder, for the places that its topics name.  [default: instances/TEAM, if it is there]",
+    help="The team's folder: it has the robots' names and topics.  [default: instances/TEAM, if it is there]",
 )
 @click.option("--serve", is_flag=True, help="Show the scene live on this machine until Ctrl-C.")
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Of --serve; 0 is any free one.")
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port for --serve; 0 is any free one.")
 @invalid_input_fails
 def animate(saved: Path, output: Path | None, folder: Path | None, port: int, *, serve: bool) -> None:
     """Make the 3D scene of what `robochoc solve --json` printed, or of the journal that `--journal` wrote."""
@@ -39,15 +39,28 @@ def animate(saved: Path, output: Path | None, folder: Path | None, port: int, *,
 
     if not (output or serve):
         raise click.UsageError("say where the page goes (-o FILE), or show it live (--serve)")
+    if port and not serve:
+        raise click.UsageError("--port is for --serve")
     outcome = _outcome(saved)
-    if folder is None:
-        usual = Path("instances") / Path(outcome.team).name
-        folder = usual if usual.is_dir() else None
-    scene = scene_of(outcome, read_team(folder) if folder else None)
+    folder = folder or _usual_folder(outcome)
+    team = read_team(folder) if folder else None
+    if team and not (team.variables.keys() >= outcome.assignment.keys() and {*team.order} >= {*outcome.withdrawn}):
+        raise BadInput(f"{folder}: this is not the team of {saved}, {outcome.team} (give its folder with --team)")
+    scene = scene_of(outcome, team)
     if output:
         write_page(scene, output)
     if serve:
         serve_scene(scene, port)
+
+
+def _usual_folder(outcome: Outcome) -> Path | None:
+    """Where `generate` puts teams of that name, if it is there."""
+    name = Path(outcome.team).name
+    folder = Path("instances") / name
+    if name not in {"", ".."} and folder.is_dir():
+        return folder
+    click.echo(f"{folder} is not there: drones are named for variables, without topics (give --team DIR)", err=True)
+    return None
 
 
 def _outcome(saved: Path) -> Outcome:

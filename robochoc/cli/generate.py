@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from robochoc.cli.failure import invalid_input_fails
+from robochoc.cli.paths import InputPath
 
 
 @click.group(short_help="Write a team of a known family.")
@@ -23,9 +24,7 @@ def generate() -> None:
     show_default=True,
     help="planar: the constraints of the paper's Figure 2; full: the space diagonals attack too.",
 )
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Folder to write  [default: instances/queens3d-N]"
-)
+@click.option("-o", "--output", type=InputPath(), help="Folder to write  [default: instances/queens3d-N]")
 @click.option("--force", is_flag=True, help="Replace the folder if it is there.")
 @invalid_input_fails
 def queens3d(n: int, model: str, output: Path | None, *, force: bool) -> None:

@@ -6,6 +6,7 @@ left, no file half written. Handlers are set before anything else is imported.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import time
@@ -20,6 +21,7 @@ _STOPPING = (signal.SIGINT, signal.SIGTERM)
 
 def main() -> NoReturn:
     """Run the command line, and leave with its exit status."""
+    _open_standard_streams()
     ending = Ending()
     try:
         ending.listen()
@@ -31,6 +33,16 @@ def main() -> NoReturn:
         sys.stderr.write("robochoc: interrupted\n")
         status = 128 + signal.SIGINT
     sys.exit(status)
+
+
+def _open_standard_streams() -> None:
+    """Let streams that the caller has closed go nowhere: no pipe of ours must take their place."""
+    for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+            setattr(sys, name, os.fdopen(descriptor, "w" if descriptor else "r"))
 
 
 class Ending:

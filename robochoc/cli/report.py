@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from robochoc.formats import on_one_line
 from robochoc.outcome import Metrics, Outcome, Verdict
 from robochoc.problem import Team, natural
 
@@ -14,11 +15,12 @@ _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 
 def report(team: Team, outcome: Outcome) -> str:
     """The verdict, why, where everybody flies, and what it cost, in a few lines."""
-    lines = [f"{outcome.team}: {_verdict(outcome)}"]
+    lines = [f"{on_one_line(outcome.team)}: {_verdict(outcome)}"]
     if outcome.assignment:
-        lines += _board(team, outcome.assignment) or _list(outcome.assignment)
+        lines += _board(team, outcome.assignment) or _list(team, outcome.assignment)
     if outcome.withdrawn:
-        lines.append(f"  {len(team.robots) - len(outcome.withdrawn)} robots fly, {len(outcome.withdrawn)} step aside:")
+        flying, aside = len(team.robots) - len(outcome.withdrawn), len(outcome.withdrawn)
+        lines.append(f"  {flying} fly, {aside} step{'s' * (aside == 1)} aside:")
         lines += _wrapped(outcome.withdrawn)
     place = (
         f"{len(team.robots)} processes" if outcome.runtime == "processes" else f"{outcome.runtime}, seed {outcome.seed}"
@@ -43,8 +45,9 @@ def _verdict(outcome: Outcome) -> str:
 def _metrics(spent: Metrics) -> str:
     kinds = sorted(spent.messages.items(), key=lambda item: -item[1])
     types = ", ".join(f"{count:,} {kind}" for kind, count in kinds)
+    total = sum(spent.messages.values())
     return (
-        f"{sum(spent.messages.values()):,} messages ({types or 'none'}), {spent.bytes:,} bytes,"
+        f"{total:,} message{'s' * (total != 1)} ({types or 'none'}), {spent.bytes:,} bytes,"
         f" {spent.ncccs:,} NCCCs, {spent.checks:,} checks, {spent.wall_s:.2f} s"
     )
 
@@ -65,8 +68,9 @@ def _board(team: Team, assignment: Mapping[str, int]) -> list[str]:
     return [head, *(f"  {row:>10}" + "".join(f"{cells[row, column]:>{width}}" for column in columns) for row in rows)]
 
 
-def _list(assignment: Mapping[str, int]) -> list[str]:
-    return _wrapped([f"{name} = {assignment[name]}" for name in sorted(assignment, key=natural)])
+def _list(team: Team, assignment: Mapping[str, int]) -> list[str]:
+    names = sorted(assignment, key=natural)
+    return _wrapped([f"{team.owner[name]}: {name} = {assignment[name]}" for name in names])
 
 
 def _wrapped(words: tuple[str, ...] | list[str]) -> list[str]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.failure import INVALID, LIMIT, LOST, USAGE
-from robochoc.cli.output import OutputFile
+from robochoc.cli.paths import InputPath, OutputFile
 
 if TYPE_CHECKING:
     from robochoc.observers.journal import Recorder
@@ -49,8 +49,10 @@ class Products:
 
 
 @click.command(cls=SolveCommand, short_help="Solve teams, each robot in its own process.")
-@click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="PATH ...")
-@click.option("--protocol", default="abt", show_default=True, metavar="NAME", help="What robots speak.")
+@click.argument("paths", nargs=-1, required=True, type=InputPath(), metavar="PATH ...")
+@click.option(
+    "--protocol", default="abt", show_default=True, metavar="NAME", help="Protocol to run; abt comes with this version."
+)
 @click.option(
     "--runtime",
     type=click.Choice(["processes", "simulator"]),
@@ -58,32 +60,35 @@ class Products:
     show_default=True,
     help="processes: one OS process per robot; simulator: one thread, repeatable.",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the simulator's schedule.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the simulator.")
 @click.option(
     "--schedule",
     type=click.Choice(["concurrent", "random"]),
     default="concurrent",
     show_default=True,
-    help="Of the simulator: time counted in constraint checks, or any channel next.",
+    help="Simulator only. concurrent: time is counted in constraint checks; random: any channel may come next.",
 )
 @click.option(
     "--delay",
     type=click.IntRange(0),
     default=0,
     show_default=True,
-    help="Of the concurrent schedule: a message takes up to so many checks.",
+    help="Simulator, concurrent schedule only: the longest delay of a message, in constraint checks.",
 )
 @click.option(
     "--timeout",
     type=click.FloatRange(0, min_open=True),
     metavar="SECONDS",
-    help="Give up after so long: verdict unknown, exit status 3.",
+    help="Give up after so long, the start of the processes included: verdict unknown, exit status 3.",
 )
 @click.option(
     "--withdraw",
     type=click.Choice(WITHDRAWALS),
-    metavar="[maximal]",
-    help="When the whole team has no solution, robots that cannot be placed step aside, in priority order.",
+    metavar="[=maximal]",
+    help=(
+        "When the whole team has no solution, robots that find no place step aside, in priority order. maximal (also"
+        " without a word): nobody who stepped aside could be added; fewer might do."
+    ),
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a team, and nothing else, on standard output.")
 @click.option(
@@ -117,6 +122,7 @@ def solve(
     """
     from robochoc.run import Options, Runtime, ScheduleName, Withdrawal
 
+    _check_settings(settings)
     withdraw = settings.pop("withdraw")
     options = Options(
         runtime=Runtime(settings.pop("runtime")),
@@ -126,11 +132,23 @@ def solve(
     )
     folders, statuses = _teams(paths)
     products = Products(html, journal, serve)
+    if html and html == journal:
+        raise click.UsageError(f"--html and --journal are two files; both are {html}")
     if products and len(folders) > 1:
         raise click.UsageError(f"--html, --journal and --serve are for one team; {len(folders)} were found")
     for folder in folders:
         statuses.append(_solve_one(folder, options, products, as_json=as_json))
     context.exit(next((status for status in (INVALID, USAGE, LOST, LIMIT) if status in statuses), 0))
+
+
+def _check_settings(settings: dict[str, Any]) -> None:
+    """Options that would be ignored are wrong usage."""
+    if settings["runtime"] != "simulator" and (settings["delay"] or settings["schedule"] != "concurrent"):
+        raise click.UsageError("--delay and --schedule are the simulator's; add --runtime simulator")
+    if settings["timeout"] is not None and not settings["timeout"] > 0:
+        raise click.UsageError("--timeout takes a number of seconds")
+    if settings["delay"] and settings["schedule"] != "concurrent":
+        raise click.UsageError("--delay is for --schedule concurrent: in a random one any message may take any time")
 
 
 def _teams(paths: tuple[Path, ...]) -> tuple[list[Path], list[int]]:
@@ -151,44 +169,47 @@ def _teams(paths: tuple[Path, ...]) -> tuple[list[Path], list[int]]:
 def _solve_one(folder: Path, options: Options, products: Products, *, as_json: bool) -> int:
     """Solve the team in `folder`, tell the outcome, and return the exit status."""
     from robochoc.communication.robot_link import RobotsLost
-    from robochoc.formats import InvalidInput, read_team
+    from robochoc.formats import InvalidInput, on_one_line, read_team
     from robochoc.registry import UnknownProtocol
     from robochoc.run import Refuted
     from robochoc.solver.compiled import Unsupported
 
     try:
         team = read_team(folder)
-        outcome = _run(team, options, products)
+        with _journal(team, options, products.journal) as recorder:
+            outcome = _run(team, options, recorder)
+            _tell(team, outcome, as_json=as_json)
     except InvalidInput as invalid:
         click.echo(str(invalid), err=True)
         return INVALID
     except (UnknownProtocol, Unsupported) as refusal:
-        click.echo(f"{folder}: {refusal}", err=True)
+        click.echo(on_one_line(f"{folder}: {refusal}"), err=True)
         return USAGE
     except (RobotsLost, Refuted) as failure:
-        click.echo(f"{folder}: {failure}", err=True)
+        click.echo(on_one_line(f"{folder}: {failure}"), err=True)
         return LOST
-    _tell(team, outcome, as_json=as_json)
     _show(team, outcome, products, quiet=as_json)
     return LIMIT if outcome.verdict == "unknown" else 0
 
 
-def _run(team: Team, options: Options, products: Products) -> Outcome:
+def _run(team: Team, options: Options, recorder: Recorder | None) -> Outcome:
     """Run with whatever watches: a journal, a line on the terminal."""
     from robochoc.cli.progress import progress_line
     from robochoc.run import solve as run
 
-    if not products.journal:
-        with progress_line(team.name) as progress:
-            return run(team, options, progress=progress)
-    with _journal(team, options, products.journal) as recorder, progress_line(team.name) as progress:
-        outcome = recorder.outcome = run(team, options, observer=recorder, progress=progress)
-        return outcome
+    with progress_line(team.name) as progress:
+        outcome = run(team, options, observer=recorder, progress=progress)
+    if recorder:
+        recorder.outcome = outcome
+    return outcome
 
 
 @contextmanager
-def _journal(team: Team, options: Options, path: Path) -> Iterator[Recorder]:
-    """A recorder whose journal is written at the end, also of a run that breaks off."""
+def _journal(team: Team, options: Options, path: Path | None) -> Iterator[Recorder | None]:
+    """A recorder, if there is a journal to write; it is written at the end, also of a run that breaks off."""
+    if path is None:
+        yield None
+        return
     from robochoc.formats import write_atomically
     from robochoc.observers.journal import Header, Recorder
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.failure import INVALID
+from robochoc.cli.paths import InputPath
 
 if TYPE_CHECKING:
     from robochoc.formats import InvalidInput
@@ -15,14 +16,14 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Check teams, and tell every mistake with file and line.")
-@click.argument("paths", nargs=-1, type=click.Path(path_type=Path), metavar="[PATH ...]")
+@click.argument("paths", nargs=-1, type=InputPath(), metavar="[PATH ...]")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a team.")
 @click.pass_context
 def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) -> None:
     """Check every team at PATH or below (default: instances/), or single robots' files.
 
-    XML, schema, each file's own meaning, and the team as a whole: all mistakes are told at once. Exit status 1 if
-    there are any.
+    Four layers: XML, schema, each file's own meaning, the team as a whole. All mistakes of all files are told at
+    once, of each file those of its first layer that has any. Exit status 1 if there are any.
     """
     from robochoc.formats import InvalidInput, find_teams
 
@@ -42,13 +43,13 @@ def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) 
 
 def _report(place: Path) -> dict[str, Any]:
     """The validation of one team, or of one robot's file."""
-    from robochoc.formats import InvalidInput, read_robot, read_team
+    from robochoc.formats import InvalidInput, encodable, read_robot, read_team
 
     try:
         robots = (read_robot(place),) if place.is_file() else read_team(place).robots
     except InvalidInput as invalid:
         return _invalid(place, invalid)
-    return {"path": str(place), "valid": True, **_sizes(robots), "errors": []}
+    return {"path": encodable(str(place)), "valid": True, **_sizes(robots), "errors": []}
 
 
 def _sizes(robots: tuple[Robot, ...]) -> dict[str, int]:
@@ -62,11 +63,19 @@ def _sizes(robots: tuple[Robot, ...]) -> dict[str, int]:
 
 
 def _invalid(place: Path, invalid: InvalidInput) -> dict[str, Any]:
+    from robochoc.formats import encodable
+
     errors = [
-        {"file": one.file, "line": one.line, "message": one.message, "hint": one.hint, "text": str(one)}
+        {
+            "file": encodable(one.file),
+            "line": one.line,
+            "message": one.message,
+            "hint": one.hint,
+            "text": str(one),
+        }
         for one in invalid.diagnostics
     ]
-    return {"path": str(place), "valid": False, "errors": errors}
+    return {"path": encodable(str(place)), "valid": False, "errors": errors}
 
 
 def _print_json(report: dict[str, Any]) -> None:
@@ -76,14 +85,18 @@ def _print_json(report: dict[str, Any]) -> None:
 
 
 def _print(report: dict[str, Any]) -> None:
+    from robochoc.formats import on_one_line
+
+    path = on_one_line(report["path"])
     if report["valid"]:
         counts = ", ".join(
             f"{report[what]} {what if report[what] != 1 else what[:-1]}"
             for what in ("robots", "variables", "constraints")
         )
-        click.echo(f"{report['path']}: {counts}: ok")
+        alone = "" if Path(report["path"]).is_dir() else " by itself"
+        click.echo(f"{path}: {counts}: ok{alone}")
         return
     errors = report["errors"]
-    click.echo(f"{report['path']}: {len(errors)} error{'s' * (len(errors) != 1)}")
+    click.echo(f"{path}: {len(errors)} error{'s' * (len(errors) != 1)}")
     for error in errors:
         click.echo(f"  {error['text']}")

@@ -57,6 +57,8 @@ TICK_S = 0.2
 """Between two looks at the counters for those who watch the progress, and at who is dying."""
 LAST_WORDS_S = 5.0
 """How long the parent waits for reports after it has said stop."""
+LATE_WORDS_S = 0.5
+"""The same when the time was over: who still computes then is left out of the metrics."""
 FAREWELL_S = 0.5
 """How long processes may take to end by themselves before they are killed."""
 _FDS_PER_ROBOT = 4
@@ -105,7 +107,7 @@ class ProcessesRun:
         self._began = time.monotonic()
         deadline = None if timeout is None else self._began + timeout
         try:
-            self._launch()
+            self._launch(deadline)
             self._wait_until(lambda: not self._absent, deadline)
             if not self._absent:
                 self._tell_all(Start(self._began))
@@ -122,14 +124,16 @@ class ProcessesRun:
 
     # Beginning
 
-    def _launch(self) -> None:
-        """Start the processes. Raises `Unsupported` when the system does not allow so many."""
+    def _launch(self, deadline: float | None) -> None:
+        """Start the processes, as long as there is time. Raises `Unsupported` when the system allows fewer."""
         robots = self._team.robots
         allow_descriptors(len(robots) * _FDS_PER_ROBOT + _FDS_SPARE)
         self._selector.register(self._ends.fileno(), selectors.EVENT_READ)
         shown = interfaces(self._team)
         with garbage_frozen():
             for robot in robots:
+                if _over(deadline):
+                    break
                 try:
                     # One by one, so that a signal waits for the start of one robot, and not of a large team.
                     with signals_held():
@@ -169,13 +173,15 @@ class ProcessesRun:
         """Serve the robots until `done()` or the deadline; raises `RobotsLost` as soon as one is lost."""
         while not done():
             now = time.monotonic()
-            if deadline is not None and now >= deadline:
+            if _over(deadline):
                 return
             patience = TICK_S if deadline is None else min(TICK_S, deadline - now)
             for key, _ in self._selector.select(patience):
                 if key.data is not None:
                     self._listen(key.data)
                 self._see_ends()  # after each, as robots may have much to say, and the machine may be busy
+                if _over(deadline):
+                    return
             if not self._stopped and now - self._looked >= TICK_S:
                 self._looked = now
                 self._give_up([robot for robot in self._robots.values() if robot.is_dying])
@@ -290,7 +296,7 @@ class ProcessesRun:
         wall_s = self._now()
         self._stopped = True
         self._tell_all(Stop())
-        deadline = time.monotonic() + LAST_WORDS_S
+        deadline = time.monotonic() + (LAST_WORDS_S if self._verdict else LATE_WORDS_S)
         self._wait_until(lambda: not self._silent(), deadline)
         silent = self._silent()
         if silent and self._verdict is not None:
@@ -345,3 +351,7 @@ class ProcessesRun:
 
     def _now(self) -> float:
         return time.monotonic() - self._began
+
+
+def _over(deadline: float | None) -> bool:
+    return deadline is not None and time.monotonic() >= deadline

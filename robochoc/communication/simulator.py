@@ -19,8 +19,8 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled import LocalProblem, interfaces
 
-CHECK_EVERY = 256
-"""Packets between two looks at the wall clock."""
+PROGRESS_EVERY = 256
+"""Packets between two reports of progress."""
 
 
 class Simulation:
@@ -56,6 +56,12 @@ class Simulation:
             self._pass_on(host, host.start())
         packets = 0
         while self._verdict is None:
+            elapsed_s = time.monotonic() - began
+            if timeout is not None and elapsed_s > timeout:
+                self._verdict = Verdict.UNKNOWN
+                break
+            if self._progress and packets % PROGRESS_EVERY == 0:
+                self._progress(Progress(self._sent(), elapsed_s))
             packet = self._schedule.get()
             if not packet:
                 self._verdict = Verdict.SOLUTION
@@ -63,8 +69,6 @@ class Simulation:
             host = self._hosts[packet[0].receiver]
             self._pass_on(host, host.handle(packet))
             packets += 1
-            if packets % CHECK_EVERY == 0:
-                self._look_at_the_clock(time.monotonic() - began, timeout)
         return RunResult.of(
             self._verdict,
             self._witness,
@@ -80,9 +84,5 @@ class Simulation:
         if host.protocol.verdict is not None:
             self._verdict, self._witness = host.protocol.verdict, host.name
 
-    def _look_at_the_clock(self, elapsed_s: float, timeout: float | None) -> None:
-        if timeout is not None and elapsed_s > timeout:
-            self._verdict = Verdict.UNKNOWN
-        elif self._progress:
-            messages = sum(sum(host.sent.values()) for host in self._hosts.values())
-            self._progress(Progress(messages, elapsed_s))
+    def _sent(self) -> int:
+        return sum(sum(host.sent.values()) for host in self._hosts.values())

@@ -1,6 +1,6 @@
 """Robots and teams as XML files: reading them with every mistake told, and writing them (FORMAT.md, Figure 2)."""
 
-from robochoc.formats.diagnostics import Diagnostic, InvalidInput
+from robochoc.formats.diagnostics import Diagnostic, InvalidInput, encodable, on_one_line
 from robochoc.formats.files import write_atomically
 from robochoc.formats.folder import write_team
 from robochoc.formats.intension import PREDEFINED
@@ -12,7 +12,9 @@ __all__ = [
     "PREDEFINED",
     "Diagnostic",
     "InvalidInput",
+    "encodable",
     "find_teams",
+    "on_one_line",
     "read_robot",
     "read_team",
     "robot_xml",

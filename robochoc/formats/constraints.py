@@ -62,7 +62,7 @@ def read_shared(element: etree._Element, context: Context) -> Constraint | None:
             hint = suggestion(constraint.variables[0], context.own, "own variables")
             raise MistakeError(f"the scope '{_shown(constraint.scope)}' has no variable of this robot", hint)
         if len(own) == len(constraint.variables):
-            hint = "put it into the <constraints> of the instance: it is private"
+            hint = "name one, or put the constraint into the <constraints> of the instance: it is private"
             raise MistakeError(f"the scope '{_shown(constraint.scope)}' has no variable of the neighbour", hint)
     return constraint
 

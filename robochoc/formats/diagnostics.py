@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import itertools
+import os
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ class Diagnostic:
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}" if self.line else self.file
-        return _on_one_line(f"{place}: {self.message} ({self.hint})")
+        return on_one_line(f"{place}: {self.message} ({self.hint})")
 
 
 class InvalidInput(Exception):  # noqa: N818 - the error is the input's
@@ -93,6 +94,11 @@ def _place(diagnostic: Diagnostic) -> tuple[object, int]:
     return natural(diagnostic.file[:4096]), diagnostic.line
 
 
-def _on_one_line(text: str) -> str:
-    """No name in an input may break the line, or speak to the terminal."""
+def encodable(path: str) -> str:
+    """`path` as text that has a UTF-8 form: a file system's names need not have one."""
+    return os.fsencode(path).decode("utf-8", "replace")
+
+
+def on_one_line(text: str) -> str:
+    """`text` as it may be printed: no name in an input may break the line, or speak to the terminal."""
     return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)

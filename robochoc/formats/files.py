@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import secrets
+from contextlib import suppress
 from pathlib import Path
 
 _NO_UNNAMED = {errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL}
@@ -15,9 +16,15 @@ def write_atomically(path: Path, content: bytes) -> None:
     """Write `content` to `path`; whoever looks sees the old file or the whole new one.
 
     It is written beside `path` and then renamed. Where Linux allows it the file has no name until it is complete, so
-    that not even SIGKILL leaves a trace. Devices and pipes (`/dev/stdout`) are written to as they are, symbolic links
-    are followed. Raises `OSError`; nothing is left behind then.
+    that not even SIGKILL leaves a trace. Devices, pipes, and what standard output or error already go to (such as
+    `/dev/stdout`) are written to as they are; symbolic links are followed. Raises `OSError`; nothing is left behind
+    then.
     """
+    stream = _stream_to(path)
+    if stream is not None:
+        with os.fdopen(os.dup(stream), "wb") as open_already:
+            open_already.write(content)
+        return
     if path.exists() and not path.is_file():
         path.write_bytes(content)
         return
@@ -28,6 +35,15 @@ def write_atomically(path: Path, content: bytes) -> None:
     except BaseException:
         complete.unlink(missing_ok=True)
         raise
+
+
+def _stream_to(path: Path) -> int | None:
+    """The standard stream that goes to `path`: to replace the file would take away what was written there."""
+    for stream in (1, 2):
+        with suppress(OSError):
+            if os.path.samestat(path.stat(), os.fstat(stream)):
+                return stream
+    return None
 
 
 def _written_unnamed(target: Path, content: bytes) -> Path | None:

@@ -19,8 +19,9 @@ def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
     """
     if folder.exists() or folder.is_symlink():
         _may_replace(folder, replace=replace)
+    folder = folder.resolve()
     folder.parent.mkdir(parents=True, exist_ok=True)
-    new = folder.with_name(f".{folder.name[:100]}.{secrets.token_hex(4)}.new")
+    new = folder.with_name(f".{secrets.token_hex(8)}.new")
     old = new.with_suffix(".old")
     try:
         new.mkdir()
@@ -39,7 +40,7 @@ def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
 def _may_replace(folder: Path, *, replace: bool) -> None:
     if not replace:
         raise _refusal(folder, "it exists already", "choose another folder with -o, or replace it with --force")
-    if folder.is_symlink() or not folder.is_dir():
+    if folder.is_symlink() or not folder.is_dir() or folder.resolve() == Path(folder.resolve().anchor):
         raise _refusal(folder, "it is no folder, and is not replaced", "choose another folder with -o")
     if foreign := sorted(entry.name for entry in folder.iterdir() if entry.suffix != ".xml" or not entry.is_file()):
         raise _refusal(

@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import Path
 
 from robochoc.formats.copies import differing_copies
-from robochoc.formats.diagnostics import Diagnostic, InvalidInput
+from robochoc.formats.diagnostics import Diagnostic, InvalidInput, encodable
 from robochoc.formats.members import Members
 from robochoc.formats.neighbours import cycles, disagreements, missing_files, mixed_kinds, shared_variables
 from robochoc.formats.robot import RobotFile, read_robot_file
@@ -61,7 +61,7 @@ def read_team(folder: Path | str) -> Team:
     if found:
         raise InvalidInput(found)
     order = priority_order(members.agreed)
-    return Team(folder.resolve().name, tuple(_informed(members, name) for name in order), dynamic)
+    return Team(encodable(folder.resolve().name), tuple(_informed(members, name) for name in order), dynamic)
 
 
 def _mistakes(members: Members) -> Iterator[Diagnostic]:
@@ -90,14 +90,16 @@ def _informed(members: Members, name: str) -> Robot:
     return replace(file.robot, children=tuple(children))
 
 
-def _teams(folder: Path) -> Iterator[Path]:
-    entries = _listing(folder)
-    if any(_xml_files(entries)):
-        yield folder
-        return
-    for entry in entries:
-        if not entry.name.startswith(".") and entry.is_dir(follow_symlinks=False):
-            yield from _teams(folder / entry.name)
+def _teams(top: Path) -> Iterator[Path]:
+    waiting = [top]
+    while waiting:
+        folder = waiting.pop()
+        entries = _listing(folder)
+        if any(_xml_files(entries)):
+            yield folder
+            continue
+        below = [e.name for e in entries if not e.name.startswith(".") and e.is_dir(follow_symlinks=False)]
+        waiting += [folder / name for name in reversed(below)]
 
 
 def _xml_files(entries: Iterable[os.DirEntry[str]]) -> Iterator[str]:
@@ -111,7 +113,8 @@ def _listing(folder: Path) -> list[os.DirEntry[str]]:
         with os.scandir(folder) as entries:
             return sorted(entries, key=lambda entry: natural(entry.name))
     except NotADirectoryError:
-        raise _invalid(folder, "is not a folder", _NEXT_STEP) from None
+        step = f"a robot's team is its folder: {folder.parent}" if folder.suffix == ".xml" else _NEXT_STEP
+        raise _invalid(folder, "is not a folder", step) from None
     except FileNotFoundError:
         raise _invalid(folder, "does not exist", _NEXT_STEP) from None
     except (OSError, ValueError) as error:

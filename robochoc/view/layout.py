@@ -153,7 +153,7 @@ def _axes(crew: Sequence[Craft], cells: Sequence[Cell]) -> tuple[Axis, Axis, Axi
 def _axis_names(crew: Sequence[Craft]) -> tuple[str, str, str]:
     if all(craft.cell and craft.cell == numbers(craft.name) for craft in crew):
         return "row", "column", "level"
-    return ("x", "y", "z") if all(craft.cell for craft in crew) else ("", "", "value")
+    return ("x", "y", "z") if any(craft.cell for craft in crew) else ("", "", "value")
 
 
 def _lines(x: float, across: int, y: int, step: int) -> Iterator[tuple[float, float]]:

@@ -55,13 +55,11 @@ def _ending(outcome: Outcome, flying: int) -> str:
 
 
 def _facts(outcome: Outcome, flying: int) -> tuple[tuple[str, str], ...]:
-    facts = [
-        ("verdict", outcome.verdict + (", verified" if outcome.verified else "")),
-        ("protocol", outcome.protocol),
-        ("fly", str(flying)),
-    ]
+    checked = ", checked" if outcome.verified else ""
+    verdict = f"{outcome.verdict}{checked}"
     if outcome.withdrawn:
-        facts.append(("withdrew", str(len(outcome.withdrawn))))
+        verdict = f"no solution for all {flying + len(outcome.withdrawn)}; {flying} placed{checked}"
+    facts = [("verdict", verdict), ("protocol", outcome.protocol)]
     if outcome.cost:
         facts.append(("cost", f"{outcome.cost:,g}"))
     facts.append(("messages", f"{sum(outcome.metrics.messages.values()):,}"))
