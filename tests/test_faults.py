@@ -284,7 +284,7 @@ def test_a_robot_ended_by_another_signal(signum: int, team: Path, tmp_path: Path
 def test_a_stopped_robot_does_not_outlive_the_time_limit(team: Path, tmp_path: Path) -> None:
     with running(solving(team, timeout_s=2), tmp_path / "run") as run:
         run.strike(signal.SIGSTOP, run.wait_for_robots(len(NAMES))[30])
-        assert run.end() < 2 + processes.LAST_WORDS_S + processes.FAREWELL_S + GONE_WITHIN_S
+        assert run.end() < 2 + processes.LATE_WORDS_S + processes.FAREWELL_S + GONE_WITHIN_S
         assert run.status() in {3, 4}
         nothing_is_left(run)
 
@@ -423,8 +423,7 @@ def test_a_message_of_a_megabyte() -> None:
     assert speaking(SaysMuch) == (Verdict.SOLUTION, {"Word": len(TEAM.robots)})
 
 
-def test_deaf_robots_do_not_outlive_the_time_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(processes, "LAST_WORDS_S", 0.2)
+def test_deaf_robots_do_not_outlive_the_time_limit() -> None:
     verdict, _ = speaking(Spins, timeout=0.5)
     assert verdict is Verdict.UNKNOWN
 
