@@ -18,7 +18,7 @@ from robochoc.problem import Kind, Model, Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.registry import protocol_named
-from robochoc.solver.compiled import Unsupported
+from robochoc.solver.compiled import Unsupported, check_supported
 
 
 class Runtime(StrEnum):
@@ -142,6 +142,8 @@ def _refuse(team: Team, name: str, protocol: type[Protocol]) -> None:
         raise Unsupported(f"{team.name} has a scenario.xml; this version does not solve dynamic problems yet")
     if team.kind is Kind.DISWCSP and not protocol.costs:
         raise Unsupported(f"{team.name} is a DisWCSP, and {name} does not minimise costs")
+    for robot in team.robots:
+        check_supported(robot)
     if not protocol.partially_known:
         for robot in team.robots:
             for constraint in robot.shared:

@@ -33,11 +33,7 @@ class LocalProblem:
     """
 
     def __init__(self, robot: Robot, order: Sequence[str], interfaces: Interfaces) -> None:
-        if len(robot.variables) > 1:
-            raise Unsupported(
-                f"{robot.name} has {len(robot.variables)} variables; this version solves teams of robots with one"
-                " variable each (compiled domains of complex robots are the next step)"
-            )
+        check_supported(robot)
         rank = {name: place for place, name in enumerate(order)}
         self.agent = robot.name
         self.parents = tuple(sorted((parent.name for parent in robot.parents), key=rank.__getitem__))
@@ -102,6 +98,15 @@ class _SharedConstraint:
             mask = sum(1 << index for index, own in enumerate(self._own) if self._holds((*given, *own)))
             self._masks[others] = mask
         return mask
+
+
+def check_supported(robot: Robot) -> None:
+    """Raise `Unsupported` when `robot`'s local problem is more than this version can compile."""
+    if len(robot.variables) > 1:
+        raise Unsupported(
+            f"{robot.name} has {len(robot.variables)} variables; this version solves teams of robots with one variable"
+            " each (compiled domains of complex robots are the next step)"
+        )
 
 
 def interfaces(team: Team) -> dict[str, tuple[str, ...]]:
