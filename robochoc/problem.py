@@ -218,11 +218,6 @@ class Robot:
         seen.update(name for child in self.children for name in child.variables)
         return tuple(variable.name for variable in self.variables if variable.name in seen)
 
-    @property
-    def neighbours(self) -> tuple[str, ...]:
-        """Names of parents and children."""
-        return (*(parent.name for parent in self.parents), *(child.name for child in self.children))
-
 
 @dataclass(frozen=True)
 class Team:
