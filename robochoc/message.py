@@ -11,8 +11,12 @@ from typing import NamedTuple
 
 import msgspec
 
-Value = tuple[int, ...]
-"""A robot's value as others see it: the values of its interface variables, in the order of its file."""
+Value = tuple[int | None, ...]
+"""A robot's value as others see it: the values of its interface variables, in the order of its file.
+
+In the left side of a nogood, and in the value that it rules out, None stands for a variable that does not matter:
+the nogood holds whatever that variable's value is, and so for every value of the robot that looks alike.
+"""
 
 
 class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):

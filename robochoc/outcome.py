@@ -20,7 +20,9 @@ class Metrics:
     """What a run cost. Definitions: `docs/metrics.md`.
 
     `messages`: protocol messages sent, by type; `bytes`: of their encoded contents; `ncccs`: non-concurrent
-    constraint checks; `checks`: constraint checks of all robots; `wall_s`: seconds of wall-clock time.
+    constraint checks; `checks`: constraint checks of all robots; `wall_s`: seconds of wall-clock time;
+    `compile_s`: seconds before that, in which local domains were compiled; `memory`: bytes that the largest robot's
+    process had to itself at the end (0 where robots have no processes).
     """
 
     messages: dict[str, int] = field(default_factory=dict)
@@ -28,6 +30,8 @@ class Metrics:
     ncccs: int = 0
     checks: int = 0
     wall_s: float = 0.0
+    compile_s: float = 0.0
+    memory: int = 0
 
     def __add__(self, other: Metrics) -> Metrics:
         """The cost of two runs, one after the other."""
@@ -38,6 +42,8 @@ class Metrics:
             ncccs=self.ncccs + other.ncccs,
             checks=self.checks + other.checks,
             wall_s=self.wall_s + other.wall_s,
+            compile_s=self.compile_s + other.compile_s,
+            memory=max(self.memory, other.memory),
         )
 
 
@@ -57,3 +63,7 @@ class Outcome:
     verified: bool = False
     witness: str | None = None
     """Who ended the search: for `no-solution`, the robot that derived the empty nogood."""
+    reason: str | None = None
+    """Why, where that is not plain: a robot whose local problem has no solution, or the limit that was reached."""
+    count: int | None = None
+    """The number of solutions, where it was asked for."""

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import assert_never
+from typing import TypedDict, assert_never
 
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.simulator import Simulation
 from robochoc.observers.checker import cost, could_join, objections
 from robochoc.observers.events import Began, Observer
-from robochoc.outcome import Outcome, Verdict
+from robochoc.outcome import Metrics, Outcome, Verdict
 from robochoc.problem import Kind, Model, Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.registry import protocol_named
-from robochoc.solver.compiled import Unsupported, check_supported
+from robochoc.solver.ace import AceProcess, SolverTimeout
+from robochoc.solver.cache import SolutionCache
+from robochoc.solver.central import Judge
+from robochoc.solver.compile import Compilation, Compiler, CompileTimeout, Limits, Source
+from robochoc.solver.domain import CompiledDomain, TooManySolutions
+from robochoc.solver.encoding import Unsupported
+
+CENTRAL = "central"
+"""The protocol that is none: one model of all files, which ACE decides."""
 
 
 class Runtime(StrEnum):
@@ -49,7 +57,9 @@ class Refuted(Exception):  # noqa: N818 - named for what happened to the claim
 class Options:
     """How to run. `timeout` is in seconds of wall-clock time; `seed`, `schedule` and `delay` are the simulator's.
 
-    `delay` is the longest a message takes, in constraint checks.
+    `delay` is the longest a message takes, in constraint checks. `local` limits the compilation of each robot's
+    domain; `cache` says whether solutions of local problems are kept in the user's cache folder. `count` is for the
+    central judge: the number of all solutions. `verify` asks for a second opinion on a `no-solution`.
     """
 
     protocol: str = "abt"
@@ -59,6 +69,10 @@ class Options:
     withdraw: Withdrawal | None = None
     schedule: ScheduleName = ScheduleName.CONCURRENT
     delay: int = 0
+    local: Limits = field(default_factory=Limits)
+    cache: bool = True
+    count: bool = False
+    verify: bool = False
 
 
 def solve(
@@ -67,63 +81,154 @@ def solve(
     *,
     observer: Observer | None = None,
     progress: Callable[[Progress], None] | None = None,
+    solver: AceProcess | None = None,
 ) -> Outcome:
     """Let `team` solve its problem, and hold its answer against every constraint.
 
-    When the time is over, the verdict is `unknown`. Raises `UnknownProtocol`, `Unsupported`, `RobotsLost`
-    (processes), and `Refuted` when the checker does not agree.
+    Who solves many teams may lend a `solver` that stays warm between them. When a limit is reached, the verdict is
+    `unknown`. Raises `UnknownProtocol`, `Unsupported`, `RobotsLost` (processes), `CompileFailed` and `SolverLost`
+    (the constraint solver), `SolverMissing`, and `Refuted` when a second opinion does not agree.
     """
-    protocol = protocol_named(options.protocol)
-    _refuse(team, options.protocol, protocol)
-    phase = _Phases(team, options, observer, progress)
-    result = phase.play(protocol)
-    witness = result.witness
-    metrics = result.metrics
-    withdrawn: tuple[str, ...] = ()
-    if result.verdict is Verdict.NO_SOLUTION and options.withdraw is Withdrawal.MAXIMAL:
-        result = phase.play(FirstFit)
-        metrics += result.metrics
-        withdrawn = tuple(name for name in team.order if not result.assignments[name])
-    outcome = Outcome(
-        team=team.name,
-        protocol=options.protocol,
-        runtime=options.runtime,
-        seed=options.seed,
-        verdict=result.verdict,
-        metrics=metrics,
-        witness=witness,
-    )
-    if result.verdict is not Verdict.SOLUTION:
-        return outcome
-    assignment = {name: value for own in result.assignments.values() for name, value in own.items()}
-    _check(team, assignment, withdrawn)
-    return replace(outcome, assignment=assignment, cost=cost(team, assignment), withdrawn=withdrawn, verified=True)
+    run = _Run(team, options, observer, progress, solver)
+    outcome = run.centrally() if options.protocol == CENTRAL else run.distributed()
+    if outcome.verdict is Verdict.SOLUTION and outcome.count is None:
+        _check(team, outcome.assignment, outcome.withdrawn)
+        return replace(outcome, cost=cost(team, outcome.assignment), verified=True)
+    if options.verify and outcome.verdict is Verdict.NO_SOLUTION and options.protocol != CENTRAL:
+        return run.second_opinion(outcome)
+    return outcome
 
 
-class _Phases:
-    """Runs of one team, one after the other, within one time limit."""
+class _Run:
+    """One team, one set of options, one time limit for all that has to be done."""
 
     def __init__(
-        self, team: Team, options: Options, observer: Observer | None, progress: Callable[[Progress], None] | None
+        self,
+        team: Team,
+        options: Options,
+        observer: Observer | None,
+        progress: Callable[[Progress], None] | None,
+        solver: AceProcess | None,
     ) -> None:
         self._team = team
+        self._solver = solver
         self._options = options
         self._observer = observer
         self._progress = progress
-        self._deadline = None if options.timeout is None else time.monotonic() + options.timeout
+        self._began = time.monotonic()
+        self._deadline = None if options.timeout is None else self._began + options.timeout
+        self._cache = SolutionCache() if options.cache else None
+        self._outcome = Outcome(
+            team=team.name,
+            protocol=options.protocol,
+            runtime=options.runtime,
+            seed=options.seed,
+            verdict=Verdict.UNKNOWN,
+        )
 
-    def play(self, protocol: type[Protocol]) -> RunResult:
+    def distributed(self) -> Outcome:
+        """The robots compile their domains, then the protocol runs; robots step aside if they are to."""
+        protocol = protocol_named(self._options.protocol)
+        _refuse(self._team, self._options.protocol, protocol)
+        try:
+            compiled = self._compile()
+        except (TooManySolutions, CompileTimeout) as limit:
+            return replace(self._outcome, reason=str(limit))
+        except SolverTimeout:
+            return self._outcome
+        compile_s = time.monotonic() - self._began if any(c.source is not Source.DIRECT for c in compiled) else 0.0
+        outcome = replace(self._outcome, metrics=Metrics(compile_s=compile_s))
+        domains = {one.robot: one.domain for one in compiled}
+        alone = next((name for name, domain in domains.items() if not domain.values), None)
+        if alone is None:
+            outcome = _after(outcome, self._play(protocol, domains))
+        else:
+            outcome = replace(
+                outcome,
+                verdict=Verdict.NO_SOLUTION,
+                reason=f"{alone} alone has none: its private constraints leave it no local solution",
+            )
+        if outcome.verdict is Verdict.NO_SOLUTION and self._options.withdraw is Withdrawal.MAXIMAL:
+            outcome = self._withdrawn(outcome, self._play(FirstFit, domains))
+        return outcome
+
+    def _withdrawn(self, outcome: Outcome, result: RunResult) -> Outcome:
+        placed = replace(_after(outcome, result), witness=outcome.witness)
+        if result.verdict is not Verdict.SOLUTION:
+            return placed
+        return replace(placed, withdrawn=tuple(name for name in self._team.order if not result.assignments[name]))
+
+    def centrally(self, *, count: bool | None = None) -> Outcome:
+        """One model of all files, decided by ACE."""
+        count = self._options.count if count is None else count
+        if self._team.dynamic:
+            raise Unsupported(f"{self._team.name} has a scenario.xml; this version does not solve dynamic problems yet")
+        if self._team.kind is Kind.DISWCSP:
+            raise Unsupported(f"{self._team.name} is a DisWCSP, and {CENTRAL} does not minimise costs yet")
+        judge = Judge(self._cache, self._deadline, lambda: self._show("ACE decides the whole team"), self._solver)
+        judgement = judge.judge(self._team, count=count)
+        return replace(
+            self._outcome,
+            runtime=CENTRAL,
+            verdict=judgement.verdict,
+            assignment=judgement.assignment,
+            count=judgement.count,
+            verified=False,
+            metrics=Metrics(wall_s=time.monotonic() - self._began),
+        )
+
+    def second_opinion(self, outcome: Outcome) -> Outcome:
+        """Let ACE decide what the robots have found to have no solution. Raises `Refuted` when it finds one."""
+        opinion = self.centrally(count=False)
+        if opinion.verdict is Verdict.SOLUTION:
+            raise Refuted(f"{outcome.protocol} says that {self._team.name} has no solution, and ACE has found one")
+        return replace(outcome, verified=opinion.verdict is Verdict.NO_SOLUTION)
+
+    def _compile(self) -> list[Compilation]:
+        """All robots' domains; up to the first that is empty, if that decides the matter."""
+        compiled = []
+        robots = self._team.robots
+        with Compiler(self._options.local, self._cache, self._deadline, self._solver) as compiler:
+            for number, robot in enumerate(robots, 1):
+                self._show(f"compiling {robot.name} ({number} of {len(robots)})")
+                compiled.append(compiler.compile(robot))
+                if not compiled[-1].domain.values and self._options.withdraw is None:
+                    break
+        return compiled
+
+    def _play(self, protocol: type[Protocol], domains: Mapping[str, CompiledDomain]) -> RunResult:
         """One run of `protocol`, in the runtime asked for."""
         left = None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
         if self._observer:
             self._observer(Began(t=0, protocol=protocol.__name__))
+        watchers: _Watchers = {"observer": self._observer, "progress": self._progress}
         if self._options.runtime is Runtime.PROCESSES:
             from robochoc.communication.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
 
-            run = ProcessesRun(self._team, protocol, observer=self._observer, progress=self._progress)
-            return run.run(left)
-        schedule = _schedule(self._options)
-        return Simulation(self._team, protocol, schedule, observer=self._observer, progress=self._progress).run(left)
+            return ProcessesRun(self._team, protocol, domains=domains, **watchers).run(left)
+        return Simulation(self._team, protocol, _schedule(self._options), domains=domains, **watchers).run(left)
+
+    def _show(self, stage: str) -> None:
+        if self._progress:
+            self._progress(Progress(0, time.monotonic() - self._began, stage))
+
+
+class _Watchers(TypedDict):
+    observer: Observer | None
+    progress: Callable[[Progress], None] | None
+
+
+def _after(outcome: Outcome, result: RunResult) -> Outcome:
+    """`outcome`, with what a run has come to; a solution's values are of all robots that have one."""
+    found = result.verdict is Verdict.SOLUTION
+    assignment = {name: value for own in result.assignments.values() for name, value in own.items()} if found else {}
+    return replace(
+        outcome,
+        verdict=result.verdict,
+        witness=result.witness,
+        metrics=outcome.metrics + result.metrics,
+        assignment=assignment,
+    )
 
 
 def _schedule(options: Options) -> Schedule:
@@ -142,8 +247,6 @@ def _refuse(team: Team, name: str, protocol: type[Protocol]) -> None:
         raise Unsupported(f"{team.name} has a scenario.xml; this version does not solve dynamic problems yet")
     if team.kind is Kind.DISWCSP and not protocol.costs:
         raise Unsupported(f"{team.name} is a DisWCSP, and {name} does not minimise costs")
-    for robot in team.robots:
-        check_supported(robot)
     if not protocol.partially_known:
         for robot in team.robots:
             for constraint in robot.shared:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robochoc.cli.failure import BadInput, invalid_input_fails
+from robochoc.cli.failure import INVALID, Failure, invalid_input_fails
 from robochoc.cli.paths import InputPath, OutputFile
 
 if TYPE_CHECKING:
@@ -45,7 +45,9 @@ def animate(saved: Path, output: Path | None, folder: Path | None, port: int, *,
     folder = folder or _usual_folder(outcome)
     team = read_team(folder) if folder else None
     if team and not (team.variables.keys() >= outcome.assignment.keys() and {*team.order} >= {*outcome.withdrawn}):
-        raise BadInput(f"{folder}: this is not the team of {saved}, {outcome.team} (give its folder with --team)")
+        raise Failure(
+            INVALID, f"{folder}: this is not the team of {saved}, {outcome.team} (give its folder with --team)"
+        )
     scene = scene_of(outcome, team)
     if output:
         write_page(scene, output)
@@ -72,13 +74,13 @@ def _outcome(saved: Path) -> Outcome:
         with saved.open("rb") as file:
             content = file.read(LARGEST_FILE)
     except OSError as error:
-        raise BadInput(f"{saved}: {error.strerror} ({NEXT_STEP})") from error
+        raise Failure(INVALID, f"{saved}: {error.strerror} ({NEXT_STEP})") from error
     try:
         if not is_journal(content):
             return read_result(content)
         outcome = read_journal(content).outcome
     except (BadJournal, BadResult) as wrong:
-        raise BadInput(f"{saved}: {wrong} ({NEXT_STEP})") from wrong
+        raise Failure(INVALID, f"{saved}: {wrong} ({NEXT_STEP})") from wrong
     if outcome is None:
-        raise BadInput(f"{saved}: the run broke off before an outcome, so there is nothing to show")
+        raise Failure(INVALID, f"{saved}: the run broke off before an outcome, so there is nothing to show")
     return outcome

@@ -8,6 +8,9 @@ import click
 
 from robochoc import __version__
 from robochoc.cli.animate import animate
+from robochoc.cli.cache import cache
+from robochoc.cli.compile import compile_team
+from robochoc.cli.export import export
 from robochoc.cli.generate import generate
 from robochoc.cli.solve import solve
 from robochoc.cli.validate import validate
@@ -39,7 +42,7 @@ def cli() -> None:
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
 
 
-for command in (solve, validate, generate, animate):
+for command in (solve, validate, generate, animate, compile_team, export, cache):
     cli.add_command(command)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import wraps
 from typing import IO, Any, ParamSpec, TypeVar
 
@@ -10,14 +11,18 @@ import click
 
 INVALID, USAGE, LIMIT, LOST = 1, 2, 3, 4
 
+_WORST_FIRST = (INVALID, USAGE, LOST, LIMIT)
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
-class BadInput(click.ClickException):
-    """The input is invalid: the message goes to stderr as it is."""
+class Failure(click.ClickException):
+    """The command ends with `status`, and its message goes to stderr as it is."""
 
-    exit_code = INVALID
+    def __init__(self, status: int, message: str) -> None:
+        super().__init__(message)
+        self.exit_code = status  # type: ignore[misc]  # click reads it off instances
 
     def show(self, file: IO[Any] | None = None) -> None:  # noqa: ARG002 - click's signature
         """Say it on stderr."""
@@ -34,6 +39,36 @@ def invalid_input_fails(command: Callable[P, R]) -> Callable[P, R]:
         try:
             return command(*args, **kwargs)
         except InvalidInput as invalid:
-            raise BadInput(str(invalid)) from invalid
+            raise Failure(INVALID, str(invalid)) from invalid
 
     return guarded
+
+
+def worst(statuses: Iterable[int]) -> int:
+    """The exit status of a command whose parts ended with `statuses`."""
+    found = set(statuses)
+    return next((status for status in _WORST_FIRST if status in found), 0)
+
+
+@contextmanager
+def failures_told(place: object) -> Iterator[None]:
+    """Whatever ends the work at `place` that is no fault of the program becomes one line, and `Failure`."""
+    from robochoc.communication.robot_link import RobotsLost
+    from robochoc.formats import InvalidInput, on_one_line
+    from robochoc.registry import UnknownProtocol
+    from robochoc.run import Refuted
+    from robochoc.solver.ace import SolverLost, SolverMissing
+    from robochoc.solver.compile import CompileFailed, CompileTimeout
+    from robochoc.solver.domain import TooManySolutions
+    from robochoc.solver.encoding import Unsupported
+
+    try:
+        yield
+    except InvalidInput as invalid:
+        raise Failure(INVALID, str(invalid)) from invalid
+    except (UnknownProtocol, Unsupported, SolverMissing) as refusal:
+        raise Failure(USAGE, on_one_line(f"{place}: {refusal}")) from refusal
+    except (TooManySolutions, CompileTimeout) as limit:
+        raise Failure(LIMIT, on_one_line(f"{place}: {limit}")) from limit
+    except (RobotsLost, CompileFailed, SolverLost, Refuted) as failure:
+        raise Failure(LOST, on_one_line(f"{place}: {failure}")) from failure

@@ -35,7 +35,8 @@ def progress_line(team: str) -> Iterator[Callable[[Progress], None] | None]:
             if time.monotonic() - last < REFRESH_S:
                 return
             last = time.monotonic()
-            line = f"{team}: {progress.messages:,} messages, {progress.elapsed_s:.1f} s"
+            stage = progress.stage or f"{progress.messages:,} messages"
+            line = f"{team}: {stage}, {progress.elapsed_s:.1f} s"
             live.update(Text(line, style="dim"), refresh=True)
 
         yield show

@@ -22,34 +22,55 @@ def report(team: Team, outcome: Outcome) -> str:
         flying, aside = len(team.robots) - len(outcome.withdrawn), len(outcome.withdrawn)
         lines.append(f"  {flying} fly, {aside} step{'s' * (aside == 1)} aside:")
         lines += _wrapped(outcome.withdrawn)
-    place = (
-        f"{len(team.robots)} processes" if outcome.runtime == "processes" else f"{outcome.runtime}, seed {outcome.seed}"
-    )
-    lines.append(f"  {outcome.protocol}, {place}: {_metrics(outcome.metrics)}")
+    lines.append(f"  {outcome.protocol}, {_place(team, outcome)}: {_metrics(outcome)}")
     return "\n".join(lines)
 
 
+def _place(team: Team, outcome: Outcome) -> str:
+    match outcome.runtime:
+        case "processes":
+            return f"{len(team.robots)} process{'es' * (len(team.robots) != 1)}"
+        case "central":
+            return "ACE on all files merged"
+        case _:
+            return f"{outcome.runtime}, seed {outcome.seed}"
+
+
 def _verdict(outcome: Outcome) -> str:
-    proof = f"no solution ({outcome.witness} has derived the empty nogood)" if outcome.witness else "no solution"
+    why = outcome.reason or (f"{outcome.witness} has derived the empty nogood" if outcome.witness else "")
+    proof = f"no solution ({why})" if why else "no solution"
     match outcome.verdict:
         case Verdict.NO_SOLUTION:
-            return proof
+            return f"{proof}, confirmed by ACE" if outcome.verified else proof
         case Verdict.UNKNOWN:
-            return "unknown: the time was over before a verdict"
+            return f"unknown: {outcome.reason or 'the time was over before a verdict'}"
+        case _ if outcome.count is not None:
+            return f"{outcome.count:,} solution{'s' * (outcome.count != 1)}"
         case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.withdrawn:
             return f"{proof} for the whole team; some step aside, checked against every constraint"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             return f"{outcome.verdict}, checked against every constraint"
 
 
-def _metrics(spent: Metrics) -> str:
+def _metrics(outcome: Outcome) -> str:
+    spent = outcome.metrics
+    if outcome.runtime == "central":
+        return f"{spent.wall_s:.2f} s"
     kinds = sorted(spent.messages.items(), key=lambda item: -item[1])
     types = ", ".join(f"{count:,} {kind}" for kind, count in kinds)
     total = sum(spent.messages.values())
     return (
         f"{total:,} message{'s' * (total != 1)} ({types or 'none'}), {spent.bytes:,} bytes,"
-        f" {spent.ncccs:,} NCCCs, {spent.checks:,} checks, {spent.wall_s:.2f} s"
+        f" {spent.ncccs:,} NCCCs, {spent.checks:,} checks, {spent.wall_s:.2f} s{_local(spent)}"
     )
+
+
+def _local(spent: Metrics) -> str:
+    """What compiling and keeping local solutions cost, where there were any."""
+    if not spent.compile_s:
+        return ""
+    memory = f", {spent.memory / 2**20:.1f} MiB in the largest process" if spent.memory else ""
+    return f" after {spent.compile_s:.2f} s of compiling{memory}"
 
 
 def _board(team: Team, assignment: Mapping[str, int]) -> list[str]:

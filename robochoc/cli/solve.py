@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.failure import INVALID, LIMIT, LOST, USAGE
+from robochoc.cli.failure import INVALID, LIMIT, Failure, failures_told, worst
+from robochoc.cli.local import limits, local_options
 from robochoc.cli.paths import InputPath, OutputFile
 
 if TYPE_CHECKING:
@@ -51,7 +52,11 @@ class Products:
 @click.command(cls=SolveCommand, short_help="Solve teams, each robot in its own process.")
 @click.argument("paths", nargs=-1, required=True, type=InputPath(), metavar="PATH ...")
 @click.option(
-    "--protocol", default="abt", show_default=True, metavar="NAME", help="Protocol to run; abt comes with this version."
+    "--protocol",
+    default="abt",
+    show_default=True,
+    metavar="NAME",
+    help="abt: the robots solve it together; central: ACE decides all files merged into one model.",
 )
 @click.option(
     "--runtime",
@@ -90,6 +95,11 @@ class Products:
         " without a word): nobody who stepped aside could be added; fewer might do."
     ),
 )
+@click.option("--count", is_flag=True, help="With --protocol central: count all solutions.")
+@click.option(
+    "--verify", is_flag=True, help="Have a no-solution confirmed by ACE on all files merged: two ways must agree."
+)
+@local_options
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a team, and nothing else, on standard output.")
 @click.option(
     "--html",
@@ -125,6 +135,8 @@ def solve(
     _check_settings(settings)
     withdraw = settings.pop("withdraw")
     options = Options(
+        local=limits(settings.pop("local_solutions"), settings.pop("local_timeout")),
+        cache=not settings.pop("no_cache"),
         runtime=Runtime(settings.pop("runtime")),
         schedule=ScheduleName(settings.pop("schedule")),
         withdraw=Withdrawal(withdraw) if withdraw else None,
@@ -134,11 +146,13 @@ def solve(
     products = Products(html, journal, serve)
     if html and html == journal:
         raise click.UsageError(f"--html and --journal are two files; both are {html}")
+    if settings["count"] and products:
+        raise click.UsageError("--count gives a number: there is nothing for --html, --journal or --serve to show")
     if products and len(folders) > 1:
         raise click.UsageError(f"--html, --journal and --serve are for one team; {len(folders)} were found")
     for folder in folders:
         statuses.append(_solve_one(folder, options, products, as_json=as_json))
-    context.exit(next((status for status in (INVALID, USAGE, LOST, LIMIT) if status in statuses), 0))
+    context.exit(worst(statuses))
 
 
 def _check_settings(settings: dict[str, Any]) -> None:
@@ -147,6 +161,13 @@ def _check_settings(settings: dict[str, Any]) -> None:
         raise click.UsageError("--delay and --schedule are the simulator's; add --runtime simulator")
     if settings["timeout"] is not None and not settings["timeout"] > 0:
         raise click.UsageError("--timeout takes a number of seconds")
+    central = settings["protocol"] == "central"
+    if settings["count"] and not central:
+        raise click.UsageError("--count is for --protocol central")
+    if central and settings["withdraw"]:
+        raise click.UsageError("--withdraw is for robots that solve it together, not for --protocol central")
+    if central and settings["verify"]:
+        raise click.UsageError("--verify asks ACE, which is --protocol central itself")
     if settings["delay"] and settings["schedule"] != "concurrent":
         raise click.UsageError("--delay is for --schedule concurrent: in a random one any message may take any time")
 
@@ -168,28 +189,23 @@ def _teams(paths: tuple[Path, ...]) -> tuple[list[Path], list[int]]:
 
 def _solve_one(folder: Path, options: Options, products: Products, *, as_json: bool) -> int:
     """Solve the team in `folder`, tell the outcome, and return the exit status."""
-    from robochoc.communication.robot_link import RobotsLost
-    from robochoc.formats import InvalidInput, on_one_line, read_team
-    from robochoc.registry import UnknownProtocol
-    from robochoc.run import Refuted
-    from robochoc.solver.compiled import Unsupported
+    from robochoc.formats import on_one_line, read_team
 
     try:
-        team = read_team(folder)
-        with _journal(team, options, products.journal) as recorder:
-            outcome = _run(team, options, recorder)
-            _tell(team, outcome, as_json=as_json)
-    except InvalidInput as invalid:
-        click.echo(str(invalid), err=True)
-        return INVALID
-    except (UnknownProtocol, Unsupported) as refusal:
-        click.echo(on_one_line(f"{folder}: {refusal}"), err=True)
-        return USAGE
-    except (RobotsLost, Refuted) as failure:
-        click.echo(on_one_line(f"{folder}: {failure}"), err=True)
-        return LOST
+        with failures_told(folder):
+            team = read_team(folder)
+            with _journal(team, options, products.journal) as recorder:
+                outcome = _run(team, options, recorder)
+                _tell(team, outcome, as_json=as_json)
+    except Failure as failure:
+        failure.show()
+        return failure.exit_code
     _show(team, outcome, products, quiet=as_json)
-    return LIMIT if outcome.verdict == "unknown" else 0
+    if outcome.verdict != "unknown":
+        return 0
+    if outcome.reason and as_json:
+        click.echo(on_one_line(f"{folder}: {outcome.reason}"), err=True)
+    return LIMIT
 
 
 def _run(team: Team, options: Options, recorder: Recorder | None) -> Outcome:

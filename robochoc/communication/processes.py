@@ -15,10 +15,11 @@ import multiprocessing.connection
 import selectors
 import socket
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import ExitStack
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkContext, ForkServerContext
+from types import MappingProxyType
 from typing import Literal, assert_never, cast
 
 from robochoc.communication.control import (
@@ -39,14 +40,16 @@ from robochoc.communication.control import (
 )
 from robochoc.communication.quiescence import Counts, FourCounters
 from robochoc.communication.robot_link import RobotLink, RobotsLost
-from robochoc.communication.robot_process import robot_process
+from robochoc.communication.robot_process import Part, robot_process
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.system import allow_descriptors, garbage_frozen, signals_held
 from robochoc.observers.events import AnyEvent, Lost, Observer, Registered
 from robochoc.outcome import Verdict
 from robochoc.problem import Robot, Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.compiled import Interfaces, Unsupported, interfaces
+from robochoc.solver.compiled import Interfaces, interfaces
+from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.encoding import Unsupported
 
 StartMethod = Literal["fork", "forkserver"]
 _CONTEXTS: dict[StartMethod, type[ForkContext | ForkServerContext]] = {
@@ -68,6 +71,7 @@ _FDS_SPARE = 128
 class ProcessesRun:
     """One run of one team. `run` gives the result; whatever happens, no process outlives it.
 
+    `domains` holds the compiled domains of robots whose private constraints need a solver (`solver/compile.py`).
     `observer` is told of all events; with `progress`, somebody watches the count of messages.
     """
 
@@ -76,12 +80,14 @@ class ProcessesRun:
         team: Team,
         protocol: type[Protocol],
         *,
+        domains: Mapping[str, CompiledDomain] = MappingProxyType({}),
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
         start_method: StartMethod = "fork",
     ) -> None:
         self._team = team
         self._protocol = protocol
+        self._domains = domains
         self._observer = observer
         self._progress = progress
         self._context = _CONTEXTS[start_method]()
@@ -150,10 +156,11 @@ class ProcessesRun:
         ours, theirs = socket.socketpair()
         forked = self._context.get_start_method() == "fork"
         inherited = [other.control for other in self._robots.values()] + [ours] if forked else []
+        part = Part(robot, self._team.order, shown, self._domains.get(robot.name))
         process = self._context.Process(
             target=robot_process,
             name=robot.name,
-            args=(robot, self._team.order, shown, self._protocol, theirs, inherited),
+            args=(part, self._protocol, theirs, inherited),
             kwargs={"observed": self._observer is not None},
             daemon=True,
         )

@@ -20,7 +20,8 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Sequence
-from typing import assert_never
+from dataclasses import replace
+from typing import NamedTuple, assert_never
 
 import msgspec
 
@@ -43,12 +44,15 @@ from robochoc.communication.control import (
 )
 from robochoc.communication.host import Host
 from robochoc.communication.queues import READ_BYTES, QueueReader, QueueWriter, unpack
+from robochoc.communication.system import own_memory
 from robochoc.message import Envelope
 from robochoc.observers.events import AnyEvent
 from robochoc.problem import Robot
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.compiled import Interfaces, LocalProblem, Unsupported
+from robochoc.solver.compiled import Interfaces, LocalProblem
+from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.encoding import Unsupported
 
 IDLE_S = 0.002
 """A robot that has heard nothing for so long reports its counters. Only when to ask; never whether it is over."""
@@ -61,17 +65,22 @@ _libc = ctypes.CDLL(None)
 """Loaded before the fork: once for all robots."""
 
 
+class Part(NamedTuple):
+    """A robot's part of the team's problem: its file, and what all robots know of each other.
+
+    `domain` is None when the robot can compile its domain without a solver.
+    """
+
+    robot: Robot
+    order: Sequence[str]
+    interfaces: Interfaces
+    domain: CompiledDomain | None
+
+
 def robot_process(
-    robot: Robot,
-    order: Sequence[str],
-    interfaces: Interfaces,
-    protocol: type[Protocol],
-    control: socket.socket,
-    inherited: Sequence[socket.socket],
-    *,
-    observed: bool,
+    part: Part, protocol: type[Protocol], control: socket.socket, inherited: Sequence[socket.socket], *, observed: bool
 ) -> None:
-    """What the process of `robot` runs, from its first breath to its report.
+    """What a robot's process runs, from its first breath to its report.
 
     `inherited` are the parent's ends of control pipes that a fork copied: closed here, so that the others see the
     end of the parent. Ctrl-C reaches the whole process group, and is left to the parent.
@@ -82,10 +91,10 @@ def robot_process(
     _end_with_the_parent()
     for copy in inherited:
         copy.close()
-    _take_place(robot.name, order)
+    _take_place(part.robot.name, part.order)
     link = _ControlPipe(control)
     try:
-        host = Host(protocol(LocalProblem(robot, order, interfaces), PriorityOrder(order)))
+        host = Host(protocol(LocalProblem(*part), PriorityOrder(part.order)))
         _RobotLoop(host, link, observed=observed).run()
     except Unsupported as refusal:
         link.say(Failed(str(refusal), unsupported=True))
@@ -290,7 +299,7 @@ class _RobotLoop:
                 self._say_counters(number)
             case Stop():
                 self._report_events()
-                self._say(Report(self._host.protocol.assignment, self._host.metrics()))
+                self._say(Report(self._host.protocol.assignment, replace(self._host.metrics(), memory=own_memory())))
                 self._running = False
             case never:
                 assert_never(never)

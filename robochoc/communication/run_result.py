@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
 from typing import NamedTuple, Self
@@ -12,10 +12,11 @@ from robochoc.outcome import Metrics, Verdict
 
 
 class Progress(NamedTuple):
-    """How far a run has come: messages sent so far, and seconds since its start."""
+    """How far a run has come: messages sent so far, and seconds since its start; `stage` where it is not a search."""
 
     messages: int
     elapsed_s: float
+    stage: str = ""
 
 
 @dataclass(frozen=True)
@@ -43,5 +44,5 @@ class RunResult:
         parts = list(parts)
         total = reduce(add, parts, Metrics())
         ncccs = max((part.ncccs for part in parts), default=0)
-        metrics = Metrics(total.messages, total.bytes, ncccs, total.checks, wall_s)
+        metrics = replace(total, ncccs=ncccs, wall_s=wall_s)
         return cls(verdict, witness, dict(assignments), metrics)

@@ -6,7 +6,8 @@ A schedule says which messages arrive next (`communication/schedule.py`); nobody
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 from robochoc.communication.host import Host
 from robochoc.communication.run_result import Progress, RunResult
@@ -18,13 +19,18 @@ from robochoc.problem import Team
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled import LocalProblem, interfaces
+from robochoc.solver.domain import CompiledDomain
 
 PROGRESS_EVERY = 256
 """Packets between two reports of progress."""
 
 
 class Simulation:
-    """One run of one team in this thread. `observer` is told of all events, with the schedule's time."""
+    """One run of one team in this thread.
+
+    `domains` holds the compiled domains of robots whose private constraints need a solver (`solver/compile.py`).
+    `observer` is told of all events, with the schedule's time.
+    """
 
     def __init__(
         self,
@@ -32,11 +38,12 @@ class Simulation:
         protocol: type[Protocol],
         schedule: Schedule,
         *,
+        domains: Mapping[str, CompiledDomain] = MappingProxyType({}),
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
         order, shown = PriorityOrder(team.order), interfaces(team)
-        problems = (LocalProblem(robot, team.order, shown) for robot in team.robots)
+        problems = (LocalProblem(robot, team.order, shown, domains.get(robot.name)) for robot in team.robots)
         self._hosts = {problem.agent: Host(protocol(problem, order)) for problem in problems}
         self._schedule = schedule
         self._progress = progress

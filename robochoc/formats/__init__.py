@@ -1,7 +1,7 @@
 """Robots and teams as XML files: reading them with every mistake told, and writing them (FORMAT.md, Figure 2)."""
 
+from robochoc.files import write_atomically
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput, encodable, on_one_line
-from robochoc.formats.files import write_atomically
 from robochoc.formats.folder import write_team
 from robochoc.formats.intension import PREDEFINED
 from robochoc.formats.robot import read_robot

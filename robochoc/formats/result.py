@@ -20,9 +20,11 @@ class _MetricsForm(msgspec.Struct):
     checks: int
     wall_s: float
     messages_by_type: dict[str, int] = {}
+    compile_s: float = 0.0
+    memory: int = 0
 
 
-class _Form(msgspec.Struct):
+class _Form(msgspec.Struct, omit_defaults=True):
     team: str
     protocol: str
     runtime: str
@@ -34,6 +36,8 @@ class _Form(msgspec.Struct):
     epochs: list[Any]
     metrics: _MetricsForm
     verified: bool
+    count: int | None = None
+    reason: str | None = None
 
 
 def result_json(outcome: Outcome) -> bytes:
@@ -46,6 +50,8 @@ def result_json(outcome: Outcome) -> bytes:
         checks=spent.checks,
         wall_s=round(spent.wall_s, 6),
         messages_by_type=dict(sorted(spent.messages.items())),
+        compile_s=round(spent.compile_s, 6),
+        memory=spent.memory,
     )
     form = _Form(
         team=outcome.team,
@@ -59,6 +65,8 @@ def result_json(outcome: Outcome) -> bytes:
         epochs=[],
         metrics=metrics,
         verified=outcome.verified,
+        count=outcome.count,
+        reason=outcome.reason,
     )
     return msgspec.json.encode(form)
 
@@ -80,6 +88,8 @@ def read_result(content: bytes) -> Outcome:
         assignment=form.assignment,
         cost=form.cost,
         withdrawn=tuple(form.withdrawn),
-        metrics=Metrics(messages, spent.bytes, spent.ncccs, spent.checks, spent.wall_s),
+        metrics=Metrics(messages, spent.bytes, spent.ncccs, spent.checks, spent.wall_s, spent.compile_s, spent.memory),
         verified=form.verified,
+        count=form.count,
+        reason=form.reason,
     )

@@ -7,12 +7,18 @@ Paper, Section 5.1, and Allison, Yee and McGaughey, TR 89/130 (1989). Two models
 * `full` adds the space diagonals (|di| = |dj| = |dk| attacks too): Allison's queen, which moves in 26 directions.
 
 The constraint C3 printed in the paper contradicts its own Figure 2 and is neither.
+
+The team may have a robot for every cell, as in the paper, or one for every row: a complex agent that flies n drones,
+whose private constraints are those within the row.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from enum import StrEnum
+from typing import assert_never
 
 from robochoc.expression import Constant, Name, Type, parse
 from robochoc.formats import PREDEFINED
@@ -32,6 +38,13 @@ class QueensModel(StrEnum):
     FULL = "full"
 
 
+class QueensRobots(StrEnum):
+    """What a robot flies: the drone of one cell, or those of a whole row."""
+
+    CELLS = "cells"
+    ROWS = "rows"
+
+
 NOT_ATTACKING = Predicate(
     "p1",
     ("X", "Y", "i", "j"),
@@ -40,33 +53,59 @@ NOT_ATTACKING = Predicate(
 """Figure 2's p1: levels X and Y differ, and are no diagonal at the distance |i - j|."""
 
 
-def queens3d(n: int, model: QueensModel | str = QueensModel.PLANAR) -> Team:
-    """The team for an n x n x n cube, in lexicographic priority order.
+def queens3d(
+    n: int, model: QueensModel | str = QueensModel.PLANAR, robots: QueensRobots | str = QueensRobots.CELLS
+) -> Team:
+    """The team for an n x n x n cube, in lexicographic priority order; a robot flies a cell's drone, or a row's.
 
-    Raises `ValueError` unless 1 <= n <= `LARGEST_N` and the model is known.
+    Raises `ValueError` unless 1 <= n <= `LARGEST_N` and the model and the robots are known.
     """
     if not 1 <= n <= LARGEST_N:
         raise ValueError(f"n is {n}; it must be from 1 to {LARGEST_N}")
     model = QueensModel(model)
     levels = Domain("D1", (range(1, n + 1),))
-    cells = [(row, column) for row in range(1, n + 1) for column in range(1, n + 1)]
-    robots = tuple(_robot(cell, n, levels, model) for cell in cells)
-    return Team(f"queens3d-{n}", robots)
+    numbers = range(1, n + 1)
+    match QueensRobots(robots):
+        case QueensRobots.CELLS:
+            crews = {_robot_name(cell): [cell] for cell in itertools.product(numbers, numbers)}
+        case QueensRobots.ROWS:
+            crews = {f"Robot{row}": [(row, column) for column in numbers] for row in numbers}
+        case never:
+            assert_never(never)
+    flown_by = {cell: name for name, cells in crews.items() for cell in cells}
+    suffix = "" if robots == QueensRobots.CELLS else f"-{QueensRobots(robots)}"
+    team = (_robot(name, cells, flown_by, levels, model) for name, cells in crews.items())
+    return Team(f"queens3d-{n}{suffix}", tuple(team))
 
 
-def _robot(cell: Cell, n: int, levels: Domain, model: QueensModel) -> Robot:
-    row, column = cell
-    near = list(_attackable(cell, n))
-    topic = Topic(
-        f"/drone{row}.{column}/waypoint{row}.{column}", x=Constant(row), y=Constant(column), z=Name(_variable(cell))
-    )
+def _robot(name: str, cells: Sequence[Cell], flown_by: Mapping[Cell, str], levels: Domain, model: QueensModel) -> Robot:
+    """The robot that flies the drones of `cells`; it holds what they owe each other, and what they owe above."""
+    n = len(levels)
+    private, above, below = [], dict[str, list[Constraint]](), dict[str, list[str]]()
+    for cell in cells:
+        for other in _attackable(cell, n):
+            owner = flown_by[other]
+            if owner == name:
+                if other < cell:
+                    private.append(replace(_apart(other, cell, model), model=None))
+            elif other < cell:
+                above.setdefault(owner, []).append(_apart(other, cell, model))
+            elif _variable(cell) not in below.setdefault(owner, []):
+                below[owner].append(_variable(cell))
     return Robot(
-        name=_robot_name(cell),
-        variables=(Variable(_variable(cell), levels),),
-        parents=tuple(Parent(_robot_name(other), (_apart(other, cell, model),)) for other in near if other < cell),
-        children=tuple(Child(_robot_name(other), (_variable(cell),)) for other in near if other > cell),
-        topics=(topic,),
+        name=name,
+        variables=tuple(Variable(_variable(cell), levels) for cell in cells),
+        private=tuple(private),
+        parents=tuple(Parent(owner, tuple(shared)) for owner, shared in above.items()),
+        children=tuple(Child(owner, tuple(seen)) for owner, seen in below.items()),
+        topics=tuple(_topic(cell) for cell in cells),
     )
+
+
+def _topic(cell: Cell) -> Topic:
+    row, column = cell
+    name = f"/drone{row}.{column}/waypoint{row}.{column}"
+    return Topic(name, x=Constant(row), y=Constant(column), z=Name(_variable(cell)))
 
 
 def _attackable(cell: Cell, n: int) -> Iterator[Cell]:

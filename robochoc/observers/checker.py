@@ -6,10 +6,13 @@ the files state them, tuple by tuple and term by term.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 
 from robochoc.expression import Undefined, evaluate
-from robochoc.problem import INFINITE, Assignment, Constraint, Relation, Semantics, Team
+from robochoc.problem import INFINITE, Assignment, Constraint, Relation, Semantics, Team, Variable
+
+PLACES = 20_000
+"""Values to be tried for the variables of a robot that stepped aside."""
 
 
 def objections(team: Team, assignment: Assignment, withdrawn: Collection[str] = ()) -> Iterator[str]:
@@ -37,15 +40,34 @@ def cost(team: Team, assignment: Assignment) -> float:
 
 
 def could_join(team: Team, assignment: Assignment, withdrawn: Collection[str]) -> Iterator[str]:
-    """Robots of one variable that stepped aside although they had a place beside those that fly."""
+    """Robots that stepped aside although they had a place beside those that fly.
+
+    A robot of many variables is given `PLACES` tries; who has found no place by then is believed.
+    """
     constraints = list(team.constraints())
     for name in withdrawn:
-        for variable in team[name].variables[:1]:
-            known = {*assignment, variable.name}
-            own = [c for c in constraints if variable.name in c.variables and known.issuperset(c.variables)]
-            places = ({**assignment, variable.name: value} for value in variable.domain)
-            if any(all(price(constraint, place) < INFINITE for constraint in own) for place in places):
-                yield name
+        names = [variable.name for variable in team[name].variables]
+        own = [c for c in constraints if {*assignment, *names}.issuperset(c.variables) and set(names) & {*c.variables}]
+        if _has_a_place(team[name].variables, assignment, own, [PLACES]):
+            yield name
+
+
+def _has_a_place(
+    open_still: Sequence[Variable], assignment: Assignment, own: Sequence[Constraint], tries: list[int]
+) -> bool:
+    """Whether values for `open_still` can be added to `assignment` without breaking one of `own`."""
+    if not open_still:
+        return True
+    first, *rest = open_still
+    for value in first.domain:
+        if not tries[0]:
+            return False
+        tries[0] -= 1
+        place = {**assignment, first.name: value}
+        met = (c for c in own if first.name in c.variables and all(name in place for name in c.variables))
+        if all(price(constraint, place) < INFINITE for constraint in met) and _has_a_place(rest, place, own, tries):
+            return True
+    return False
 
 
 def price(constraint: Constraint, assignment: Assignment) -> float:

@@ -10,11 +10,12 @@ names the methods bear:
     Backtrack        `_backtrack`            SetLink          `_set_link`
     CheckAddLink     `_check_add_link`       Update           `_update`
 
-Complete, asynchronous, for satisfaction. Three things the paper leaves open: constraints may be n-ary (the lowest
+Complete, asynchronous, for satisfaction. Four things the paper leaves open: constraints may be n-ary (the lowest
 robot of the scope checks them, once it knows all the others); of several nogoods for a value the one with the
 highest possible lowest variable is kept (Hirayama and Yokoo 2000); messages are read by packets, and the view is
-checked once the inbox has been drained. That nobody speaks any more, and so a solution stands, is for the runtime
-to see (`communication/quiescence.py`).
+checked once the inbox has been drained; a nogood names only the variables that matter, so of a robot with several
+it rules out all values that look alike there (neighbourhood partial interchangeability). That nobody speaks any
+more, and so a solution stands, is for the runtime to see (`communication/quiescence.py`).
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -29,7 +30,7 @@ from typing import assert_never, cast
 
 from robochoc.message import Message, Value
 from robochoc.outcome import Verdict
-from robochoc.protocols.nogood import NogoodStore
+from robochoc.protocols.nogood import NogoodStore, contradicts, joined
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled import LocalProblem
@@ -95,11 +96,12 @@ class ABT(Protocol):
     def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
         """Accept a nogood about the present value that agrees with the view; otherwise it is obsolete."""
         current = self._current()
-        if current != nogood.value:
+        if current is None or contradicts(nogood.value, current):
             return
         if self._coherent(nogood):
             self._check_add_link(nogood)
-            self.store.add(cast("int", self.value), nogood.lhs)
+            for index in self.problem.alike(nogood.value):
+                self.store.add(index, nogood.lhs)
             self.value = None
         else:
             # The sender's picture of others was old, and it has forgotten my value: say it again.
@@ -163,15 +165,22 @@ class ABT(Protocol):
         self.store.forget(agent, value)
 
     def _coherent(self, nogood: Nogood) -> bool:
-        return all(self.view.get(agent) == value for agent, value in nogood.lhs.items() if agent in self.higher)
+        return all(
+            agent in self.view and not contradicts(value, self.view[agent])
+            for agent, value in nogood.lhs.items()
+            if agent in self.higher
+        )
 
     def _check_add_link(self, nogood: Nogood) -> None:
-        """Ask robots of the left side that do not tell me their values yet to do so."""
+        """Ask robots of the left side that do not tell me their values yet to do so; meanwhile believe it."""
         for agent, value in nogood.lhs.items():
             if agent not in self.higher:
                 self.higher.add(agent)
                 self.send(agent, AddLink())
-                self._update(agent, value)
+            known = self.view.get(agent)
+            told = joined(known, value)
+            if told != known:
+                self._update(agent, told)
 
     def _current(self) -> Value | None:
         return None if self.value is None else self.problem.values[self.value]

@@ -7,13 +7,25 @@ value is enough to stay complete, and bounds the space by O(n d) (Bessiere, Maes
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from robochoc.message import Value
 from robochoc.protocols.order import PriorityOrder
 
 LeftSide = Mapping[str, Value]
-"""A conjunction of assignments of higher-priority robots."""
+"""A conjunction of assignments of higher-priority robots; None where a variable of a robot does not matter."""
+
+
+def contradicts(value: Value, other: Value) -> bool:
+    """Whether two pictures of one robot's value cannot both be true: they differ where both say something."""
+    return any(part != told for part, told in zip(value, other, strict=True) if part is not None and told is not None)
+
+
+def joined(value: Value | None, other: Value) -> Value:
+    """What two pictures of one robot's value, which do not contradict each other, say together."""
+    if value is None:
+        return other
+    return tuple([told if part is None else part for part, told in zip(value, other, strict=True)])
 
 
 class NogoodStore:
@@ -37,13 +49,23 @@ class NogoodStore:
 
     def forget(self, agent: str, value: Value | None = None) -> None:
         """Drop every nogood that rests on another value of `agent` than `value` (None: on any)."""
-        for index, lhs in enumerate(self._by_value):
-            if lhs is not None and lhs.get(agent, value) != value:
-                self._by_value[index] = None
+        stale = {
+            id(lhs) for lhs in self._distinct() if agent in lhs and (value is None or contradicts(lhs[agent], value))
+        }
+        if stale:
+            self._by_value = [None if id(lhs) in stale else lhs for lhs in self._by_value]
 
     def resolve(self) -> dict[str, Value]:
         """The union of all left sides: what rules out the whole domain when every value has a nogood."""
-        return {agent: value for lhs in self for agent, value in lhs.items()}
+        union: dict[str, Value] = {}
+        for lhs in self._distinct():
+            for agent, value in lhs.items():
+                union[agent] = joined(union.get(agent), value)
+        return union
+
+    def _distinct(self) -> Iterable[LeftSide]:
+        """Each left side once, in the order of the values: many values often share one."""
+        return {id(lhs): lhs for lhs in self}.values()
 
     def _better(self, left: LeftSide, right: LeftSide) -> bool:
         """Highest possible lowest variable (Hirayama and Yokoo 2000); between equals, the shorter one."""

@@ -1,0 +1,31 @@
+"""`robochoc export`: a team's problem in a format that other programs read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from robochoc.cli.failure import failures_told
+from robochoc.cli.paths import InputPath, OutputFile
+
+
+@click.command(short_help="Write a team's whole problem for other solvers.")
+@click.argument("folder", type=InputPath(), metavar="TEAM")
+@click.option("--format", "kind", type=click.Choice(["xcsp3"]), default="xcsp3", show_default=True)
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File to write  [default: standard output]")
+def export(folder: Path, kind: str, output: Path | None) -> None:  # noqa: ARG001 - the only format there is
+    """Write the problem of the team in the folder TEAM, all its files merged, for other solvers.
+
+    xcsp3: one XCSP3-core file (tables, allDifferent), which ACE, Choco and others read.
+    """
+    from robochoc.files import write_atomically
+    from robochoc.formats import read_team
+    from robochoc.formats.xcsp3 import xcsp3
+
+    with failures_told(folder):
+        document = xcsp3(read_team(folder))
+    if output is None:
+        click.echo(document, nl=False)
+    else:
+        write_atomically(output, document)

@@ -1,0 +1,52 @@
+"""Options of every command that compiles robots' local problems."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from robochoc.solver.compile import Limits
+
+Command = TypeVar("Command", bound=Callable[..., object])
+
+
+def local_options(command: Command) -> Command:
+    """`--local-solutions`, `--local-timeout` and `--no-cache`."""
+    for option in reversed(
+        (
+            click.option(
+                "--local-solutions",
+                type=click.IntRange(1),
+                default=100_000,
+                show_default=True,
+                help="So many local solutions may a robot have.",
+            ),
+            click.option(
+                "--local-timeout",
+                type=click.FloatRange(0, min_open=True),
+                default=60.0,
+                show_default=True,
+                metavar="SECONDS",
+                help="So long may compiling a robot's private constraints take.",
+            ),
+            click.option(
+                "--no-cache",
+                is_flag=True,
+                help="Neither use nor fill the cache of solved local problems (see robochoc cache).",
+            ),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+def limits(local_solutions: int, local_timeout: float) -> Limits:
+    """The limits that the options ask for."""
+    from robochoc.solver.compile import Limits
+
+    if not local_timeout > 0:
+        raise click.UsageError("--local-timeout takes a number of seconds")
+    return Limits(local_solutions, local_timeout)

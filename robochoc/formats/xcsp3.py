@@ -1,0 +1,25 @@
+"""A team's whole problem as one XCSP3 file, which ACE, Choco and other solvers read (https://xcsp.org)."""
+
+from __future__ import annotations
+
+from lxml import etree
+
+from robochoc.problem import Team
+from robochoc.solver.ace import AceProcess
+from robochoc.solver.merged import identifiers, merged
+
+
+def xcsp3(team: Team) -> bytes:
+    """The merged problem of `team` as an XCSP3-core document: tables over the true values, and allDifferent.
+
+    Variables get names that XCSP3 allows; the attribute `note` says whose variable each is. Raises `Unsupported`,
+    and `SolverLost` when pycsp3, which writes it in a process of its own, fails.
+    """
+    network = merged(team)
+    names = list(team.variables)
+    with AceProcess(java=False) as solver:
+        document = solver.export(network, identifiers(names))
+    root = etree.fromstring(document, etree.XMLParser(huge_tree=True, resolve_entities=False, no_network=True))
+    for element, name in zip(root.iterfind("variables/var"), names, strict=True):
+        element.set("note", f"{name} of {team.owner[name]}")
+    return etree.tostring(root, pretty_print=True, xml_declaration=True, encoding="UTF-8")

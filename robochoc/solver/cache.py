@@ -1,0 +1,123 @@
+"""Solutions of networks that were solved before, kept in the user's cache folder by what the network is.
+
+A file is named by the digest of the network and of the versions of all that went into the answer, so other
+versions have other files. It begins with the digest of its own content and repeats its name: a file that is cut
+off, changed, or in the wrong place is noticed, removed, and made again. Files are written beside and renamed, so
+runs at the same time see whole files only. Nothing in it is ever executed or unpickled.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from array import array
+from collections.abc import Iterator
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import msgspec
+
+from robochoc.files import write_atomically
+from robochoc.solver.encoding import Codes, Network
+
+FORMAT = 1
+"""Counts up when what is stored, or how networks are encoded, changes."""
+LARGEST_BYTES = 64 << 20
+SUFFIX = ".solutions"
+_DIGEST_BYTES = 32
+
+
+class _Entry(msgspec.Struct, frozen=True, array_like=True):
+    """`count` solutions of `width` codes each, four bytes a code."""
+
+    key: str
+    width: int
+    count: int
+    codes: bytes
+
+
+class SolutionCache:
+    """The cache in `folder` (made when it is needed). What it cannot read or write it does without."""
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self.folder = folder or cache_folder()
+        self._versions = (FORMAT, _version("pycsp3"))
+
+    def key(self, network: Network) -> str:
+        """The name of `network`: equal for equal networks, whatever robot or team they belong to."""
+        return _digest(msgspec.msgpack.encode((self._versions, network))).hex()
+
+    def get(self, network: Network) -> tuple[Codes, ...] | None:
+        """All solutions of `network`, if they are known."""
+        path = self._path(self.key(network))
+        try:
+            content = path.read_bytes()
+        except OSError:
+            return None
+        solutions = _read(content, path.stem, len(network.domains))
+        if solutions is None:
+            with suppress(OSError):
+                path.unlink()
+        return solutions
+
+    def put(self, network: Network, solutions: tuple[Codes, ...]) -> None:
+        """Remember all solutions of `network`, unless they are too many, or the folder cannot be written."""
+        key, width = self.key(network), len(network.domains)
+        codes = array("i", (code for solution in solutions for code in solution)).tobytes()
+        if len(codes) > LARGEST_BYTES:
+            return
+        body = msgspec.msgpack.encode(_Entry(key, width, len(solutions), codes))
+        with suppress(OSError):
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_atomically(self._path(key), _digest(body) + body)
+
+    def files(self) -> Iterator[Path]:
+        """The cache's files."""
+        with suppress(OSError):
+            yield from sorted(self.folder.glob(f"*{SUFFIX}"))
+
+    def clear(self) -> int:
+        """Remove all files; returns how many there were. Raises `OSError` when one cannot be removed."""
+        gone = 0
+        for path in self.files():
+            path.unlink(missing_ok=True)
+            gone += 1
+        return gone
+
+    def _path(self, key: str) -> Path:
+        return self.folder / f"{key}{SUFFIX}"
+
+
+def cache_folder() -> Path:
+    """Where the user's cache is (`~/.cache/robochoc` on Linux; `XDG_CACHE_HOME` is respected)."""
+    from platformdirs import user_cache_path  # noqa: PLC0415 - only who solves has a cache
+
+    return user_cache_path("robochoc")
+
+
+def _read(content: bytes, key: str, width: int) -> tuple[Codes, ...] | None:
+    """The solutions in a cache file; None if it is not what it should be."""
+    digest, body = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
+    if _digest(body) != digest:
+        return None
+    try:
+        entry = msgspec.msgpack.decode(body, type=_Entry)
+    except msgspec.MsgspecError:
+        return None
+    numbers = array("i")
+    if entry.key != key or entry.width != width or len(entry.codes) != width * entry.count * numbers.itemsize:
+        return None
+    numbers.frombytes(entry.codes)
+    flat = numbers.tolist()
+    return tuple(tuple(flat[start : start + width]) for start in range(0, len(flat), width))
+
+
+def _digest(content: bytes) -> bytes:
+    return hashlib.blake2b(content, digest_size=_DIGEST_BYTES).digest()
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "none"

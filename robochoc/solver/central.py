@@ -1,0 +1,150 @@
+"""The central judge: a whole team's problem as one, decided or counted by ACE.
+
+It sees every file, which no robot does. What it is for: to hold a team's verdict against an independent one, and to
+say how many solutions there are. Robots that share nothing are solved apart; what is left goes to ACE with cliques
+made explicit (`solver/cliques.py`), in two ways at once, and the first to be ready is believed.
+"""
+
+from __future__ import annotations
+
+import math
+import select
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+
+from robochoc.outcome import Verdict
+from robochoc.problem import Team
+from robochoc.solver.ace import AceProcess, Answer, SolverTimeout
+from robochoc.solver.ace_words import Strategy
+from robochoc.solver.cache import SolutionCache
+from robochoc.solver.cliques import strengthened
+from robochoc.solver.encoding import Codes, Network, components
+
+LONGEST_TABLE = 20_000
+"""A clique with more solutions than this stays an allDifferent."""
+TABLE_PATIENCE_S = 20.0
+"""So long, all in all, may it take to make tables of cliques."""
+HEDGE_S = 5.0
+"""After so long without an answer the other strategy is tried beside."""
+_TICK_S = 0.2
+NOTHING = Answer(0, complete=True, solutions=())
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the judge has found. `count` is None unless it was asked for."""
+
+    verdict: Verdict
+    assignment: dict[str, int] = field(default_factory=dict)
+    count: int | None = None
+
+
+class Judge:
+    """Decides teams by ACE. `deadline` is on the monotonic clock; `progress` is called while it lasts.
+
+    A `solver` that is warm may be lent; it is left running.
+    """
+
+    def __init__(
+        self,
+        cache: SolutionCache | None = None,
+        deadline: float | None = None,
+        progress: Callable[[], None] | None = None,
+        solver: AceProcess | None = None,
+    ) -> None:
+        self._solver = solver
+        self._cache = cache
+        self._deadline = deadline
+        self._progress = progress
+        self._tables: dict[Network, tuple[Codes, ...] | None] = {}
+
+    def judge(self, team: Team, *, count: bool = False) -> Judgement:
+        """The verdict on `team`, with a solution or (`count`) with the number of all solutions.
+
+        `unknown` when the time was over. Raises `SolverMissing`, `SolverLost`, `Unsupported`.
+        """
+        with ExitStack() as processes:
+            ace = self._solver or processes.enter_context(AceProcess())
+            spare = processes.enter_context(AceProcess())
+            if any(len(constraint.variables) > 1 for constraint in team.constraints()):
+                ace.start()
+            parts = components(team.variables.values(), team.constraints())
+            parts.sort(key=lambda part: math.prod(len(domain) for domain in part.network.domains))
+            found = []
+            for part in parts:
+                try:
+                    found.append(self._solve(part.network, ace, spare, count=count))
+                except SolverTimeout:
+                    return Judgement(Verdict.UNKNOWN)
+                if not found[-1].found:
+                    return Judgement(Verdict.NO_SOLUTION, count=0 if count else None)
+        if count:
+            return Judgement(Verdict.SOLUTION, count=math.prod(answer.found for answer in found))
+        assignment: dict[str, int] = {}
+        for part, answer in zip(parts, found, strict=True):
+            assignment.update(zip(part.names, part.decoded(answer.solutions[0]), strict=True))
+        return Judgement(Verdict.SOLUTION, {name: assignment[name] for name in team.variables})
+
+    def _solve(self, network: Network, ace: AceProcess, spare: AceProcess, *, count: bool) -> Answer:
+        """The number of solutions of one component, or its first one."""
+        if network.impossible:
+            return NOTHING
+        if not network.tables:
+            (domain,) = network.domains
+            return Answer(len(domain), complete=True, solutions=((domain[0],),))
+        network = strengthened(network, lambda clique: self._table(ace, clique))
+        if network.impossible:
+            return NOTHING
+        return self._race(network, ace, spare, count=count)
+
+    def _table(self, ace: AceProcess, clique: Network) -> tuple[Codes, ...] | None:
+        """All solutions of a clique; None when there are too many, or it takes too long."""
+        if clique not in self._tables:
+            self._tables[clique] = self._known_or_solved(ace, clique)
+        return self._tables[clique]
+
+    def _known_or_solved(self, ace: AceProcess, clique: Network) -> tuple[Codes, ...] | None:
+        known = self._cache.get(clique) if self._cache else None
+        if known is not None:
+            return known if len(known) <= LONGEST_TABLE else None
+        patience = time.monotonic() + TABLE_PATIENCE_S
+        deadline = patience if self._deadline is None else min(patience, self._deadline)
+        try:
+            answer = ace.solve(clique, limit=LONGEST_TABLE + 1, strategy="static", deadline=deadline)
+        except SolverTimeout:
+            if self._deadline is not None and deadline == self._deadline:
+                raise
+            return None
+        if not answer.complete or answer.found > LONGEST_TABLE:
+            return None
+        if self._cache:
+            self._cache.put(clique, answer.solutions)
+        return answer.solutions
+
+    def _race(self, network: Network, first: AceProcess, second: AceProcess, *, count: bool) -> Answer:
+        """The answer of whichever of two strategies is ready first; the second begins when the first takes long."""
+        strategies: tuple[Strategy, Strategy] = ("static", "default") if count else ("default", "static")
+        limit = None if count else 1
+        running = [first]
+        if not first.begin(network, limit=limit, count_only=count, strategy=strategies[0]):
+            return first.answer()
+        hedge = time.monotonic() + HEDGE_S
+        while not (ready := select.select(running, [], [], self._patience())[0]):
+            if self._progress:
+                self._progress()
+            if self._deadline is not None and time.monotonic() >= self._deadline:
+                raise SolverTimeout
+            if second not in running and time.monotonic() >= hedge:
+                second.begin(network, limit=limit, count_only=count, strategy=strategies[1])
+                running.append(second)
+        winner: AceProcess = ready[0]
+        answer = winner.answer(self._deadline)
+        for ace in running:
+            if ace is not winner:
+                ace.close()
+        return answer
+
+    def _patience(self) -> float:
+        return _TICK_S if self._deadline is None else max(0.0, min(_TICK_S, self._deadline - time.monotonic()))

@@ -1,0 +1,150 @@
+"""Compiles the domains of a team's robots: what private constraints connect goes to ACE, once for equal problems."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from types import TracebackType
+from typing import Self
+
+from robochoc.problem import Robot
+from robochoc.solver.ace import AceProcess, SolverLost, SolverTimeout
+from robochoc.solver.cache import SolutionCache
+from robochoc.solver.domain import MOST_SOLUTIONS, CompiledDomain, TooManySolutions, compiled_domain
+from robochoc.solver.encoding import Codes, Network, Unsupported
+
+PATIENCE_S = 60.0
+"""How long the compilation of one robot may take, unless more is asked for."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What compiling one robot may come to: a number of local solutions, and seconds."""
+
+    solutions: int = MOST_SOLUTIONS
+    time_s: float = PATIENCE_S
+
+
+class Source(StrEnum):
+    """Where a robot's local solutions come from; of several, the one that cost most."""
+
+    DIRECT = "direct"
+    EQUAL = "equal"
+    CACHE = "cache"
+    ACE = "ace"
+
+
+class CompileTimeout(Exception):  # noqa: N818 - a limit that was reached
+    """A robot's local problem took too long."""
+
+    def __init__(self, robot: str, limit_s: float) -> None:
+        super().__init__(
+            f"{robot}'s private constraints were not solved within {limit_s:g} s; give it more time (--local-timeout),"
+            " or give some of its variables to a robot of their own"
+        )
+        self.robot = robot
+
+
+class CompileFailed(Exception):  # noqa: N818 - named for what happened
+    """The solver was lost over a robot's local problem."""
+
+    def __init__(self, robot: str, why: str) -> None:
+        super().__init__(f"{robot} could not be compiled: {why}")
+        self.robot = robot
+        self.why = why
+
+
+@dataclass(frozen=True)
+class Compilation:
+    """One robot's compiled domain, where it came from, and how long that took."""
+
+    robot: str
+    domain: CompiledDomain
+    source: Source
+    seconds: float
+
+
+class Compiler:
+    """Compiles robots one after the other, with one solver's process (none, if none is needed) and one cache.
+
+    Left as a context, the process is gone, unless it was given as `solver`. `deadline` is on the monotonic clock, and
+    for all together.
+    """
+
+    def __init__(
+        self,
+        limits: Limits | None = None,
+        cache: SolutionCache | None = None,
+        deadline: float | None = None,
+        solver: AceProcess | None = None,
+    ) -> None:
+        self._limits = limits or Limits()
+        self._cache = cache
+        self._deadline = deadline
+        self._ace = solver or AceProcess()
+        self._lent = solver is not None
+        self._known: dict[Network, tuple[Codes, ...]] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if not self._lent:
+            self._ace.close()
+
+    def compile(self, robot: Robot) -> Compilation:
+        """The compiled domain of `robot`.
+
+        Raises `TooManySolutions`, `CompileTimeout`, `CompileFailed`, `SolverMissing`, and `Unsupported` when a
+        constraint is too large; and `SolverTimeout` when the time for all together is over.
+        """
+        began = time.monotonic()
+        sources = [Source.DIRECT]
+
+        def solve(network: Network) -> Sequence[Codes]:
+            solutions, source = self._solutions(robot.name, network, began + self._limits.time_s)
+            sources.append(source)
+            return solutions
+
+        try:
+            domain = compiled_domain(robot, solve, self._limits.solutions)
+        except Unsupported as refusal:
+            raise Unsupported(f"{robot.name}: {refusal}") from refusal
+        costliest = max(sources, key=list(Source).index)
+        return Compilation(robot.name, domain, costliest, time.monotonic() - began)
+
+    def _solutions(self, robot: str, network: Network, limit: float) -> tuple[tuple[Codes, ...], Source]:
+        known = self._known.get(network)
+        source = Source.EQUAL
+        if known is None and self._cache is not None:
+            known = self._cache.get(network)
+            source = Source.CACHE
+        if known is None:
+            known = self._solved(robot, network, limit)
+            source = Source.ACE
+            if self._cache is not None:
+                self._cache.put(network, known)
+        if len(known) > self._limits.solutions:
+            raise TooManySolutions(robot, self._limits.solutions)
+        self._known[network] = known
+        return known, source
+
+    def _solved(self, robot: str, network: Network, limit: float) -> tuple[Codes, ...]:
+        deadline = limit if self._deadline is None else min(limit, self._deadline)
+        try:
+            answer = self._ace.solve(network, limit=self._limits.solutions + 1, strategy="static", deadline=deadline)
+        except SolverTimeout as timeout:
+            if self._deadline is not None and self._deadline <= limit:
+                raise
+            raise CompileTimeout(robot, self._limits.time_s) from timeout
+        except SolverLost as lost:
+            raise CompileFailed(robot, str(lost)) from lost
+        if answer.found > self._limits.solutions:
+            raise TooManySolutions(robot, self._limits.solutions)
+        if not answer.complete:
+            raise CompileFailed(robot, "the solver stopped before it had seen everything")
+        return answer.solutions

@@ -1,0 +1,242 @@
+"""Constraints as tables over codes: the form in which a solver is handed a problem.
+
+A solver that computes with the values of a problem may compute wrongly (ACE does, with negative ones; FINDINGS).
+So nothing is left to compute: values become codes 0, 1, ... in ascending order, every constraint becomes the list
+of code tuples that it allows or forbids, and unary constraints are folded into the domains first. Problems that
+differ by names and by a shift of values only become equal, which is what lets one solution serve them all.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from robochoc.expression import Undefined, compiled
+from robochoc.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Variable
+
+MOST_TUPLES = 4_000_000
+"""How many tuples of values a constraint may have to be tried on."""
+
+LONGEST_ALLOWED = 100_000
+"""A constraint on so many combinations of values is a table of allowed tuples, however few it forbids."""
+
+Codes = tuple[int, ...]
+
+
+class Unsupported(Exception):  # noqa: N818 - it is an answer, not a fault
+    """The problem is well-formed, and this version (or this protocol) cannot take it; says why and what can."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A constraint on the variables at places `scope`: `rows` are the allowed code tuples, or the forbidden ones."""
+
+    scope: Codes
+    allowed: bool
+    rows: tuple[Codes, ...]
+
+
+@dataclass(frozen=True)
+class Network:
+    """A constraint network over codes: a domain for each variable, in ascending order, and tables.
+
+    `different` lists scopes on which all values differ. It may repeat what tables say, never add to it.
+    """
+
+    domains: tuple[Codes, ...]
+    tables: tuple[Table, ...] = ()
+    different: tuple[Codes, ...] = ()
+
+    @property
+    def impossible(self) -> bool:
+        """Whether it can be seen without a search that there is no solution."""
+        return not all(self.domains) or any(table.allowed and not table.rows for table in self.tables)
+
+
+@dataclass(frozen=True)
+class Component:
+    """Variables that constraints connect, as a network; `values[code]` is the value that a code stands for."""
+
+    names: tuple[str, ...]
+    values: tuple[int, ...]
+    network: Network
+
+    def decoded(self, codes: Sequence[int]) -> tuple[int, ...]:
+        """The values behind a solution of the network."""
+        return tuple([self.values[code] for code in codes])
+
+
+def components(variables: Iterable[Variable], constraints: Iterable[Constraint]) -> list[Component]:
+    """The problem of `variables` and the hard part of `constraints`, split into what does not depend on each other.
+
+    Components are in the order of their first variables, variables within in their given order. Constraints are on
+    `variables` only. Raises `Unsupported` when a constraint has too many tuples to be made a table.
+    """
+    domains = {variable.name: sorted(variable.domain) for variable in variables}
+    unary: list[Constraint] = []
+    wider: list[Constraint] = []
+    for constraint in constraints:
+        if _forbids_something(constraint):
+            (unary if len(constraint.variables) <= 1 else wider).append(constraint)
+    for constraint in unary:
+        _fold(constraint, domains)
+    tables = _Tables(domains)
+    relevant = [rows for rows in map(tables.of, wider) if rows is not None]
+    groups = _connected(domains, [rows.scope for rows in relevant])
+    held: dict[str, list[_Rows]] = {names[0]: [] for names in groups}
+    first = {name: names[0] for names in groups for name in names}
+    for rows in relevant:
+        held[first[rows.scope[0]]].append(rows)
+    return [_component(names, domains, held[names[0]]) for names in groups]
+
+
+def holds_on(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
+    """`constraint` as a test of the values of the variables `names`; what is soft is allowed."""
+    place = {name: index for index, name in enumerate(names)}
+    terms = [(place[term], 0) if isinstance(term, str) else (None, term) for term in constraint.parameters]
+
+    def arguments(values: Sequence[int]) -> list[int]:
+        return [constant if index is None else values[index] for index, constant in terms]
+
+    definition = constraint.definition
+    if not isinstance(definition, Predicate):
+        return lambda values: definition.cost(arguments(values)) < INFINITE
+    if constraint.cost < INFINITE:
+        return lambda values: True  # noqa: ARG005 - a soft predicate forbids nothing
+    body = compiled(definition.body, definition.parameters)
+
+    def holds(values: Sequence[int]) -> bool:
+        try:
+            return bool(body(arguments(values)))
+        except Undefined:
+            return False
+
+    return holds
+
+
+def _forbids_something(constraint: Constraint) -> bool:
+    return isinstance(constraint.definition, Relation) or constraint.cost == INFINITE
+
+
+def _fold(constraint: Constraint, domains: dict[str, list[int]]) -> None:
+    """Take from a domain what a unary constraint forbids; a false one on constants only leaves no domain a value."""
+    test = holds_on(constraint, constraint.variables)
+    if constraint.variables:
+        (name,) = constraint.variables
+        domains[name] = [value for value in domains[name] if test((value,))]
+    elif not test(()):
+        domains.update({name: [] for name in domains})
+
+
+def _connected(names: Iterable[str], scopes: Iterable[Sequence[str]]) -> list[list[str]]:
+    """The connected components of the graph that `scopes` make, in the order of `names`."""
+    root = {name: name for name in names}
+
+    def find(name: str) -> str:
+        while root[name] != name:
+            root[name] = name = root[root[name]]
+        return name
+
+    for scope in scopes:
+        for other in scope[1:]:
+            root[find(other)] = find(scope[0])
+    groups: dict[str, list[str]] = {}
+    for name in root:
+        groups.setdefault(find(name), []).append(name)
+    return list(groups.values())
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """A table over values: what `Table` is over codes."""
+
+    scope: tuple[str, ...]
+    allowed: bool
+    rows: tuple[tuple[int, ...], ...]
+
+
+def _component(names: Sequence[str], domains: Mapping[str, list[int]], held: Iterable[_Rows]) -> Component:
+    values = sorted({value for name in names for value in domains[name]})
+    code = {value: number for number, value in enumerate(values)}
+    place = {name: index for index, name in enumerate(names)}
+    coded = tuple(tuple([code[value] for value in domains[name]]) for name in names)
+    coder = _Coder(place, code)
+    tables = {coder.table(rows) for rows in held}
+    ordered = sorted(tables, key=lambda table: (table.scope, table.allowed, table.rows))
+    return Component(tuple(names), tuple(values), Network(coded, tuple(ordered)))
+
+
+class _Coder:
+    """Turns tables over values into tables over codes; equal rows become one object."""
+
+    def __init__(self, place: Mapping[str, int], code: Mapping[int, int]) -> None:
+        self._place = place
+        self._code = code
+        self._rows: dict[Hashable, tuple[Codes, ...]] = {}
+
+    def table(self, held: _Rows) -> Table:
+        scope = [self._place[name] for name in held.scope]
+        order = sorted(range(len(scope)), key=scope.__getitem__)
+        alike = id(held.rows), tuple(order)
+        if alike not in self._rows:
+            code = self._code
+            self._rows[alike] = tuple(sorted(tuple([code[row[index]] for index in order]) for row in held.rows))
+        return Table(tuple(sorted(scope)), held.allowed, self._rows[alike])
+
+
+class _Tables:
+    """Makes constraints tables; those that say the same of equal domains are tried once."""
+
+    def __init__(self, domains: Mapping[str, list[int]]) -> None:
+        self._domains = domains
+        self._made: dict[Hashable, _Rows | None] = {}
+
+    def of(self, constraint: Constraint) -> _Rows | None:
+        """The tuples that `constraint` allows (of a large one: or forbids); None when it allows everything."""
+        scope = constraint.variables
+        terms = tuple([scope.index(term) if isinstance(term, str) else (term,) for term in constraint.parameters])
+        alike = id(constraint.definition), terms, tuple([tuple(self._domains[name]) for name in scope])
+        if alike not in self._made:
+            self._made[alike] = _rows(constraint, self._domains)
+        made = self._made[alike]
+        return made and replace(made, scope=scope)
+
+
+def _rows(constraint: Constraint, domains: Mapping[str, list[int]]) -> _Rows | None:
+    scope = constraint.variables
+    size = math.prod(len(domains[name]) for name in scope)
+    definition = constraint.definition
+    if size > MOST_TUPLES and isinstance(definition, Relation) and definition.semantics is not Semantics.SOFT:
+        listed = tuple(set(_listed(constraint, definition, domains)))
+        allows = definition.semantics is Semantics.SUPPORTS
+        return _Rows(scope, allows, listed) if allows or listed else None
+    if size > MOST_TUPLES:
+        raise Unsupported(
+            f"constraint {constraint.name} has {size:,} combinations of values to try, more than {MOST_TUPLES:,};"
+            " state it as a relation, or split it"
+        )
+    test = holds_on(constraint, scope)
+    sorted_out: tuple[list[tuple[int, ...]], list[tuple[int, ...]]] = ([], [])
+    for row in itertools.product(*(domains[name] for name in scope)):
+        sorted_out[test(row)].append(row)
+    forbidden, allowed = sorted_out
+    if not forbidden:
+        return None
+    if size > LONGEST_ALLOWED and len(forbidden) < len(allowed):
+        return _Rows(scope, allowed=False, rows=tuple(forbidden))
+    return _Rows(scope, allowed=True, rows=tuple(allowed))
+
+
+def _listed(constraint: Constraint, relation: Relation, domains: Mapping[str, list[int]]) -> Iterable[tuple[int, ...]]:
+    """The tuples of `relation` as values of the scope: those that fit its constants, repetitions and domains."""
+    scope = constraint.variables
+    known = {name: set(domains[name]) for name in scope}
+    for row in relation.tuples:
+        bound: dict[str, int] = {}
+        if all(
+            value == term if isinstance(term, int) else bound.setdefault(term, value) == value
+            for term, value in zip(constraint.parameters, row, strict=True)
+        ) and all(bound[name] in known[name] for name in scope):
+            yield tuple([bound[name] for name in scope])

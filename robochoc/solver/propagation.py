@@ -1,0 +1,125 @@
+"""Generalised arc consistency on tables: what is left is smaller, and safe for ACE to have.
+
+ACE 2.6 counts wrongly where a table of forbidden tuples meets a domain of one value, and fails an assertion where
+its own first filtering empties a table (`tests/test_ace.py` has both; docs/design.md, "ACE"). So it gets neither:
+values without support go, variables with one value leave their tables, tables that say nothing any more are dropped.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from robochoc.solver.encoding import LONGEST_ALLOWED, Codes, Network, Table
+
+
+def propagated(network: Network) -> Network:
+    """`network` with the same variables and the same solutions, arc consistent; impossible, if that shows it.
+
+    Every domain has at least two values wherever a table or a `different` looks at it, and of forbidden tuples there
+    are tables only where those allowed would be more than `LONGEST_ALLOWED`.
+    """
+    filtered = _Filter(network)
+    if not filtered.run():
+        return Network(tuple(() for _ in network.domains))
+    domains = tuple(tuple(sorted(domain)) for domain in filtered.domains)
+    left = [_without_fixed(table, domains) for table in filtered.tables]
+    tables = [_allowing(table, domains) for table in left if not _says_nothing(table, domains)]
+    scopes = (tuple([place for place in scope if len(domains[place]) > 1]) for scope in network.different)
+    result = Network(domains, tuple(tables), tuple(scope for scope in scopes if len(scope) > 1))
+    # A table of forbidden tuples that has become one of allowed ones may have more to say.
+    return result if tables == left or all(table.allowed for table in filtered.tables) else propagated(result)
+
+
+class _Filter:
+    """Removes values without support until none is left to remove."""
+
+    def __init__(self, network: Network) -> None:
+        self.domains = [set(domain) for domain in network.domains]
+        self.tables = [_allowing(table, network.domains) for table in network.tables]
+        self._different = network.different
+        self._waiting = dict.fromkeys(range(len(self.tables)))
+        self._looking: list[list[int]] = [[] for _ in network.domains]
+        for number, table in enumerate(self.tables):
+            for place in table.scope:
+                self._looking[place].append(number)
+
+    def run(self) -> bool:
+        """Filter; False when a domain has run empty."""
+        if not all(self.domains):
+            return False
+        while True:
+            while self._waiting:
+                number, _ = self._waiting.popitem()
+                if not self._revise(number):
+                    return False
+            if not self._tell_fixed_values():
+                return False
+            if not self._waiting:
+                return True
+
+    def _revise(self, number: int) -> bool:
+        table = self.tables[number]
+        if not table.rows:
+            return not table.allowed
+        domains = [self.domains[place] for place in table.scope]
+        columns = [set(column) for column in zip(*table.rows, strict=True)]
+        if not all(column <= domain for column, domain in zip(columns, domains, strict=True)):
+            fits = list(zip(range(len(domains)), domains, strict=True))
+            rows = tuple([row for row in table.rows if all(row[index] in domain for index, domain in fits)])
+            table = self.tables[number] = replace(table, rows=rows)
+            columns = [set(column) for column in zip(*rows, strict=True)]
+        if not table.allowed:
+            return True
+        if not table.rows:
+            return False
+        for place, supported in zip(table.scope, columns, strict=True):
+            self._keep(place, supported)
+        return all(domains)
+
+    def _keep(self, place: int, values: set[int]) -> None:
+        """Restrict the domain at `place` to `values`, and have whoever looks at it look again."""
+        if not self.domains[place] <= values:
+            self.domains[place] &= values
+            self._waiting.update(dict.fromkeys(self._looking[place]))
+
+    def _tell_fixed_values(self) -> bool:
+        """Where all values differ, one that is taken is taken from the others."""
+        before = -1
+        while before != (before := sum(map(len, self.domains))):
+            for scope in self._different:
+                taken = [next(iter(self.domains[place])) for place in scope if len(self.domains[place]) == 1]
+                if len(taken) != len(set(taken)):
+                    return False
+                for place in scope:
+                    if len(self.domains[place]) > 1:
+                        self._keep(place, self.domains[place].difference(taken))
+            if not all(self.domains):
+                return False
+        return True
+
+
+def _allowing(table: Table, domains: Sequence[Codes]) -> Table:
+    """`table` by its allowed tuples, unless they are too many."""
+    if table.allowed or math.prod(len(domains[place]) for place in table.scope) > LONGEST_ALLOWED:
+        return table
+    forbidden = set(table.rows)
+    rows = itertools.product(*(domains[place] for place in table.scope))
+    return Table(table.scope, allowed=True, rows=tuple(row for row in rows if row not in forbidden))
+
+
+def _without_fixed(table: Table, domains: Sequence[Codes]) -> Table:
+    """`table` on those of its variables that have a choice; all its rows agree with the values of the others."""
+    kept = [index for index, place in enumerate(table.scope) if len(domains[place]) > 1]
+    if len(kept) == len(table.scope):
+        return table
+    rows = sorted({tuple([row[index] for index in kept]) for row in table.rows})
+    return Table(tuple([table.scope[index] for index in kept]), table.allowed, tuple(rows))
+
+
+def _says_nothing(table: Table, domains: Sequence[Codes]) -> bool:
+    if not table.allowed:
+        return not table.rows
+    return len(table.rows) == math.prod(len(domains[place]) for place in table.scope)

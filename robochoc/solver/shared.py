@@ -1,0 +1,112 @@
+"""A constraint shared with other robots, as its owner checks it: compiled once, remembered by what the others say."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Mapping, Sequence
+
+from robochoc.message import Value
+from robochoc.problem import Constraint, Robot
+from robochoc.solver.encoding import holds_on
+
+Conflict = Mapping[str, Value]
+"""Assignments of other robots that rule out an own value: the left side of a nogood."""
+
+Others = tuple[int, ...]
+"""What a constraint sees of the others: their variables' values, in the order in which it looks at them."""
+
+
+class OwnValues:
+    """The own compiled domain: `values` of the variables `names`, and what constraints can tell apart in it.
+
+    A constraint looks at some of the variables; values that agree there get one code. Many constraints look at the
+    same ones.
+    """
+
+    def __init__(self, names: Sequence[str], values: Sequence[tuple[int, ...]]) -> None:
+        self._names = names
+        self._values = values
+        self._coded: dict[tuple[int, ...], tuple[list[int], list[tuple[int, ...]]]] = {}
+
+    def seen(self, scope: Container[str]) -> tuple[tuple[int, ...], list[str]]:
+        """The places and names of the own variables in `scope`."""
+        places = tuple([place for place, name in enumerate(self._names) if name in scope])
+        return places, [self._names[place] for place in places]
+
+    def codes(self, places: tuple[int, ...]) -> tuple[list[int], list[tuple[int, ...]]]:
+        """For each value its code, and for each code what it stands for, when only `places` are looked at."""
+        if places not in self._coded:
+            codes: dict[tuple[int, ...], int] = {}
+            coded = [codes.setdefault(tuple([value[place] for place in places]), len(codes)) for value in self._values]
+            self._coded[places] = coded, list(codes)
+        return self._coded[places]
+
+
+class SharedConstraint:
+    """A constraint on the own compiled variable and those of `agents` (in priority order).
+
+    After `compile` it answers which own values go with what the others say. Made at the first look, then kept:
+    there is one answer for each combination of the others' variables that the constraint looks at, however many
+    values their owners have.
+    """
+
+    def __init__(
+        self, constraint: Constraint, robot: Robot, rank: Mapping[str, int], known: Mapping[str, tuple[str, ...]]
+    ) -> None:
+        scope = set(constraint.variables)
+        above = (parent.name for parent in robot.parents if scope.intersection(known[parent.name]))
+        self.agents = tuple(sorted(above, key=rank.__getitem__))
+        self._constraint = constraint
+        self._scope = scope
+        self._seen = [
+            (agent, place) for agent in self.agents for place, name in enumerate(known[agent]) if name in scope
+        ]
+        self._names = [known[agent][place] for agent, place in self._seen]
+        self._widths = {agent: len(known[agent]) for agent in self.agents}
+        self._masks: dict[Others, int] = {}
+        self._conflicts: dict[Others, Conflict] = {}
+
+    def compile(self, own: OwnValues) -> None:
+        """Get ready for the own compiled domain."""
+        places, names = own.seen(self._scope)
+        self._holds = holds_on(self._constraint, [*self._names, *names])
+        self.codes, self._distinct = own.codes(places)
+
+    def others(self, view: Mapping[str, Value]) -> Others | None:
+        """What the constraint sees in `view`; None as long as a part of it is unknown."""
+        try:
+            seen = [view[agent][place] for agent, place in self._seen]
+        except KeyError:
+            return None
+        return None if None in seen else tuple(seen)  # type: ignore[arg-type]
+
+    def holds(self, others: Others) -> list[bool]:
+        """For each code of own values, whether it goes with `others`."""
+        return [self._holds((*others, *own)) for own in self._distinct]
+
+    def mask(self, others: Others) -> int:
+        """The own values that go with `others`: bit i for the i-th."""
+        mask = self._masks.get(others)
+        if mask is None:
+            holds = self.holds(others)
+            mask = sum(1 << index for index, code in enumerate(self.codes) if holds[code])
+            self._masks[others] = mask
+        return mask
+
+    def conflict(self, others: Others) -> Conflict:
+        """`others` as a nogood's left side: one object for one combination, not to be changed."""
+        conflict = self._conflicts.get(others)
+        if conflict is None:
+            parts: dict[str, list[int | None]] = {agent: [None] * self._widths[agent] for agent in self.agents}
+            for (agent, place), value in zip(self._seen, others, strict=True):
+                parts[agent][place] = value
+            conflict = self._conflicts[others] = {agent: tuple(value) for agent, value in parts.items()}
+        return conflict
+
+
+def in_order_of_lowest(
+    constraints: Iterable[SharedConstraint], rank: Mapping[str, int]
+) -> tuple[SharedConstraint, ...]:
+    """`constraints` in the order of their lowest other robot, the highest first."""
+    return tuple(
+        sorted(constraints, key=lambda c: (max((rank[agent] for agent in c.agents), default=-1), len(c.agents)))
+    )
