@@ -61,6 +61,7 @@ def random_complex_team(chance: Random) -> Team:
     density = chance.uniform(0.25, 0.8)
     pairs = [pair for pair in itertools.combinations(domains, 2) if chance.random() < density]
     constraints = [random_constraint(chance, domains, pair) for pair in pairs]
+    constraints += [random_constraint(chance, domains, pair) for pair in pairs if chance.random() < 0.15]
     if len(domains) > 2 and chance.random() < 0.6:
         constraints.append(random_constraint(chance, domains, chance.sample(sorted(domains), 3)))
     constraints += [
@@ -111,15 +112,16 @@ def random_constraint(chance: Random, domains: Mapping[str, Sequence[int]], term
         return Constraint("C", TERNARY, tuple(scope), tuple(scope))
     names = [term for term in scope if isinstance(term, str)]
     if chance.random() < 0.1:
-        third = chance.choice((*names, chance.randint(-2, 3)))
+        terms_there: list[Term] = [*names, chance.randint(-2, 3)]
+        third = chance.choice(terms_there)
         return Constraint("C", TERNARY, (*scope, third), (*scope, third))
     return Constraint("C", chance.choice(PREDICATES), tuple(scope), tuple(scope))
 
 
 def _random_relation(chance: Random, domains: Mapping[str, Sequence[int]], scope: Sequence[Term]) -> Constraint:
     tightness = chance.uniform(0.1, 0.6)
-    columns = [domains[term] if isinstance(term, str) else (term, term + 1) for term in scope]
-    rows = list(itertools.product(*columns))
+    columns: list[Sequence[int]] = [domains[term] if isinstance(term, str) else (term, term + 1) for term in scope]
+    rows: list[tuple[int, ...]] = list(itertools.product(*columns))
     forbidden = [row for row in rows if chance.random() < tightness]
     semantics = chance.choice((Semantics.CONFLICTS, Semantics.SUPPORTS))
     listed = forbidden if semantics is Semantics.CONFLICTS else [row for row in rows if row not in forbidden]

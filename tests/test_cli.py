@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import pty
@@ -19,7 +20,7 @@ from program import PROGRAM, ROOT, robochoc
 from robochoc.cli.commands import cli
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.problem import Constraint, Model, Relation, Semantics
+from robochoc.problem import Constraint, Model, Relation, Robot, Semantics
 
 RESULT_KEYS = {
     "team", "protocol", "runtime", "seed", "verdict", "assignment", "cost", "withdrawn", "epochs", "metrics",
@@ -218,11 +219,12 @@ def test_what_this_version_cannot_solve_is_said_in_one_sentence(tmp_path: Path) 
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_robots_with_several_variables_are_said_to_be_the_next_step() -> None:
-    done = robochoc("solve", ROOT / "tests" / "data" / "complex")
-    assert done.returncode == 2
-    assert "variables; this version" in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+def test_complex_robots_are_solved_alike_by_abt_and_the_judge() -> None:
+    for words in ([], ["--runtime", "simulator"], ["--protocol", "central"]):
+        done = robochoc("solve", ROOT / "tests" / "data" / "complex", "--json", *words)
+        result = json.loads(done.stdout)
+        assert (result["verdict"], result["verified"], result["cost"]) == ("solution", True, 0), done.stderr
+        assert len(result["assignment"]) == 5
 
 
 def test_the_example_of_the_documentation_is_solved(tmp_path: Path) -> None:
@@ -232,14 +234,23 @@ def test_the_example_of_the_documentation_is_solved(tmp_path: Path) -> None:
     assert (ROOT / "docs" / "examples" / "scouts" / "Relay.xml").read_text() in (ROOT / "README.md").read_text()
 
 
-def test_the_jchoc_originals_load_and_are_said_to_be_the_next_step() -> None:
+def test_the_jchoc_originals_get_a_verdict_distributed_and_central() -> None:
     originals = ROOT.parent / "shared" / "data" / "jchoc"
     if not originals.is_dir():
         pytest.skip("the original files are not part of this repository")
     assert "3 robots, 12 variables" in robochoc("validate", originals).stdout
-    done = robochoc("solve", originals)
-    assert done.returncode == 2
-    assert "A1 has 4 variables" in done.stderr
+    assert not any(solutions_of_robot(robot) for robot in read_team(originals).robots)
+    for words in (["--runtime", "simulator"], ["--protocol", "central"]):
+        result = json.loads(robochoc("solve", originals, "--json", *words).stdout)
+        assert result["verdict"] == "no-solution", words
+    assert "A1 alone has none" in robochoc("solve", originals).stdout
+
+
+def solutions_of_robot(robot: Robot) -> bool:
+    names = [variable.name for variable in robot.variables]
+    every = itertools.product(*(variable.domain for variable in robot.variables))
+    locals_ = (dict(zip(names, values, strict=True)) for values in every)
+    return any(all(constraint.allows(local) for constraint in robot.private) for local in locals_)
 
 
 def test_progress_is_shown_on_a_terminal_only(tmp_path: Path) -> None:

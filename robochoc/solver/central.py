@@ -20,12 +20,15 @@ from robochoc.solver.ace import AceProcess, Answer, SolverTimeout
 from robochoc.solver.ace_words import Strategy
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.cliques import strengthened
-from robochoc.solver.encoding import Codes, Network, components
+from robochoc.solver.encoding import Codes, Component, Network, components
+from robochoc.solver.symmetry import broken, orbits, symmetries
 
 LONGEST_TABLE = 20_000
 """A clique with more solutions than this stays an allDifferent."""
 TABLE_PATIENCE_S = 20.0
 """So long, all in all, may it take to make tables of cliques."""
+MOST_ORBITS = 20_000
+"""So many solutions up to symmetry are looked at one by one to be counted; of more only the number is asked."""
 HEDGE_S = 5.0
 """After so long without an answer the other strategy is tried beside."""
 _TICK_S = 0.2
@@ -39,6 +42,19 @@ class Judgement:
     verdict: Verdict
     assignment: dict[str, int] = field(default_factory=dict)
     count: int | None = None
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """What to find: up to `limit` solutions, or their number. `in_order`: in the variables' order at first."""
+
+    limit: int | None = None
+    count_only: bool = False
+    in_order: bool = False
+
+    @property
+    def strategies(self) -> tuple[Strategy, Strategy]:
+        return ("static", "default") if self.in_order else ("default", "static")
 
 
 class Judge:
@@ -75,7 +91,7 @@ class Judge:
             found = []
             for part in parts:
                 try:
-                    found.append(self._solve(part.network, ace, spare, count=count))
+                    found.append(self._solve(part, ace, spare, count=count))
                 except SolverTimeout:
                     return Judgement(Verdict.UNKNOWN)
                 if not found[-1].found:
@@ -87,17 +103,28 @@ class Judge:
             assignment.update(zip(part.names, part.decoded(answer.solutions[0]), strict=True))
         return Judgement(Verdict.SOLUTION, {name: assignment[name] for name in team.variables})
 
-    def _solve(self, network: Network, ace: AceProcess, spare: AceProcess, *, count: bool) -> Answer:
+    def _solve(self, part: Component, ace: AceProcess, spare: AceProcess, *, count: bool) -> Answer:
         """The number of solutions of one component, or its first one."""
+        network = part.network
         if network.impossible:
             return NOTHING
         if not network.tables:
             (domain,) = network.domains
             return Answer(len(domain), complete=True, solutions=((domain[0],),))
-        network = strengthened(network, lambda clique: self._table(ace, clique))
-        if network.impossible:
-            return NOTHING
-        return self._race(network, ace, spare, count=count)
+        group = symmetries(part)
+        if group:
+            smaller = broken(network, group)
+            if not count:
+                return self._search(smaller, ace, spare, _Wanted(limit=1, in_order=True))
+            first = self._search(smaller, ace, spare, _Wanted(limit=MOST_ORBITS, in_order=True))
+            if first.complete:
+                return Answer(len(orbits(first.solutions, group, network)), complete=True, solutions=())
+        wanted = _Wanted(count_only=True, in_order=True) if count else _Wanted(limit=1)
+        return self._search(network, ace, spare, wanted)
+
+    def _search(self, network: Network, ace: AceProcess, spare: AceProcess, wanted: _Wanted) -> Answer:
+        strong = strengthened(network, lambda clique: self._table(ace, clique))
+        return NOTHING if strong.impossible else self._race(strong, ace, spare, wanted)
 
     def _table(self, ace: AceProcess, clique: Network) -> tuple[Codes, ...] | None:
         """All solutions of a clique; None when there are too many, or it takes too long."""
@@ -123,13 +150,12 @@ class Judge:
             self._cache.put(clique, answer.solutions)
         return answer.solutions
 
-    def _race(self, network: Network, first: AceProcess, second: AceProcess, *, count: bool) -> Answer:
+    def _race(self, network: Network, first: AceProcess, second: AceProcess, wanted: _Wanted) -> Answer:
         """The answer of whichever of two strategies is ready first; the second begins when the first takes long."""
-        strategies: tuple[Strategy, Strategy] = ("static", "default") if count else ("default", "static")
-        limit = None if count else 1
-        running = [first]
-        if not first.begin(network, limit=limit, count_only=count, strategy=strategies[0]):
+        usual, other = wanted.strategies
+        if not first.begin(network, limit=wanted.limit, count_only=wanted.count_only, strategy=usual):
             return first.answer()
+        running = [first]
         hedge = time.monotonic() + HEDGE_S
         while not (ready := select.select(running, [], [], self._patience())[0]):
             if self._progress:
@@ -137,7 +163,7 @@ class Judge:
             if self._deadline is not None and time.monotonic() >= self._deadline:
                 raise SolverTimeout
             if second not in running and time.monotonic() >= hedge:
-                second.begin(network, limit=limit, count_only=count, strategy=strategies[1])
+                second.begin(network, limit=wanted.limit, count_only=wanted.count_only, strategy=other)
                 running.append(second)
         winner: AceProcess = ready[0]
         answer = winner.answer(self._deadline)

@@ -9,43 +9,44 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Hashable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from enum import StrEnum
 
 from robochoc.solver.encoding import Codes, Network, Table
 
-Edge = tuple[int, int]
+
+class Demand(StrEnum):
+    """What a binary table demands of two variables: that they differ, that and more, or something else."""
+
+    DIFFER = "differ"
+    DIFFER_AND_MORE = "differ and more"
+    OTHER = "other"
 
 
-@dataclass(frozen=True)
-class Differing:
-    """The pairs of variables whose values must differ; `stronger` are those that owe each other more than that."""
-
-    pairs: frozenset[Edge]
-    stronger: frozenset[Edge]
-
-
-def differing(network: Network) -> Differing:
-    """The graph of the `ne` that the binary tables of `network` imply."""
-    pairs, stronger = set(), set()
-    known: dict[Hashable, tuple[bool, bool]] = {}
+def demands(network: Network) -> list[Demand]:
+    """What each table of `network` demands."""
+    known: dict[Hashable, Demand] = {}
+    found = []
     for table in network.tables:
-        if len(table.scope) != 2:  # noqa: PLR2004 - binary
-            continue
-        left, right = table.scope
-        alike = id(table.rows), table.allowed, network.domains[left], network.domains[right]
+        alike = id(table.rows), table.allowed, tuple([network.domains[place] for place in table.scope])
         if alike not in known:
-            equal = {(code, code) for code in set(network.domains[left]).intersection(network.domains[right])}
-            forbidden = _forbidden(network, table)
-            known[alike] = equal <= forbidden, equal < forbidden
-        differ, more = known[alike]
-        if differ:
-            pairs.add((left, right))
-        if more:
-            stronger.add((left, right))
-    return Differing(frozenset(pairs), frozenset(stronger))
+            known[alike] = _demand(network, table)
+        found.append(known[alike])
+    return found
 
 
-def cliques(pairs: Iterable[Edge]) -> list[Codes]:
+def _demand(network: Network, table: Table) -> Demand:
+    if len(table.scope) != 2:  # noqa: PLR2004 - binary
+        return Demand.OTHER
+    left, right = (set(network.domains[place]) for place in table.scope)
+    equal = {(code, code) for code in left & right}
+    forbidden = _forbidden(network, table)
+    if not equal <= forbidden:
+        return Demand.OTHER
+    return Demand.DIFFER if equal == forbidden else Demand.DIFFER_AND_MORE
+
+
+def cliques(pairs: Iterable[Codes]) -> list[Codes]:
     """Cliques that together cover all `pairs`, each grown as long as it covers something new."""
     neighbours: dict[int, set[int]] = {}
     for left, right in pairs:
@@ -65,28 +66,34 @@ def cliques(pairs: Iterable[Edge]) -> list[Codes]:
 def strengthened(network: Network, solutions: Callable[[Network], tuple[Codes, ...] | None]) -> Network:
     """`network` with allDifferent on cliques of `ne`, and with tables for the cliques that owe each other more.
 
+    Tables are for cliques that need every value there is: there they pay, as almost nothing is left to choose.
+
     `solutions` gives all solutions of a sub-network, or None where there are too many to be a table.
     """
-    found = differing(network)
+    demanded = demands(network)
+    differ = {t.scope: d for t, d in zip(network.tables, demanded, strict=True) if d is not Demand.OTHER}
+    more = {t.scope for t, d in zip(network.tables, demanded, strict=True) if d is Demand.DIFFER_AND_MORE}
     different: list[Codes] = []
     compiled: list[Table] = []
-    for clique in cliques(found.pairs):
+    for clique in cliques(differ):
         edges = set(itertools.combinations(clique, 2))
         if len(clique) == 2:  # noqa: PLR2004 - an edge, which its table covers
             continue
-        rows = solutions(_within(network, clique)) if edges <= found.stronger else None
+        tight = len(clique) == len({code for place in clique for code in network.domains[place]})
+        rows = solutions(_within(network, clique)) if tight and edges <= more else None
         if rows is None:
             different.append(clique)
         else:
             compiled.append(Table(clique, allowed=True, rows=tuple(sorted(rows))))
-    said = {pair for scope in different for pair in itertools.combinations(scope, 2)} - found.stronger
+    said = {pair for scope in different for pair in itertools.combinations(scope, 2)}
     covered = [set(table.scope) for table in compiled]
     kept = [
         table
-        for table in network.tables
-        if table.scope not in said and not any(scope.issuperset(table.scope) for scope in covered)
+        for table, demand in zip(network.tables, demanded, strict=True)
+        if not (demand is Demand.DIFFER and table.scope in said)
+        and not any(scope.issuperset(table.scope) for scope in covered)
     ]
-    return replace(network, tables=(*compiled, *kept), different=tuple(different))
+    return replace(network, tables=(*compiled, *kept), different=(*network.different, *different))
 
 
 def _grown(clique: list[int], neighbours: dict[int, set[int]], open_still: dict[int, set[int]]) -> list[int]:

@@ -1,0 +1,143 @@
+"""Symmetries of a network: guessed from the variables' names, verified on its tables, and broken.
+
+A symmetry exchanges variables, and may turn the order of the values around, in such a way that every table becomes
+a table of the network again. Solutions then come in orbits, and of each orbit it is enough to find the first one in
+lexicographic order (lex-leader; Crawford, Ginsberg, Luks and Roy, KR 1996). A guess that is no symmetry is dropped;
+nothing depends on names but the guessing: `V3.1` stands for row 3, column 1 of a board that may be mirrored or turned.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from robochoc.solver.encoding import Codes, Component, Network, Table
+
+LARGEST_GROUP = 96
+_NUMBER = re.compile(r"[0-9]+")
+
+
+class Symmetry(NamedTuple):
+    """The value of variable i becomes that of variable `image[i]`, turned around if `reflects`."""
+
+    image: Codes
+    reflects: bool
+
+    def then(self, other: Symmetry) -> Symmetry:
+        """First this one, then `other`."""
+        return Symmetry(tuple([other.image[place] for place in self.image]), self.reflects != other.reflects)
+
+    def applied(self, solution: Codes, highest: int) -> Codes:
+        """What `solution` becomes; `highest` is the largest code of the network."""
+        moved = [0] * len(solution)
+        for place, code in zip(self.image, solution, strict=True):
+            moved[place] = highest - code if self.reflects else code
+        return tuple(moved)
+
+
+def symmetries(part: Component) -> tuple[Symmetry, ...]:
+    """A group of symmetries of the network of `part`, without the identity; empty when none was found."""
+    network = part.network
+    identity = Symmetry(tuple(range(len(part.names))), reflects=False)
+    is_symmetry = _verifier(network)
+    generators = [guess for guess in _guesses(part.names) if guess != identity and is_symmetry(guess)]
+    group = {identity}
+    frontier = [identity]
+    while frontier and len(group) <= LARGEST_GROUP:
+        frontier = [new for old in frontier for generator in generators if (new := old.then(generator)) not in group]
+        group.update(frontier)
+    if frontier:
+        return ()
+    return tuple(sorted(group - {identity}))
+
+
+def broken(network: Network, group: Sequence[Symmetry]) -> Network:
+    """`network` without most of those solutions that are not the first of their orbit.
+
+    x is the first if x <= g(x) for every g. Of that the first place where g may change something is demanded: all
+    before it are equal, whatever x is.
+    """
+    highest = _highest(network)
+    demanded: dict[Hashable, Table] = {}
+    for symmetry in group:
+        source = {target: place for place, target in enumerate(symmetry.image)}
+        place = next(place for place in range(len(source)) if source[place] != place or symmetry.reflects)
+        other = source[place]
+        left, right = network.domains[place], network.domains[other]
+        rows = {(a, b) for a in left for b in right if a <= (highest - b if symmetry.reflects else b)}
+        if place == other:
+            demanded[place, symmetry.reflects] = Table(
+                (place,), allowed=True, rows=tuple((a,) for a, b in rows if a == b)
+            )
+        else:
+            scope = tuple(sorted((place, other)))
+            turned = rows if place < other else {(b, a) for a, b in rows}
+            demanded[scope, symmetry.reflects, place] = Table(scope, allowed=True, rows=tuple(sorted(turned)))
+    return replace(network, tables=(*network.tables, *demanded.values()))
+
+
+def orbits(solutions: Sequence[Codes], group: Sequence[Symmetry], network: Network) -> set[Codes]:
+    """`solutions` and all that `group` makes of them."""
+    highest = _highest(network)
+    return {image for one in solutions for image in (one, *(g.applied(one, highest) for g in group))}
+
+
+def _highest(network: Network) -> int:
+    return max(code for domain in network.domains for code in domain)
+
+
+def _guesses(names: Sequence[str]) -> Iterator[Symmetry]:
+    """Symmetries that a problem whose variables are called `names` might have."""
+    yield Symmetry(tuple(range(len(names))), reflects=True)
+    coordinates = [tuple(map(int, _NUMBER.findall(name)[:3])) for name in names]
+    place = {coordinate: index for index, coordinate in enumerate(coordinates)}
+    if len(place) < len(names) or len({len(coordinate) for coordinate in coordinates}) > 1:
+        return
+    for moved in _moves(coordinates):
+        if set(moved) == set(place):
+            yield Symmetry(tuple([place[coordinate] for coordinate in moved]), reflects=False)
+
+
+def _moves(coordinates: Sequence[tuple[int, ...]]) -> Iterator[list[tuple[int, ...]]]:
+    """Every axis turned around, and every two exchanged."""
+    axes = range(len(coordinates[0]))
+    for axis in axes:
+        seen = {coordinate[axis] for coordinate in coordinates}
+        ends = min(seen) + max(seen)
+        yield [(*c[:axis], ends - c[axis], *c[axis + 1 :]) for c in coordinates]
+    for one, other in itertools.combinations(axes, 2):
+        order = [other if axis == one else one if axis == other else axis for axis in axes]
+        yield [tuple([coordinate[axis] for axis in order]) for coordinate in coordinates]
+
+
+def _verifier(network: Network) -> Callable[[Symmetry], bool]:
+    """A test whether a guess turns `network` into itself."""
+    highest = _highest(network)
+    content: dict[Hashable, frozenset[Codes]] = {}
+
+    def rows(table: Table, order: Codes, *, reflects: bool) -> frozenset[Codes]:
+        alike = id(table.rows), order, reflects
+        if alike not in content:
+            turned = (tuple([row[index] for index in order]) for row in table.rows)
+            content[alike] = frozenset(tuple([highest - code for code in row]) if reflects else row for row in turned)
+        return content[alike]
+
+    def moved(symmetry: Symmetry) -> Iterator[tuple[Codes, bool, frozenset[Codes]]]:
+        for table in network.tables:
+            scope = [symmetry.image[place] for place in table.scope]
+            order = tuple(sorted(range(len(scope)), key=scope.__getitem__))
+            yield tuple(sorted(scope)), table.allowed, rows(table, order, reflects=symmetry.reflects)
+
+    present = set(moved(Symmetry(tuple(range(len(network.domains))), reflects=False)))
+
+    def is_symmetry(symmetry: Symmetry) -> bool:
+        for place, domain in enumerate(network.domains):
+            image = {highest - code for code in domain} if symmetry.reflects else set(domain)
+            if set(network.domains[symmetry.image[place]]) != image:
+                return False
+        return all(table in present for table in moved(symmetry))
+
+    return is_symmetry
