@@ -11,6 +11,7 @@ from pathlib import Path
 import flagship
 import peers
 import simulated
+import solver
 import start
 import transport
 import whole
@@ -24,6 +25,7 @@ PARTS: dict[str, Callable[[], Section]] = {
     "transport": transport.measured,
     "flagship": flagship.measured,
     "simulator": simulated.measured,
+    "solver": solver.measured,
 }
 RESULTS = Path(__file__).with_name("RESULTS.md")
 

@@ -53,8 +53,21 @@ def worst(statuses: Iterable[int]) -> int:
 @contextmanager
 def failures_told(place: object) -> Iterator[None]:
     """Whatever ends the work at `place` that is no fault of the program becomes one line, and `Failure`."""
+    try:
+        yield
+    except Exception as error:
+        status = _status(error)
+        if status is None:
+            raise
+        from robochoc.formats import on_one_line
+
+        raise Failure(status, str(error) if status == INVALID else on_one_line(f"{place}: {error}")) from error
+
+
+def _status(error: Exception) -> int | None:
+    """The exit status that stands for `error`; None for one that should not be. Imports only what may be wanted."""
     from robochoc.communication.robot_link import RobotsLost
-    from robochoc.formats import InvalidInput, on_one_line
+    from robochoc.formats import InvalidInput
     from robochoc.registry import UnknownProtocol
     from robochoc.run import Refuted
     from robochoc.solver.ace import SolverLost, SolverMissing
@@ -62,13 +75,10 @@ def failures_told(place: object) -> Iterator[None]:
     from robochoc.solver.domain import TooManySolutions
     from robochoc.solver.encoding import Unsupported
 
-    try:
-        yield
-    except InvalidInput as invalid:
-        raise Failure(INVALID, str(invalid)) from invalid
-    except (UnknownProtocol, Unsupported, SolverMissing) as refusal:
-        raise Failure(USAGE, on_one_line(f"{place}: {refusal}")) from refusal
-    except (TooManySolutions, CompileTimeout) as limit:
-        raise Failure(LIMIT, on_one_line(f"{place}: {limit}")) from limit
-    except (RobotsLost, CompileFailed, SolverLost, Refuted) as failure:
-        raise Failure(LOST, on_one_line(f"{place}: {failure}")) from failure
+    statuses: dict[int, tuple[type[Exception], ...]] = {
+        INVALID: (InvalidInput,),
+        USAGE: (UnknownProtocol, Unsupported, SolverMissing),
+        LIMIT: (TooManySolutions, CompileTimeout),
+        LOST: (RobotsLost, CompileFailed, SolverLost, Refuted),
+    }
+    return next((status for status, kinds in statuses.items() if isinstance(error, kinds)), None)

@@ -12,7 +12,7 @@ import hashlib
 from array import array
 from collections.abc import Iterator
 from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from pathlib import Path
 
 import msgspec
@@ -41,7 +41,7 @@ class SolutionCache:
 
     def __init__(self, folder: Path | None = None) -> None:
         self.folder = folder or cache_folder()
-        self._versions = (FORMAT, _version("pycsp3"))
+        self._versions = (FORMAT, _solver_version())
 
     def key(self, network: Network) -> str:
         """The name of `network`: equal for equal networks, whatever robot or team they belong to."""
@@ -116,8 +116,12 @@ def _digest(content: bytes) -> bytes:
     return hashlib.blake2b(content, digest_size=_DIGEST_BYTES).digest()
 
 
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
+def _solver_version() -> str:
+    """What pycsp3 says it is, without importing it (it patches built-in types), or package metadata (slow)."""
+    found = find_spec("pycsp3")
+    if found is None or found.origin is None:
         return "none"
+    try:
+        return Path(found.origin).with_name("version.txt").read_text(encoding="utf-8").strip()
+    except OSError:
+        return "unknown"

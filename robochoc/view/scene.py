@@ -36,12 +36,14 @@ def scene_of(outcome: Outcome, team: Team | None = None) -> Scene:
     """
     layout = lay_out(crew_of(outcome, team))
     flying = sum(drone.place is not None for drone in layout.drones)
-    return Scene(f"{outcome.team}: {_ending(outcome, flying)}", _facts(outcome, flying), layout.drones, layout.axes)
+    aside = len(layout.drones) - flying  # drones, as a robot may fly several
+    title = f"{outcome.team}: {_ending(outcome, flying, aside)}"
+    return Scene(title, _facts(outcome, flying, aside), layout.drones, layout.axes)
 
 
-def _ending(outcome: Outcome, flying: int) -> str:
+def _ending(outcome: Outcome, flying: int, aside: int) -> str:
     if outcome.withdrawn and flying:
-        others = "no larger team could" if outcome.verdict is Verdict.OPTIMAL else f"{len(outcome.withdrawn)} withdrew"
+        others = "no larger team could" if outcome.verdict is Verdict.OPTIMAL else f"{aside} withdrew"
         return f"{flying} fly, {others}"
     match outcome.verdict:
         case Verdict.SOLUTION:
@@ -54,11 +56,11 @@ def _ending(outcome: Outcome, flying: int) -> str:
             return "a limit was reached without a verdict"
 
 
-def _facts(outcome: Outcome, flying: int) -> tuple[tuple[str, str], ...]:
+def _facts(outcome: Outcome, flying: int, aside: int) -> tuple[tuple[str, str], ...]:
     checked = ", checked" if outcome.verified else ""
     verdict = f"{outcome.verdict}{checked}"
     if outcome.withdrawn:
-        verdict = f"no solution for all {flying + len(outcome.withdrawn)}; {flying} placed{checked}"
+        verdict = f"no solution for all {flying + aside}; {flying} placed{checked}"
     facts = [("verdict", verdict), ("protocol", outcome.protocol)]
     if outcome.cost:
         facts.append(("cost", f"{outcome.cost:,g}"))
