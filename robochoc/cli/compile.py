@@ -52,18 +52,28 @@ def compile_team(
     from robochoc.solver.cache import SolutionCache
 
     bounds = limits(local_solutions, local_timeout)
+    cache = None if no_cache else SolutionCache()
     statuses = []
     for path in paths:
         try:
             with failures_told(path):
                 folders = find_teams(path)
-            for folder in folders:
-                with failures_told(folder):
-                    _compile(folder, bounds, None if no_cache else SolutionCache(), as_json=as_json)
         except Failure as failure:
             failure.show()
             statuses.append(failure.exit_code)
+            continue
+        statuses += [_status(folder, bounds, cache, as_json=as_json) for folder in folders]
     context.exit(worst(statuses))
+
+
+def _status(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_json: bool) -> int:
+    try:
+        with failures_told(folder):
+            _compile(folder, bounds, cache, as_json=as_json)
+    except Failure as failure:
+        failure.show()
+        return failure.exit_code
+    return 0
 
 
 def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_json: bool) -> None:

@@ -43,6 +43,7 @@ from robochoc.solver.encoding import Codes, Network
 from robochoc.solver.propagation import propagated
 
 CHUNK = 1 << 20
+LAST_WORDS_S = 1.0
 TASKS = 400
 """After so many the process is replaced: ACE keeps parts of every problem that it has seen."""
 
@@ -83,6 +84,7 @@ class AceProcess:
         self._buffer = bytearray()
         self._question: _Question | None = None
         self._tasks = 0
+        self._searching = False
         self._decoder = msgspec.msgpack.Decoder(FromSolver)
 
     def __enter__(self) -> Self:
@@ -144,7 +146,6 @@ class AceProcess:
         if self._tasks == TASKS:
             self.close()
         self._ask(_task(question.asked, limit, count_only=count_only, strategy=strategy))
-        self._tasks += 1
         return True
 
     def answer(self, deadline: float | None = None) -> Answer:
@@ -188,6 +189,7 @@ class AceProcess:
             self._folder = None
         self._buffer.clear()
         self._tasks = 0
+        self._searching = False
 
     # The process
 
@@ -217,13 +219,18 @@ class AceProcess:
         self._socket = ours
 
     def _ask(self, task: ToSolver) -> None:
+        if self._searching:  # for an answer that nobody wants any more
+            self.close()
         self.start()
         body = msgspec.msgpack.encode(task)
         try:
             if self._socket is not None:
                 self._socket.sendall(LENGTH.pack(len(body)) + body)
-        except OSError:
+        except OSError:  # it has hung up: perhaps it has said why
+            self._hear(time.monotonic() + LAST_WORDS_S)
             self._lose()
+        self._tasks += 1
+        self._searching = True
 
     def _hear(self, deadline: float | None) -> FromSolver:
         while True:
@@ -248,6 +255,7 @@ class AceProcess:
         self._buffer += chunk
 
     def _checked(self, word: FromSolver) -> FromSolver:
+        self._searching = False
         if isinstance(word, Broken):
             self.close()
             if word.java_missing:
@@ -309,11 +317,9 @@ class _Question:
     def answered(self, found: int, *, complete: bool, solutions: Sequence[Codes]) -> Answer:
         """The answer for the whole, from that for `asked`."""
         total = found * math.prod(len(domain) for domain in self.free.values())
-        if self.count_only:
-            return Answer(total, complete, ())
-        whole = tuple(itertools.islice(self._combined(solutions), self.limit))
-        cut_off = self.limit is not None and total > self.limit
-        return Answer(len(whole), complete and not cut_off, whole)
+        wanted = total if self.limit is None else min(total, self.limit)
+        whole = () if self.count_only else tuple(itertools.islice(self._combined(solutions), wanted))
+        return Answer(wanted, complete and wanted == total, whole)
 
     def _combined(self, solutions: Sequence[Codes]) -> Iterator[Codes]:
         order = sorted(range(len(self.places) + len(self.free)), key=[*self.places, *self.free].__getitem__)

@@ -74,7 +74,7 @@ class SolutionCache:
     def files(self) -> Iterator[Path]:
         """The cache's files."""
         with suppress(OSError):
-            yield from sorted(self.folder.glob(f"*{SUFFIX}"))
+            yield from sorted(path for path in self.folder.glob(f"*{SUFFIX}") if path.is_file())
 
     def clear(self) -> int:
         """Remove all files; returns how many there were. Raises `OSError` when one cannot be removed."""
@@ -102,7 +102,7 @@ def _read(content: bytes, key: str, width: int) -> tuple[Codes, ...] | None:
         return None
     try:
         entry = msgspec.msgpack.decode(body, type=_Entry)
-    except msgspec.MsgspecError:
+    except (msgspec.MsgspecError, RecursionError):
         return None
     numbers = array("i")
     if entry.key != key or entry.width != width or len(entry.codes) != width * entry.count * numbers.itemsize:

@@ -161,16 +161,17 @@ class Judge:
             if self._progress:
                 self._progress()
             if self._deadline is not None and time.monotonic() >= self._deadline:
-                raise SolverTimeout
+                break
             if second not in running and time.monotonic() >= hedge:
                 second.begin(network, limit=wanted.limit, count_only=wanted.count_only, strategy=other)
                 running.append(second)
-        winner: AceProcess = ready[0]
-        answer = winner.answer(self._deadline)
         for ace in running:
-            if ace is not winner:
+            if ace not in ready[:1]:
                 ace.close()
-        return answer
+        if not ready:
+            raise SolverTimeout
+        winner: AceProcess = ready[0]
+        return winner.answer(self._deadline)
 
     def _patience(self) -> float:
         return _TICK_S if self._deadline is None else max(0.0, min(_TICK_S, self._deadline - time.monotonic()))
