@@ -11,7 +11,7 @@ from typing import TypedDict, assert_never
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.simulator import Simulation
-from robochoc.observers.checker import cost, could_join, objections
+from robochoc.observers.checker import cost, could_join, has_local_solution, objections
 from robochoc.observers.events import Began, Observer
 from robochoc.outcome import Metrics, Outcome, Verdict
 from robochoc.problem import Kind, Model, Team
@@ -133,9 +133,7 @@ class _Run:
         try:
             compiled = self._compile()
         except (TooManySolutions, CompileTimeout) as limit:
-            return replace(self._outcome, reason=str(limit))
-        except SolverTimeout:
-            return self._outcome
+            return replace(self._outcome, reason=str(limit), metrics=Metrics(compile_s=time.monotonic() - self._began))
         compile_s = time.monotonic() - self._began if any(c.source is not Source.DIRECT for c in compiled) else 0.0
         outcome = replace(self._outcome, metrics=Metrics(compile_s=compile_s))
         domains = {one.robot: one.domain for one in compiled}
@@ -146,6 +144,7 @@ class _Run:
             outcome = replace(
                 outcome,
                 verdict=Verdict.NO_SOLUTION,
+                witness=alone,
                 reason=f"{alone} alone has none: its private constraints leave it no local solution",
             )
         if outcome.verdict is Verdict.NO_SOLUTION and self._options.withdraw is Withdrawal.MAXIMAL:
@@ -178,10 +177,15 @@ class _Run:
         )
 
     def second_opinion(self, outcome: Outcome) -> Outcome:
-        """Let ACE decide what the robots have found to have no solution. Raises `Refuted` when it finds one."""
+        """Let the central judge decide what the robots have found to have no solution.
+
+        A robot that had none alone is looked at by the checker as well, as judge and compiler share their encoding.
+        Raises `Refuted` when one of them finds a solution.
+        """
         opinion = self.centrally(count=False)
-        if opinion.verdict is Verdict.SOLUTION:
-            raise Refuted(f"{outcome.protocol} says that {self._team.name} has no solution, and ACE has found one")
+        alone = [robot for robot in self._team.robots if robot.name == outcome.witness and outcome.reason]
+        if opinion.verdict is Verdict.SOLUTION or any(has_local_solution(robot) for robot in alone):
+            raise Refuted(f"{outcome.protocol} says that {self._team.name} has no solution, and a judge has found one")
         return replace(outcome, verified=opinion.verdict is Verdict.NO_SOLUTION)
 
     def _compile(self) -> list[Compilation]:
@@ -191,7 +195,10 @@ class _Run:
         with Compiler(self._options.local, self._cache, self._deadline, self._solver) as compiler:
             for number, robot in enumerate(robots, 1):
                 self._show(f"compiling {robot.name} ({number} of {len(robots)})")
-                compiled.append(compiler.compile(robot))
+                try:
+                    compiled.append(compiler.compile(robot))
+                except SolverTimeout:
+                    raise CompileTimeout(robot.name, self._options.timeout or 0, "--timeout") from None
                 if not compiled[-1].domain.values and self._options.withdraw is None:
                     break
         return compiled

@@ -153,7 +153,7 @@ def test_withdraw_may_stand_alone_even_before_the_path(four: Path, words: list[s
 
 def test_solve_tells_people_what_happened(four: Path) -> None:
     words = robochoc("solve", four, "--withdraw", "--runtime", "simulator").stdout
-    assert "no solution (Robot" in words
+    assert "no solution for the whole team (Robot" in words
     assert "has derived the empty nogood" in words
     assert "9 fly, 7 step aside" in words
     assert re.search(r"row\\column +1 +2 +3 +4", words)

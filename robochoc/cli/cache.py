@@ -7,9 +7,9 @@ import click
 
 @click.group(short_help="Show or clear the cache of solved local problems.")
 def cache() -> None:
-    """The cache of local problems that were solved before, in your cache folder.
+    """The cache of local problems that were solved before, in your cache folder (XDG_CACHE_HOME, or ~/.cache).
 
-    It is filled by itself, is safe to remove at any time, and is never needed: what is missing is solved again.
+    compile and solve fill it by themselves. It is safe to remove at any time: what is missing is solved again.
     """
 
 

@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from robochoc.cli.failure import Failure, failures_told, worst
+from robochoc.cli.failure import LIMIT, Failure, failures_told, worst
 from robochoc.cli.local import limits, local_options
 from robochoc.cli.paths import InputPath
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
-    from robochoc.problem import Team
     from robochoc.solver.cache import SolutionCache
-    from robochoc.solver.compile import Compilation, Limits
-
-WIDTH_IN_A_PIPE = 120
-SOURCES = {
-    "direct": "no solver needed",
-    "equal": "equal to an earlier one",
-    "cache": "cached",
-    "ace": "solved by ACE",
-}
+    from robochoc.solver.compile import Limits
 
 
 @click.command("compile", short_help="Compile robots' local problems, and show what they come to.")
@@ -47,7 +35,15 @@ def compile_team(
 
     A robot's local solutions are all values of its variables that its private constraints allow. Those that look
     alike to its neighbours make one group; the groups are the values that a protocol sees.
-    """
+
+    \b
+    variables  the robot's own
+    seen       those of them that neighbours see (shared constraints, what children are told)
+    private    constraints on own variables only
+    local      solutions of these
+    groups     of local solutions that look alike from outside
+    how        ACE: solved now; cached: before; equal: for a robot above; direct: without solver
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.formats import find_teams
     from robochoc.solver.cache import SolutionCache
 
@@ -69,88 +65,38 @@ def compile_team(
 def _status(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_json: bool) -> int:
     try:
         with failures_told(folder):
-            _compile(folder, bounds, cache, as_json=as_json)
+            return _compile(folder, bounds, cache, as_json=as_json)
     except Failure as failure:
         failure.show()
         return failure.exit_code
-    return 0
 
 
-def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_json: bool) -> None:
+def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_json: bool) -> int:
+    """Compile the team in `folder`, robots that reach a limit included, tell of it, and return the exit status."""
+    from robochoc.cli.compile_report import json_report, print_table
     from robochoc.cli.progress import progress_line
     from robochoc.communication.run_result import Progress
     from robochoc.formats import read_team
-    from robochoc.solver.compile import Compiler
+    from robochoc.solver.compile import Compilation, Compiler, CompileTimeout
+    from robochoc.solver.domain import TooManySolutions
 
     began = time.monotonic()
     team = read_team(folder)
-    compiled = []
+    found: list[Compilation | TooManySolutions | CompileTimeout] = []
     with progress_line(team.name) as progress, Compiler(bounds, cache) as compiler:
         for number, robot in enumerate(team.robots, 1):
             if progress:
                 stage = f"compiling {robot.name} ({number} of {len(team.robots)})"
                 progress(Progress(0, time.monotonic() - began, stage))
-            compiled.append(compiler.compile(robot))
+            try:
+                found.append(compiler.compile(robot))
+            except (TooManySolutions, CompileTimeout) as limit:
+                found.append(limit)
     if as_json:
-        _print_json(team, compiled, time.monotonic() - began)
+        click.echo(json_report(team, found, time.monotonic() - began))
     else:
-        _print(team, compiled, time.monotonic() - began)
-
-
-def _rows(team: Team, compiled: list[Compilation]) -> list[dict[str, Any]]:
-    """A row a robot; `seconds` includes the start of the solver's process where the robot was the first to need it."""
-    return [
-        {
-            "robot": one.robot,
-            "variables": len(team[one.robot].variables),
-            "interface": len(team[one.robot].interface),
-            "private_constraints": len(team[one.robot].private),
-            "local_solutions": one.domain.total,
-            "groups": len(one.domain.values),
-            "seconds": round(one.seconds, 6),
-            "source": str(one.source),
-        }
-        for one in compiled
-    ]
-
-
-def _print_json(team: Team, compiled: list[Compilation], seconds: float) -> None:
-    import msgspec
-
-    from robochoc.formats import encodable
-
-    report = {"team": encodable(team.name), "seconds": round(seconds, 6), "robots": _rows(team, compiled)}
-    click.echo(msgspec.json.encode(report))
-
-
-def _print(team: Team, compiled: list[Compilation], seconds: float) -> None:
-    from rich.console import Console
-
-    console = Console(width=None if sys.stdout.isatty() else WIDTH_IN_A_PIPE, highlight=False)
-    console.print(_table(team, compiled), soft_wrap=False)
-    empty = [one.robot for one in compiled if not one.domain.values]
-    if empty:
-        console.print(f"{empty[0]} has no local solution, so the team has none.", markup=False)
-    console.print(f"{len(compiled)} robots, {seconds:.2f} s; next: robochoc solve", markup=False)
-
-
-def _table(team: Team, compiled: list[Compilation]) -> Table:
-    from rich.markup import escape
-    from rich.table import Table
-
-    from robochoc.formats import on_one_line
-
-    table = Table(title=escape(on_one_line(team.name)), title_justify="left", box=None, header_style="bold")
-    table.add_column("robot")
-    for heading in ("variables", "seen", "private constraints", "local solutions", "groups", "time"):
-        table.add_column(heading, justify="right")
-    table.add_column("how")
-    for row in _rows(team, compiled):
-        counts = [row[name] for name in ("variables", "interface", "private_constraints", "local_solutions", "groups")]
-        table.add_row(
-            escape(row["robot"]),
-            *(f"{count:,}" for count in counts),
-            f"{1000 * row['seconds']:,.1f} ms",
-            SOURCES[row["source"]],
-        )
-    return table
+        print_table(team, found, time.monotonic() - began, folder)
+    unknown = [str(one) for one in found if not isinstance(one, Compilation)]
+    for reason in unknown:
+        click.echo(f"{folder}: {reason}", err=True)
+    return LIMIT if unknown else 0

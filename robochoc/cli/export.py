@@ -24,8 +24,10 @@ def export(folder: Path, kind: str, output: Path | None) -> None:  # noqa: ARG00
     from robochoc.formats.xcsp3 import xcsp3
 
     with failures_told(folder):
-        document = xcsp3(read_team(folder))
+        team = read_team(folder)
+        document = xcsp3(team)
     if output is None:
         click.echo(document, nl=False)
     else:
         write_atomically(output, document)
+        click.echo(f"{output}: {len(document):,} bytes, {len(team.variables)} variables")

@@ -22,7 +22,7 @@ def local_options(command: Command) -> Command:
                 type=click.IntRange(1),
                 default=100_000,
                 show_default=True,
-                help="So many local solutions may a robot have.",
+                help="Most local solutions of a robot, and most groups of them.",
             ),
             click.option(
                 "--local-timeout",
@@ -30,7 +30,7 @@ def local_options(command: Command) -> Command:
                 default=60.0,
                 show_default=True,
                 metavar="SECONDS",
-                help="So long may compiling a robot's private constraints take.",
+                help="Longest time to compile one robot.",
             ),
             click.option(
                 "--no-cache",

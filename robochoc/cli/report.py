@@ -20,7 +20,7 @@ def report(team: Team, outcome: Outcome) -> str:
         lines += _board(team, outcome.assignment) or _list(team, outcome.assignment)
     if outcome.withdrawn:
         flying, aside = len(team.robots) - len(outcome.withdrawn), len(outcome.withdrawn)
-        lines.append(f"  {flying} fly, {aside} step{'s' * (aside == 1)} aside:")
+        lines.append(f"  {flying} {'flies' if flying == 1 else 'fly'}, {aside} step{'s' * (aside == 1)} aside:")
         lines += _wrapped(outcome.withdrawn)
     lines.append(f"  {outcome.protocol}, {_place(team, outcome)}: {_metrics(outcome)}")
     return "\n".join(lines)
@@ -41,13 +41,14 @@ def _verdict(outcome: Outcome) -> str:
     proof = f"no solution ({why})" if why else "no solution"
     match outcome.verdict:
         case Verdict.NO_SOLUTION:
-            return f"{proof}, confirmed by ACE" if outcome.verified else proof
+            return f"{proof}, confirmed centrally" if outcome.verified else proof
         case Verdict.UNKNOWN:
             return f"unknown: {outcome.reason or 'the time was over before a verdict'}"
         case _ if outcome.count is not None:
             return f"{outcome.count:,} solution{'s' * (outcome.count != 1)}"
         case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.withdrawn:
-            return f"{proof} for the whole team; some step aside, checked against every constraint"
+            who = "some step" if outcome.assignment else "all step"
+            return f"no solution for the whole team ({why}); {who} aside, checked against every constraint"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             return f"{outcome.verdict}, checked against every constraint"
 
@@ -90,8 +91,10 @@ def _board(team: Team, assignment: Mapping[str, int]) -> list[str]:
 
 
 def _list(team: Team, assignment: Mapping[str, int]) -> list[str]:
-    names = sorted(assignment, key=natural)
-    return _wrapped([f"{team.owner[name]}: {name} = {assignment[name]}" for name in names])
+    owners = sorted({team.owner[name] for name in assignment}, key=natural)
+    own = {owner: [variable.name for variable in team[owner].variables] for owner in owners}
+    values = {owner: ", ".join(f"{name} = {assignment[name]}" for name in names) for owner, names in own.items()}
+    return _wrapped([f"{owner}: {values[owner]}" for owner in owners])
 
 
 def _wrapped(words: tuple[str, ...] | list[str]) -> list[str]:

@@ -56,7 +56,7 @@ class Products:
     default="abt",
     show_default=True,
     metavar="NAME",
-    help="abt: the robots solve it together; central: ACE decides all files merged into one model.",
+    help="abt: the robots solve it together; central: no robots, ACE decides all files merged into one model.",
 )
 @click.option(
     "--runtime",
@@ -84,7 +84,7 @@ class Products:
     "--timeout",
     type=click.FloatRange(0, min_open=True),
     metavar="SECONDS",
-    help="Give up after so long, the start of the processes included: verdict unknown, exit status 3.",
+    help="Give up after so long, compiling and the start of the processes included: verdict unknown, exit status 3.",
 )
 @click.option(
     "--withdraw",
@@ -97,7 +97,9 @@ class Products:
 )
 @click.option("--count", is_flag=True, help="With --protocol central: count all solutions.")
 @click.option(
-    "--verify", is_flag=True, help="Have a no-solution confirmed by ACE on all files merged: two ways must agree."
+    "--verify",
+    is_flag=True,
+    help="Have a no-solution confirmed by the central judge, on all files merged: two ways must agree.",
 )
 @local_options
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a team, and nothing else, on standard output.")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 
 from robochoc.expression import Undefined, evaluate
-from robochoc.problem import INFINITE, Assignment, Constraint, Relation, Semantics, Team, Variable
+from robochoc.problem import INFINITE, Assignment, Constraint, Relation, Robot, Semantics, Team, Variable
 
 PLACES = 20_000
 """Values to be tried for the variables of a robot that stepped aside."""
@@ -50,6 +50,14 @@ def could_join(team: Team, assignment: Assignment, withdrawn: Collection[str]) -
         own = [c for c in constraints if {*assignment, *names}.issuperset(c.variables) and set(names) & {*c.variables}]
         if _has_a_place(team[name].variables, assignment, own, [PLACES]):
             yield name
+
+
+def has_local_solution(robot: Robot) -> bool | None:
+    """Whether the private constraints leave `robot` a solution, by trying; None when `PLACES` tries were too few."""
+    tries = [PLACES]
+    if _has_a_place(robot.variables, {}, robot.private, tries):
+        return True
+    return False if tries[0] else None
 
 
 def _has_a_place(

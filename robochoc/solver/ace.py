@@ -62,11 +62,15 @@ class SolverTimeout(Exception):  # noqa: N818 - a limit that was reached
 
 @dataclass(frozen=True)
 class Answer:
-    """What ACE found: the number of solutions, whether there are no others, and (unless only counted) the solutions."""
+    """The number of solutions, whether there are no others, and (unless only counted) the solutions.
+
+    `asked` is false when propagation alone had the answer.
+    """
 
     found: int
     complete: bool
     solutions: tuple[Codes, ...]
+    asked: bool = True
 
 
 class AceProcess:
@@ -319,7 +323,7 @@ class _Question:
         total = found * math.prod(len(domain) for domain in self.free.values())
         wanted = total if self.limit is None else min(total, self.limit)
         whole = () if self.count_only else tuple(itertools.islice(self._combined(solutions), wanted))
-        return Answer(wanted, complete and wanted == total, whole)
+        return Answer(wanted, complete and wanted == total, whole, asked=not self.trivial)
 
     def _combined(self, solutions: Sequence[Codes]) -> Iterator[Codes]:
         order = sorted(range(len(self.places) + len(self.free)), key=[*self.places, *self.free].__getitem__)

@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import Self
 
 from robochoc.problem import Robot
-from robochoc.solver.ace import AceProcess, SolverLost, SolverTimeout
+from robochoc.solver.ace import AceProcess, Answer, SolverLost, SolverTimeout
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.domain import MOST_SOLUTIONS, CompiledDomain, TooManySolutions, compiled_domain
 from robochoc.solver.encoding import Codes, Network, Unsupported
@@ -39,9 +39,9 @@ class Source(StrEnum):
 class CompileTimeout(Exception):  # noqa: N818 - a limit that was reached
     """A robot's local problem took too long."""
 
-    def __init__(self, robot: str, limit_s: float) -> None:
+    def __init__(self, robot: str, limit_s: float, option: str = "--local-timeout") -> None:
         super().__init__(
-            f"{robot}'s private constraints were not solved within {limit_s:g} s; give it more time (--local-timeout),"
+            f"{robot}'s private constraints were not solved within {limit_s:g} s; give it more time ({option}),"
             " or give some of its variables to a robot of their own"
         )
         self.robot = robot
@@ -86,6 +86,7 @@ class Compiler:
         self._ace = solver or AceProcess()
         self._lent = solver is not None
         self._known: dict[Network, tuple[Codes, ...]] = {}
+        self._too_slow: set[Network] = set()
 
     def __enter__(self) -> Self:
         return self
@@ -118,33 +119,34 @@ class Compiler:
         return Compilation(robot.name, domain, costliest, time.monotonic() - began)
 
     def _solutions(self, robot: str, network: Network, limit: float) -> tuple[tuple[Codes, ...], Source]:
+        if network in self._too_slow:
+            raise CompileTimeout(robot, self._limits.time_s)
         known = self._known.get(network)
         source = Source.EQUAL
         if known is None and self._cache is not None:
             known = self._cache.get(network)
             source = Source.CACHE
         if known is None:
-            known = self._solved(robot, network, limit)
-            source = Source.ACE
-            if self._cache is not None:
+            answer = self._solved(robot, network, limit)
+            known, source = answer.solutions, Source.ACE if answer.asked else Source.DIRECT
+            if self._cache is not None and answer.complete:
                 self._cache.put(network, known)
+        self._known[network] = known
         if len(known) > self._limits.solutions:
             raise TooManySolutions(robot, self._limits.solutions)
-        self._known[network] = known
         return known, source
 
-    def _solved(self, robot: str, network: Network, limit: float) -> tuple[Codes, ...]:
+    def _solved(self, robot: str, network: Network, limit: float) -> Answer:
         deadline = limit if self._deadline is None else min(limit, self._deadline)
         try:
             answer = self._ace.solve(network, limit=self._limits.solutions + 1, strategy="static", deadline=deadline)
         except SolverTimeout as timeout:
             if self._deadline is not None and self._deadline <= limit:
                 raise
+            self._too_slow.add(network)
             raise CompileTimeout(robot, self._limits.time_s) from timeout
         except SolverLost as lost:
             raise CompileFailed(robot, str(lost)) from lost
-        if answer.found > self._limits.solutions:
-            raise TooManySolutions(robot, self._limits.solutions)
-        if not answer.complete:
+        if not answer.complete and answer.found <= self._limits.solutions:
             raise CompileFailed(robot, "the solver stopped before it had seen everything")
-        return answer.solutions
+        return answer

@@ -27,8 +27,8 @@ class TooManySolutions(Exception):  # noqa: N818 - a limit that was reached
 
     def __init__(self, robot: str, limit: int) -> None:
         super().__init__(
-            f"{robot} has more than {limit:,} local solutions; raise the limit (--local-solutions), constrain its"
-            " variables, or give some of them to a robot of their own"
+            f"{robot} has more than {limit:,} local solutions; raise the limit (--local-solutions), or constrain its"
+            " variables more"
         )
         self.robot = robot
 
