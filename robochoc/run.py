@@ -99,6 +99,10 @@ def solve(
     return outcome
 
 
+class _TimeOver(Exception):  # noqa: N818 - a limit that was reached
+    """The time for everything was over before the robots could start."""
+
+
 class _Run:
     """One team, one set of options, one time limit for all that has to be done."""
 
@@ -132,7 +136,7 @@ class _Run:
         _refuse(self._team, self._options.protocol, protocol)
         try:
             compiled = self._compile()
-        except (TooManySolutions, CompileTimeout) as limit:
+        except (TooManySolutions, CompileTimeout, _TimeOver) as limit:
             return replace(self._outcome, reason=str(limit), metrics=Metrics(compile_s=time.monotonic() - self._began))
         compile_s = time.monotonic() - self._began if any(c.source is not Source.DIRECT for c in compiled) else 0.0
         outcome = replace(self._outcome, metrics=Metrics(compile_s=compile_s))
@@ -198,7 +202,7 @@ class _Run:
                 try:
                     compiled.append(compiler.compile(robot))
                 except SolverTimeout:
-                    raise CompileTimeout(robot.name, self._options.timeout or 0, "--timeout") from None
+                    raise _TimeOver(f"the time (--timeout) was over while {robot.name} was compiled") from None
                 if not compiled[-1].domain.values and self._options.withdraw is None:
                     break
         return compiled

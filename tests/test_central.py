@@ -17,6 +17,7 @@ from problems import solutions
 from test_complex_teams import by_hand
 
 from robochoc.expression import Type, parse
+from robochoc.formats import PREDEFINED
 from robochoc.formats.xcsp3 import xcsp3
 from robochoc.generators.queens3d import queens3d
 from robochoc.outcome import Verdict
@@ -149,6 +150,34 @@ def test_the_papers_528_solutions_are_all_there(solver: AceProcess) -> None:
 @pytest.mark.parametrize("model", ["planar", "full"])
 def test_twelve_have_no_solution(model: str) -> None:
     assert Judge().judge(queens3d(12, model)).verdict is Verdict.NO_SOLUTION
+
+
+def test_small_permutations_with_a_value_missing_are_solved(solver: AceProcess) -> None:
+    """ACE 2.6 makes a table of such an allDifferent, and fails at the value that a variable lacks."""
+    chance = Random("permutations")
+    for _ in range(60):
+        size = chance.randint(3, 6)
+        values = tuple(range(size))
+        owned = {f"R{number}": [f"V{number}"] for number in range(size)}
+        domains = {
+            f"V{number}": sorted(chance.sample(values, chance.choice((2, size, size)))) for number in range(size)
+        }
+        differ = [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in itertools.combinations(domains, 2)]
+        team = complex_team(owned, domains, differ)
+        count = sum(len(set(row)) == size for row in itertools.product(*domains.values()))
+        assert Judge(solver=solver).judge(team, count=True).count == count
+
+
+def test_latin_rectangles_are_counted(solver: AceProcess) -> None:
+    for rows, columns, count in ((2, 3, 12), (3, 3, 12), (2, 4, 216), (4, 4, 576)):
+        cells = [f"V{row}.{column}" for row in range(1, rows + 1) for column in range(1, columns + 1)]
+        lines = [[c for c in cells if c.startswith(f"V{row}.")] for row in range(1, rows + 1)]
+        lines += [[c for c in cells if c.endswith(f".{column}")] for column in range(1, columns + 1)]
+        pairs = [pair for line in lines for pair in itertools.combinations(line, 2)]
+        differ = [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in pairs]
+        domains = {cell: range(1, columns + 1) for cell in cells}
+        team = complex_team({f"R{cell[1:]}": [cell] for cell in cells}, domains, differ)
+        assert Judge(solver=solver).judge(team, count=True).count == count
 
 
 def test_parts_that_share_nothing_are_multiplied(solver: AceProcess) -> None:

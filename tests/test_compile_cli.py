@@ -174,9 +174,10 @@ def test_compile_says_which_limit_a_robot_has_reached(rows: Path, limit: str) ->
     words, option = LIMITS[limit]
     done = robochoc("compile", *words, rows)
     assert done.returncode == 3
-    told = done.stderr.splitlines()
-    assert [line.startswith(f"{rows}: Robot{row}") for row, line in enumerate(told, 1)] == [True] * 7
-    assert all(option in line for line in told)
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"{rows}: Robot1")
+    assert line.endswith("(and 6 more: Robot2, Robot3, Robot4, Robot5, Robot6, Robot7)")
+    assert option in line
     assert [found[-1] for found in cells(done.stdout)] == ["limit reached"] * 7
     robots = answered("compile", *words, rows, status=3)["robots"]
     assert all(robot["local_solutions"] is None and option in robot["reason"] for robot in robots)

@@ -76,12 +76,16 @@ def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_js
     from robochoc.cli.compile_report import json_report, print_table
     from robochoc.cli.progress import progress_line
     from robochoc.communication.run_result import Progress
-    from robochoc.formats import read_team
+    from robochoc.formats import on_one_line, read_team
+    from robochoc.problem import Kind
     from robochoc.solver.compile import Compilation, Compiler, CompileTimeout
     from robochoc.solver.domain import TooManySolutions
+    from robochoc.solver.encoding import Unsupported
 
     began = time.monotonic()
     team = read_team(folder)
+    if team.kind is Kind.DISWCSP:
+        raise Unsupported(f"{team.name} is a DisWCSP; local problems with costs are not compiled yet")
     found: list[Compilation | TooManySolutions | CompileTimeout] = []
     with progress_line(team.name) as progress, Compiler(bounds, cache) as compiler:
         for number, robot in enumerate(team.robots, 1):
@@ -96,7 +100,10 @@ def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_js
         click.echo(json_report(team, found, time.monotonic() - began))
     else:
         print_table(team, found, time.monotonic() - began, folder)
-    unknown = [str(one) for one in found if not isinstance(one, Compilation)]
-    for reason in unknown:
-        click.echo(f"{folder}: {reason}", err=True)
-    return LIMIT if unknown else 0
+    limited = [one for one in found if not isinstance(one, Compilation)]
+    if not limited:
+        return 0
+    first, *others = limited
+    more = f" (and {len(others)} more: {', '.join(one.robot for one in others)})" if others else ""
+    click.echo(on_one_line(f"{folder}: {first}{more}"), err=True)
+    return LIMIT

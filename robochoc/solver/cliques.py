@@ -13,6 +13,7 @@ from dataclasses import replace
 from enum import StrEnum
 
 from robochoc.solver.encoding import Codes, Network, Table
+from robochoc.solver.propagation import is_small_permutation
 
 
 class Demand(StrEnum):
@@ -81,10 +82,10 @@ def strengthened(network: Network, solutions: Callable[[Network], tuple[Codes, .
             continue
         tight = len(clique) == len({code for place in clique for code in network.domains[place]})
         rows = solutions(_within(network, clique)) if tight and edges <= more else None
-        if rows is None:
-            different.append(clique)
-        else:
+        if rows is not None:
             compiled.append(Table(clique, allowed=True, rows=tuple(sorted(rows))))
+        elif not is_small_permutation(clique, network.domains):
+            different.append(clique)
     said = {pair for scope in different for pair in itertools.combinations(scope, 2)}
     covered = [set(table.scope) for table in compiled]
     kept = [

@@ -39,9 +39,9 @@ class Source(StrEnum):
 class CompileTimeout(Exception):  # noqa: N818 - a limit that was reached
     """A robot's local problem took too long."""
 
-    def __init__(self, robot: str, limit_s: float, option: str = "--local-timeout") -> None:
+    def __init__(self, robot: str, limit_s: float) -> None:
         super().__init__(
-            f"{robot}'s private constraints were not solved within {limit_s:g} s; give it more time ({option}),"
+            f"{robot}'s private constraints were not solved within {limit_s:g} s; give it more time (--local-timeout),"
             " or give some of its variables to a robot of their own"
         )
         self.robot = robot

@@ -1,8 +1,9 @@
 """Generalised arc consistency on tables: what is left is smaller, and safe for ACE to have.
 
-ACE 2.6 counts wrongly where a table of forbidden tuples meets a domain of one value, and fails an assertion where
-its own first filtering empties a table (`tests/test_ace.py` has both; docs/design.md, "ACE"). So it gets neither:
-values without support go, variables with one value leave their tables, tables that say nothing any more are dropped.
+ACE 2.6 counts wrongly where a table of forbidden tuples meets a domain of one value, fails an assertion where its own
+first filtering empties a table, and trips over small permutations (`tests/test_ace.py`; docs/design.md, "ACE"). So it
+gets none of these: values without support go, variables with one value leave their tables, tables that say nothing
+any more are dropped, and small permutations are spelt out.
 """
 
 from __future__ import annotations
@@ -13,6 +14,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from robochoc.solver.encoding import LONGEST_ALLOWED, Codes, Network, Table
+
+LARGEST_PERMUTATION = 5
+"""So many variables that share out as many values are a table (120 rows); ACE does so up to 4."""
 
 
 def propagated(network: Network) -> Network:
@@ -27,10 +31,14 @@ def propagated(network: Network) -> Network:
     domains = tuple(tuple(sorted(domain)) for domain in filtered.domains)
     left = [_without_fixed(table, domains) for table in filtered.tables]
     tables = [_allowing(table, domains) for table in left if not _says_nothing(table, domains)]
-    scopes = (tuple([place for place in scope if len(domains[place]) > 1]) for scope in network.different)
-    result = Network(domains, tuple(tables), tuple(scope for scope in scopes if len(scope) > 1))
-    # A table of forbidden tuples that has become one of allowed ones may have more to say.
-    return result if tables == left or all(table.allowed for table in filtered.tables) else propagated(result)
+    chosen = [tuple([place for place in scope if len(domains[place]) > 1]) for scope in network.different]
+    scopes = [scope for scope in chosen if len(scope) > 1]
+    spelt_out = [_spelt_out(scope, domains) for scope in scopes if is_small_permutation(scope, domains)]
+    kept = tuple(scope for scope in scopes if not is_small_permutation(scope, domains))
+    result = Network(domains, (*tables, *spelt_out), kept)
+    # A table that was made of something else may have more to say.
+    forbidding = sum(not table.allowed for table in filtered.tables)
+    return propagated(result) if spelt_out or forbidding > sum(not table.allowed for table in tables) else result
 
 
 class _Filter:
@@ -99,6 +107,20 @@ class _Filter:
             if not all(self.domains):
                 return False
         return True
+
+
+def is_small_permutation(scope: Codes, domains: Sequence[Codes]) -> bool:
+    """Whether variables that all differ are few, and need every value there is.
+
+    ACE makes a table of these itself, and fails where a variable lacks one of the values.
+    """
+    values = {code for place in scope for code in domains[place]}
+    return len(scope) == len(values) <= LARGEST_PERMUTATION
+
+
+def _spelt_out(scope: Codes, domains: Sequence[Codes]) -> Table:
+    rows = itertools.product(*(domains[place] for place in scope))
+    return Table(scope, allowed=True, rows=tuple(row for row in rows if len(set(row)) == len(row)))
 
 
 def _allowing(table: Table, domains: Sequence[Codes]) -> Table:
