@@ -84,6 +84,8 @@ def main() -> None:
             link.say(answer(task))
         except Exception as error:  # noqa: BLE001 - whatever it was, Java's included, the parent has to know
             link.say(Broken(f"{type(error).__name__}: {error}"))
+    # The parent has gone, which the thread sees too; but a thread ends with the program, half done or not.
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _end_with_the_parent(lifeline: int, folder: Path) -> None:
