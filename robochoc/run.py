@@ -133,7 +133,8 @@ class _Run:
     def distributed(self) -> Outcome:
         """The robots compile their domains, then the protocol runs; robots step aside if they are to."""
         protocol = protocol_named(self._options.protocol)
-        _refuse(self._team, self._options.protocol, protocol)
+        name = self._options.protocol
+        _refuse(self._team, name, costs=protocol.costs, partially_known=protocol.partially_known)
         try:
             compiled = self._compile()
         except (TooManySolutions, CompileTimeout, _TimeOver) as limit:
@@ -164,10 +165,7 @@ class _Run:
     def centrally(self, *, count: bool | None = None) -> Outcome:
         """One model of all files, decided by ACE."""
         count = self._options.count if count is None else count
-        if self._team.dynamic:
-            raise Unsupported(f"{self._team.name} has a scenario.xml; this version does not solve dynamic problems yet")
-        if self._team.kind is Kind.DISWCSP:
-            raise Unsupported(f"{self._team.name} is a DisWCSP, and {CENTRAL} does not minimise costs yet")
+        _refuse(self._team, CENTRAL, costs=False, partially_known=True)
         judge = Judge(self._cache, self._deadline, lambda: self._show("ACE decides the whole team"), self._solver)
         judgement = judge.judge(self._team, count=count)
         return replace(
@@ -252,13 +250,13 @@ def _schedule(options: Options) -> Schedule:
             assert_never(never)
 
 
-def _refuse(team: Team, name: str, protocol: type[Protocol]) -> None:
+def _refuse(team: Team, name: str, *, costs: bool, partially_known: bool) -> None:
     """Say in one sentence what the protocol, or this version, cannot take."""
     if team.dynamic:
         raise Unsupported(f"{team.name} has a scenario.xml; this version does not solve dynamic problems yet")
-    if team.kind is Kind.DISWCSP and not protocol.costs:
+    if team.kind is Kind.DISWCSP and not costs:
         raise Unsupported(f"{team.name} is a DisWCSP, and {name} does not minimise costs")
-    if not protocol.partially_known:
+    if not partially_known:
         for robot in team.robots:
             for constraint in robot.shared:
                 if constraint.model is Model.PKC:

@@ -23,7 +23,8 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.outcome import Verdict
 from robochoc.problem import Constraint, Predicate, Relation, Semantics, Team
 from robochoc.run import Options, Refuted, Runtime, solve
-from robochoc.solver.ace import AceProcess
+from robochoc.solver.ace import AceProcess, SolverLost
+from robochoc.solver.ace_words import Solved
 from robochoc.solver.central import Judge, Judgement
 from robochoc.solver.cliques import cliques, strengthened
 from robochoc.solver.encoding import Codes, Component, Network, Table
@@ -283,3 +284,11 @@ def negative_team() -> Team:
         Constraint("C2", product, ("X2", "Y1"), ("X2", "Y1")),
     ]
     return complex_team(owned, domains, constraints)
+
+
+def test_a_search_that_broke_off_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """ACE says so in one line of many; a broken-off search without solutions is no `no-solution`."""
+    monkeypatch.setattr(AceProcess, "_hear", lambda *_: Solved(found=0, complete=False, solutions=b""))
+    for options in ({"count": True}, {"count": False}):
+        with pytest.raises(SolverLost, match="stopped before"):
+            Judge().judge(queens3d(7), **options)

@@ -153,7 +153,10 @@ class AceProcess:
         return True
 
     def answer(self, deadline: float | None = None) -> Answer:
-        """The answer to the task in hand. Raises as `solve` does."""
+        """The answer to the task in hand. Raises as `solve` does.
+
+        An answer is complete, or has as many solutions as were asked for: a search that broke off proves nothing.
+        """
         question = self._question
         if question is None:
             raise ValueError("the solver has no task")
@@ -162,6 +165,8 @@ class AceProcess:
         word = self._hear(deadline)
         if not isinstance(word, Solved):
             raise SolverLost(f"the solver answered with a {type(word).__name__}")
+        if not word.complete and (question.limit is None or word.found < question.limit):
+            raise SolverLost("the constraint solver stopped before it had seen everything")
         numbers = array("i")
         numbers.frombytes(word.solutions)
         flat, width = numbers.tolist(), len(question.asked.domains)
