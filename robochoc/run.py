@@ -17,6 +17,7 @@ from robochoc.outcome import Metrics, Outcome, Verdict
 from robochoc.problem import Kind, Model, Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import Traits
 from robochoc.registry import protocol_named
 from robochoc.solver.ace import AceProcess, SolverTimeout
 from robochoc.solver.cache import SolutionCache
@@ -25,6 +26,7 @@ from robochoc.solver.compile import Compilation, Compiler, CompileTimeout, Limit
 from robochoc.solver.domain import CompiledDomain, TooManySolutions
 from robochoc.solver.encoding import Unsupported
 
+PAIR = 2
 CENTRAL = "central"
 """The protocol that is none: one model of all files, which ACE decides."""
 
@@ -134,7 +136,7 @@ class _Run:
         """The robots compile their domains, then the protocol runs; robots step aside if they are to."""
         protocol = protocol_named(self._options.protocol)
         name = self._options.protocol
-        _refuse(self._team, name, costs=protocol.costs, partially_known=protocol.partially_known)
+        _refuse(self._team, name, protocol.traits)
         try:
             compiled = self._compile()
         except (TooManySolutions, CompileTimeout, _TimeOver) as limit:
@@ -165,7 +167,7 @@ class _Run:
     def centrally(self, *, count: bool | None = None) -> Outcome:
         """One model of all files, decided by ACE."""
         count = self._options.count if count is None else count
-        _refuse(self._team, CENTRAL, costs=False, partially_known=True)
+        _refuse(self._team, CENTRAL, Traits(partially_known=True))
         judge = Judge(self._cache, self._deadline, lambda: self._show("ACE decides the whole team"), self._solver)
         judgement = judge.judge(self._team, count=count)
         return replace(
@@ -250,20 +252,24 @@ def _schedule(options: Options) -> Schedule:
             assert_never(never)
 
 
-def _refuse(team: Team, name: str, *, costs: bool, partially_known: bool) -> None:
+def _refuse(team: Team, name: str, traits: Traits) -> None:
     """Say in one sentence what the protocol, or this version, cannot take."""
     if team.dynamic:
         raise Unsupported(f"{team.name} has a scenario.xml; this version does not solve dynamic problems yet")
-    if team.kind is Kind.DISWCSP and not costs:
+    if team.kind is Kind.DISWCSP and not traits.costs:
         raise Unsupported(f"{team.name} is a DisWCSP, and {name} does not minimise costs")
-    if not partially_known:
-        for robot in team.robots:
-            for constraint in robot.shared:
-                if constraint.model is Model.PKC:
-                    raise Unsupported(
-                        f"{robot.name} shares a partially known constraint (PKC, {constraint.name}), which {name}"
-                        " does not support; where privacy allows it, state it as TKC in the child's file"
-                    )
+    for robot in team.robots:
+        for constraint in robot.shared:
+            if constraint.model is Model.PKC and not traits.partially_known:
+                raise Unsupported(
+                    f"{robot.name} shares a partially known constraint (PKC, {constraint.name}), which {name}"
+                    " does not support; where privacy allows it, state it as TKC in the child's file"
+                )
+            if not traits.n_ary and len({team.owner[variable] for variable in constraint.variables}) > PAIR:
+                raise Unsupported(
+                    f"{robot.name} holds a constraint over more than two robots ({constraint.name}), which {name}"
+                    " does not support; see 'robochoc protocols'"
+                )
 
 
 def _check(team: Team, assignment: dict[str, int], withdrawn: tuple[str, ...]) -> None:

@@ -65,7 +65,7 @@ def team_of(domains: Mapping[str, Sequence[int]], constraints: Iterable[Constrai
     return Team(name, robots)
 
 
-def random_team(chance: Random) -> Team:
+def random_team(chance: Random, *, n_ary: bool = True) -> Team:
     """A team of 2 to 7 robots; about as often satisfiable as not; negative and gapped domains, n-ary constraints."""
     size = chance.randint(2, 7)
     domains = {
@@ -77,7 +77,7 @@ def random_team(chance: Random) -> Team:
         for pair in itertools.combinations(domains, 2)
         if chance.random() < density
     ]
-    if size > 2:
+    if size > 2 and n_ary:
         triples = (chance.sample(sorted(domains), chance.choice((3, 3, min(4, size)))) for _ in range(2))
         constraints += [_random_table(chance, domains, scope, 0.35) for scope in triples if chance.random() < 0.4]
     constraints += [_random_table(chance, domains, (name,), 0.3) for name in domains if chance.random() < 0.15]

@@ -12,7 +12,8 @@ from robochoc.outcome import Verdict
 from robochoc.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.abt import ABT, AddLink, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.compiled import LocalProblem, interfaces
+from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.part import parts
 
 DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
 
@@ -31,7 +32,7 @@ def triangle(values: int = 2) -> Team:
 def agent(team: Team, name: str) -> ABT:
     """The protocol object of one robot, started, with nothing left to say."""
     order = PriorityOrder(team.order)
-    abt = ABT(LocalProblem(team[name], team.order, interfaces(team)), order)
+    abt = ABT(LocalProblem(parts(team)[name]), order)
     abt.start()
     abt.outbox.clear()
     return abt
@@ -54,7 +55,7 @@ def value(abt: ABT) -> Value | None:
 def test_start_takes_the_first_value_and_tells_it_to_lower_neighbours_only() -> None:
     team = triangle()
     order = PriorityOrder(team.order)
-    abt = ABT(LocalProblem(team["RB"], team.order, interfaces(team)), order)
+    abt = ABT(LocalProblem(parts(team)["RB"]), order)
     abt.start()
     assert abt.outbox == [("RC", Ok((1,)))]
 

@@ -7,16 +7,17 @@ from random import Random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from problems import random_team, solutions, teams
+from problems import random_team, solutions
 
 from robochoc.communication.run_result import RunResult
 from robochoc.observers.checker import objections
 from robochoc.outcome import Outcome, Verdict
 from robochoc.problem import Team
-from robochoc.registry import protocol_names
+from robochoc.registry import protocol_named, protocol_names
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 
-BATCHES, PER_BATCH = 10, 300
+PER_BATCH = 300
+BATCHES = [0, 1, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(2, 10))]
 EVERY_PROTOCOL = pytest.mark.parametrize("protocol", protocol_names())
 
 
@@ -28,6 +29,11 @@ def agrees(team: Team, options: Options) -> Verdict:
     assert outcome.verdict is expected, (team, options)
     assert outcome.verified is (truth is not None)
     return outcome.verdict
+
+
+def team_for(protocol: str, chance: Random) -> Team:
+    """A random team that the protocol can take."""
+    return random_team(chance, n_ary=protocol_named(protocol).traits.n_ary)
 
 
 def random_schedule(chance: Random) -> Options:
@@ -43,29 +49,29 @@ def random_schedule(chance: Random) -> Options:
 
 
 @EVERY_PROTOCOL
-@pytest.mark.parametrize("batch", range(BATCHES))
+@pytest.mark.parametrize("batch", BATCHES)
 def test_simulator_agrees_with_brute_force(protocol: str, batch: int) -> None:
     chance = Random(f"{protocol} {batch}")
     seen = {Verdict.SOLUTION: 0, Verdict.NO_SOLUTION: 0}
     for _ in range(PER_BATCH):
         options = random_schedule(chance)
-        seen[agrees(random_team(chance), Options(**{**vars(options), "protocol": protocol}))] += 1
+        seen[agrees(team_for(protocol, chance), Options(**{**vars(options), "protocol": protocol}))] += 1
     assert min(seen.values()) > PER_BATCH // 4, f"the problems are one-sided: {seen}"
 
 
 @EVERY_PROTOCOL
-@given(team=teams, chance=st.randoms(use_true_random=False))
-@settings(max_examples=150, deadline=None)
-def test_simulator_agrees_with_brute_force_and_shrinks(protocol: str, team: Team, chance: Random) -> None:
-    agrees(team, Options(**{**vars(random_schedule(chance)), "protocol": protocol}))
+@given(seed=st.integers(0, 2**32), chance=st.randoms(use_true_random=False))
+@settings(max_examples=100, deadline=None)
+def test_simulator_agrees_with_brute_force_and_shrinks(protocol: str, seed: int, chance: Random) -> None:
+    agrees(team_for(protocol, Random(seed)), Options(**{**vars(random_schedule(chance)), "protocol": protocol}))
 
 
 @EVERY_PROTOCOL
-@pytest.mark.parametrize("batch", range(4))
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 4))])
 def test_processes_agree_with_brute_force(protocol: str, batch: int) -> None:
     chance = Random(f"processes {protocol} {batch}")
     for _ in range(25):
-        agrees(random_team(chance), Options(protocol=protocol, timeout=60))
+        agrees(team_for(protocol, chance), Options(protocol=protocol, timeout=60))
 
 
 @pytest.mark.parametrize("runtime", list(Runtime))

@@ -12,7 +12,8 @@ from robochoc.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.abt import ABT, Nogood, Ok
 from robochoc.protocols.first_fit import Placed
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.compiled import LocalProblem, interfaces
+from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.part import parts
 
 DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2)))
 
@@ -24,7 +25,7 @@ def chain() -> Team:
 
 def host(name: str) -> Host:
     team = chain()
-    problem = LocalProblem(team[name], team.order, interfaces(team))
+    problem = LocalProblem(parts(team)[name])
     return Host(ABT(problem, PriorityOrder(team.order)))
 
 

@@ -8,13 +8,17 @@ runtime uses it, so the same run counts the same everywhere.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Self
 
 import msgspec
 
 from robochoc.message import Envelope, Message, encode
 from robochoc.observers.events import Concluded, Decided, Observer, Received, Sent, Settled
 from robochoc.outcome import Metrics, Verdict
+from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.part import Part
 
 
 class BadMessage(Exception):  # noqa: N818 - named for what arrived
@@ -23,6 +27,11 @@ class BadMessage(Exception):  # noqa: N818 - named for what arrived
 
 class Host:
     """Drives one robot's protocol object."""
+
+    @classmethod
+    def of(cls, protocol: type[Protocol], part: Part) -> Self:
+        """A host for the robot whose part of the problem is `part`. Raises `Unsupported` (see `LocalProblem`)."""
+        return cls(protocol(LocalProblem(part), PriorityOrder(part.order, part.links)))
 
     def __init__(self, protocol: Protocol) -> None:
         self.protocol = protocol

@@ -40,16 +40,16 @@ from robochoc.communication.control import (
 )
 from robochoc.communication.quiescence import Counts, FourCounters
 from robochoc.communication.robot_link import RobotLink, RobotsLost
-from robochoc.communication.robot_process import Part, robot_process
+from robochoc.communication.robot_process import robot_process
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.system import allow_descriptors, garbage_frozen, signals_held
 from robochoc.observers.events import AnyEvent, Lost, Observer, Registered
 from robochoc.outcome import Verdict
-from robochoc.problem import Robot, Team
+from robochoc.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.compiled import Interfaces, interfaces
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.encoding import Unsupported
+from robochoc.solver.part import Part, parts
 
 StartMethod = Literal["fork", "forkserver"]
 _CONTEXTS: dict[StartMethod, type[ForkContext | ForkServerContext]] = {
@@ -135,15 +135,16 @@ class ProcessesRun:
         robots = self._team.robots
         allow_descriptors(len(robots) * _FDS_PER_ROBOT + _FDS_SPARE)
         self._selector.register(self._ends.fileno(), selectors.EVENT_READ)
-        shown = interfaces(self._team)
+        traits = self._protocol.traits
+        given = parts(self._team, self._domains, everywhere=traits.everywhere, tree=traits.tree)
         with garbage_frozen():
-            for robot in robots:
+            for part in given.values():
                 if _over(deadline):
                     break
                 try:
                     # One by one, so that a signal waits for the start of one robot, and not of a large team.
                     with signals_held():
-                        self._start(robot, shown)
+                        self._start(part)
                 except OSError as error:
                     raise Unsupported(
                         f"the system lets only {len(self._robots)} of {len(robots)} robots have a process:"
@@ -151,15 +152,14 @@ class ProcessesRun:
                     ) from error
                 self._see_ends()
 
-    def _start(self, robot: Robot, shown: Interfaces) -> None:
+    def _start(self, part: Part) -> None:
         """Start one process. Signals are to wait until it has set its own handlers, and until it is known here."""
         ours, theirs = socket.socketpair()
         forked = self._context.get_start_method() == "fork"
         inherited = [other.control for other in self._robots.values()] + [ours] if forked else []
-        part = Part(robot, self._team.order, shown, self._domains.get(robot.name))
         process = self._context.Process(
             target=robot_process,
-            name=robot.name,
+            name=part.robot.name,
             args=(part, self._protocol, theirs, inherited),
             kwargs={"observed": self._observer is not None},
             daemon=True,
@@ -170,7 +170,7 @@ class ProcessesRun:
             except BaseException:
                 ours.close()
                 raise
-        link = self._robots[robot.name] = RobotLink(robot.name, process, ours)
+        link = self._robots[part.robot.name] = RobotLink(part.robot.name, process, ours)
         self._selector.register(link.control, selectors.EVENT_READ, link)
         self._ends.register(process.sentinel, selectors.EVENT_READ, link)
 

@@ -21,7 +21,7 @@ import traceback
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple, assert_never
+from typing import assert_never
 
 import msgspec
 
@@ -47,12 +47,9 @@ from robochoc.communication.queues import READ_BYTES, QueueReader, QueueWriter, 
 from robochoc.communication.system import own_memory
 from robochoc.message import Envelope
 from robochoc.observers.events import AnyEvent
-from robochoc.problem import Robot
-from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.compiled import Interfaces, LocalProblem
-from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.encoding import Unsupported
+from robochoc.solver.part import Part
 
 IDLE_S = 0.002
 """A robot that has heard nothing for so long reports its counters. Only when to ask; never whether it is over."""
@@ -63,18 +60,6 @@ _ROOM_FOR_FDS = socket.CMSG_SPACE(QUEUES_AT_ONCE * array.array("i").itemsize)
 _PR_SET_PDEATHSIG = 1
 _libc = ctypes.CDLL(None)
 """Loaded before the fork: once for all robots."""
-
-
-class Part(NamedTuple):
-    """A robot's part of the team's problem: its file, and what all robots know of each other.
-
-    `domain` is None when the robot can compile its domain without a solver.
-    """
-
-    robot: Robot
-    order: Sequence[str]
-    interfaces: Interfaces
-    domain: CompiledDomain | None
 
 
 def robot_process(
@@ -94,7 +79,7 @@ def robot_process(
     _take_place(part.robot.name, part.order)
     link = _ControlPipe(control)
     try:
-        host = Host(protocol(LocalProblem(*part), PriorityOrder(part.order)))
+        host = Host.of(protocol, part)
         _RobotLoop(host, link, observed=observed).run()
     except Unsupported as refusal:
         link.say(Failed(str(refusal), unsupported=True))

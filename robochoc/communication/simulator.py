@@ -16,10 +16,9 @@ from robochoc.message import Envelope
 from robochoc.observers.events import Observer
 from robochoc.outcome import Verdict
 from robochoc.problem import Team
-from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.compiled import LocalProblem, interfaces
 from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.part import parts
 
 PROGRESS_EVERY = 256
 """Packets between two reports of progress."""
@@ -42,9 +41,9 @@ class Simulation:
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
-        order, shown = PriorityOrder(team.order), interfaces(team)
-        problems = (LocalProblem(robot, team.order, shown, domains.get(robot.name)) for robot in team.robots)
-        self._hosts = {problem.agent: Host(protocol(problem, order)) for problem in problems}
+        traits = protocol.traits
+        given = parts(team, domains, everywhere=traits.everywhere, tree=traits.tree)
+        self._hosts = {name: Host.of(protocol, part) for name, part in given.items()}
         self._schedule = schedule
         self._progress = progress
         self._verdict: Verdict | None = None

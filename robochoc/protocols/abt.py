@@ -33,6 +33,7 @@ from robochoc.outcome import Verdict
 from robochoc.protocols.nogood import NogoodStore, contradicts, joined
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
 
 
@@ -57,6 +58,7 @@ class ABT(Protocol):
     """One agent of ABT. State: `view` (myAgentView), `store` (myNogoodStore), Gamma- and Gamma+."""
 
     messages = Ok | Nogood | AddLink
+    traits = Traits(paper="Yokoo et al. 1992; Bessiere et al. 2005", privacy="constraints of lower robots")
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

@@ -15,6 +15,7 @@ from typing import cast
 from robochoc.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
 
 
@@ -28,6 +29,7 @@ class FirstFit(Protocol):
     """One robot. `view` holds the values of the parents that fly, `awaited` the parents not yet heard."""
 
     messages = Placed
+    traits = Traits(paper="paper, Section 5.2", complete=False)
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

@@ -1,16 +1,20 @@
-"""The total priority order that ABT and its relatives are subject to (paper, Section 5.2)."""
+"""Orders of the robots: the total priority order, and pseudo-trees that go with it (paper, Section 5.2)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 
 class PriorityOrder:
-    """Names of all robots, the highest priority first. Static, and the same for every robot of a run."""
+    """Names of all robots, the highest priority first. Static, and the same for every robot of a run.
 
-    def __init__(self, names: Sequence[str]) -> None:
+    `tree` is the pseudo-tree that the order induces; None unless the protocol asked for it (`Traits.tree`).
+    """
+
+    def __init__(self, names: Sequence[str], links: Mapping[str, Iterable[str]] | None = None) -> None:
         self.names = tuple(names)
         self.rank = {name: rank for rank, name in enumerate(self.names)}
+        self.tree = None if links is None else PseudoTree.induced(self.names, links)
 
     def lowest(self, names: Iterable[str]) -> str:
         """The lowest-priority robot of `names`. Raises `ValueError` when there is none."""
@@ -19,3 +23,54 @@ class PriorityOrder:
     def depth(self, names: Iterable[str]) -> int:
         """How far down the lowest robot of `names` stands; -1 when there is none."""
         return max((self.rank[name] for name in names), default=-1)
+
+
+class PseudoTree:
+    """A forest in which robots that share a constraint stand one above the other.
+
+    It is the one that a total order induces (the elimination tree; Dechter, "Constraint Processing", 2003, Section
+    4.5): a robot's tree parent is the lowest robot above it that it, or somebody below it in the tree, has to agree
+    with. Priority decreases from the roots to the leaves. `parents` maps each robot to its tree parent (None: a root).
+    """
+
+    def __init__(self, order: Sequence[str], parents: Mapping[str, str | None]) -> None:
+        self.parents = dict(parents)
+        self.children: dict[str, list[str]] = {name: [] for name in order}
+        for name in order:
+            parent = self.parents[name]
+            if parent is not None:
+                self.children[parent].append(name)
+
+    @classmethod
+    def induced(cls, order: Sequence[str], links: Mapping[str, Iterable[str]]) -> PseudoTree:
+        """The tree induced by `order`, where `links` maps each robot to those above it that it has to agree with."""
+        rank = {name: place for place, name in enumerate(order)}
+        above = {name: set(links[name]) for name in order}
+        parents: dict[str, str | None] = {}
+        for name in reversed(order):
+            parent = max(above[name], key=rank.__getitem__, default=None)
+            parents[name] = parent
+            if parent is not None:
+                above[parent] |= above[name] - {parent}
+        return cls(order, parents)
+
+    @property
+    def roots(self) -> list[str]:
+        """One for each part of the team that has nothing to do with the others."""
+        return [name for name, parent in self.parents.items() if parent is None]
+
+    def ancestors(self, name: str) -> list[str]:
+        """Those above `name`, from its parent to its root."""
+        above = []
+        parent = self.parents[name]
+        while parent is not None:
+            above.append(parent)
+            parent = self.parents[parent]
+        return above
+
+    def descendants(self, name: str) -> list[str]:
+        """All those below `name`, each after its tree parent."""
+        below = list(self.children[name])
+        for child in below:
+            below.extend(self.children[child])
+        return below

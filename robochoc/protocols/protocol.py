@@ -13,19 +13,19 @@ from typing import Any, ClassVar
 from robochoc.message import Message
 from robochoc.outcome import Verdict
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
 
 
 class Protocol(ABC):
     """One robot's side of a protocol.
 
-    Subclasses declare `messages`, the union of the message types that they receive, and what they can take:
-    `partially_known` (PKC) constraints, and `costs` (a DisWCSP).
+    Subclasses declare `messages`, the union of the message types that they receive, and their `traits`: what they
+    are and what they can take. Their module's docstring is what `robochoc protocols NAME` shows.
     """
 
     messages: ClassVar[Any]
-    partially_known: ClassVar[bool] = False
-    costs: ClassVar[bool] = False
+    traits: ClassVar[Traits] = Traits()
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         self.problem = problem

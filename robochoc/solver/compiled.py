@@ -15,9 +15,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from robochoc.message import Value
-from robochoc.problem import Robot, Team
-from robochoc.solver.domain import CompiledDomain, compiled_domain
-from robochoc.solver.shared import Conflict, OwnValues, SharedConstraint, in_order_of_lowest
+from robochoc.solver.domain import compiled_domain
+from robochoc.solver.part import Part, held
+from robochoc.solver.shared import Conflict, Others, OwnValues, SharedConstraint, in_order_of_lowest
 
 if TYPE_CHECKING:
     from robochoc.solver.conflict_table import ConflictTable
@@ -25,33 +25,36 @@ if TYPE_CHECKING:
 LARGE = 64
 """From so many values on, conflicts are looked up for all of them at once, in numpy."""
 
-Interfaces = Mapping[str, tuple[str, ...]]
-"""The variables that each robot shows to its neighbours, by the robot's name."""
-
 
 class LocalProblem:
     """What one robot knows: its compiled domain, its neighbours, and the constraints it has to check.
 
     `values[i]` is the i-th value as neighbours see it; `solution(i)` are the own variables' values behind it.
-    `parents` and `children` are in priority order. `checks` counts constraint checks so far. Raises `Unsupported`
-    when the robot has private constraints among its variables and comes without its compiled `domain`.
+    `parents` and `children` are the links that the files name, `neighbours` are they and all others in a constraint
+    that this robot knows; each in priority order. `checks` counts constraint checks so far. Raises `Unsupported`
+    when the robot has private constraints among its variables and comes without its compiled domain.
     """
 
-    def __init__(
-        self, robot: Robot, order: Sequence[str], interfaces: Interfaces, domain: CompiledDomain | None = None
-    ) -> None:
-        rank = {name: place for place, name in enumerate(order)}
+    def __init__(self, part: Part) -> None:
+        robot = part.robot
+        rank = {name: place for place, name in enumerate(part.order)}
         self.agent = robot.name
         self.parents = tuple(sorted((parent.name for parent in robot.parents), key=rank.__getitem__))
         self.children = tuple(sorted((child.name for child in robot.children), key=rank.__getitem__))
-        self._domain = compiled_domain(robot) if domain is None else domain
+        self._domain = compiled_domain(robot) if part.domain is None else part.domain
         self.values: tuple[Value, ...] = self._domain.values
         self.checks = 0
         own = OwnValues(robot.interface, self._domain.values)
-        shared = (SharedConstraint(constraint, robot, rank, interfaces) for constraint in robot.shared)
+        owners = {name: agent for agent, names in part.interfaces.items() for name in names if agent != self.agent}
+        shared = [
+            SharedConstraint(key, constraint, owners, rank, part.interfaces)
+            for key, constraint in (*held(robot), *part.copies)
+        ]
         self._constraints = in_order_of_lowest(shared, rank)
         for constraint in self._constraints:
             constraint.compile(own)
+        met = {agent for constraint in shared for agent in constraint.agents}
+        self.neighbours = tuple(sorted({*self.parents, *self.children, *met}, key=rank.__getitem__))
         self._table: ConflictTable | None = self._looked_up() if len(self.values) >= LARGE else None
 
     def solution(self, index: int) -> dict[str, int]:
@@ -65,18 +68,19 @@ class LocalProblem:
         lowest robot, the highest first, so the first conflict is also the one with the highest possible lowest
         variable. Of each robot only what the constraint looks at is named (`None` elsewhere).
         """
-        if self._table is not None:
-            checks, conflict = self._table.look(index, view)
-            self.checks += checks
-            return conflict
-        for constraint in self._constraints:
-            others = constraint.others(view)
-            if others is None:
-                continue
-            self.checks += 1
-            if not constraint.mask(others) >> index & 1:
-                return constraint.conflict(others)
-        return None
+        broken = self._broken(index, view)
+        return None if broken is None else broken[0].conflict(broken[1])
+
+    def explained(self, index: int, view: Mapping[str, Value]) -> tuple[Conflict, str] | None:
+        """Like `conflict`, with the key of the constraint that is broken."""
+        broken = self._broken(index, view)
+        return None if broken is None else (broken[0].conflict(broken[1]), broken[0].key)
+
+    def violated(self, index: int, view: Mapping[str, Value]) -> int:
+        """How many constraints `values[index]` breaks, of those whose other variables are all known in `view`."""
+        known = [(c, others) for c in self._constraints if (others := c.others(view)) is not None]
+        self.checks += len(known)
+        return sum(not constraint.mask(others) >> index & 1 for constraint, others in known)
 
     def alike(self, value: Value) -> Sequence[int]:
         """The places of all own values that agree with `value` wherever that is not None.
@@ -88,12 +92,22 @@ class LocalProblem:
         wanted = [(place, part) for place, part in enumerate(value) if part is not None]
         return [index for index, own in enumerate(self.values) if all(own[place] == part for place, part in wanted)]
 
+    def _broken(self, index: int, view: Mapping[str, Value]) -> tuple[SharedConstraint, Others] | None:
+        """The first constraint that `values[index]` breaks, and what it sees in `view`."""
+        if self._table is not None:
+            checks, broken = self._table.look(index, view)
+            self.checks += checks
+            return broken
+        for constraint in self._constraints:
+            others = constraint.others(view)
+            if others is None:
+                continue
+            self.checks += 1
+            if not constraint.mask(others) >> index & 1:
+                return constraint, others
+        return None
+
     def _looked_up(self) -> ConflictTable:
         from robochoc.solver.conflict_table import ConflictTable  # noqa: PLC0415 - numpy is for large domains only
 
         return ConflictTable(self._constraints, len(self.values))
-
-
-def interfaces(team: Team) -> dict[str, tuple[str, ...]]:
-    """What every robot of `team` shows to its neighbours."""
-    return {robot.name: robot.interface for robot in team.robots}

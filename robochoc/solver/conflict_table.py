@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.message import Value
-from robochoc.solver.shared import Conflict, Others, SharedConstraint
+from robochoc.solver.shared import Others, SharedConstraint
 
 REMEMBERED = 512
 """Values of a neighbour, for each group of constraints, whose conflicts are kept."""
@@ -48,17 +48,14 @@ class ConflictTable:
         self._view: dict[str, Value] | None = None
         self._last = _Look([], [], [])
 
-    def look(self, index: int, view: Mapping[str, Value]) -> tuple[int, Conflict | None]:
-        """How many constraints are checked for the value at `index`, and the conflict with `view`, if any."""
+    def look(self, index: int, view: Mapping[str, Value]) -> tuple[int, tuple[SharedConstraint, Others] | None]:
+        """How many constraints are checked for the value at `index`, and which one it breaks in `view`, if any."""
         if view != self._view:
             self._view = dict(view)
             self._last = self._look(view)
         checks, broken, constraints = self._last
         place = broken[index]
-        if place < 0:
-            return checks[index], None
-        constraint, others = constraints[place]
-        return checks[index], constraint.conflict(others)
+        return checks[index], None if place < 0 else constraints[place]
 
     def _look(self, view: Mapping[str, Value]) -> _Look:
         checks = np.zeros(self._size, np.int32)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Mapping, Sequence
 
 from robochoc.message import Value
-from robochoc.problem import Constraint, Robot
+from robochoc.problem import Constraint
 from robochoc.solver.encoding import holds_on
 
 Conflict = Mapping[str, Value]
@@ -44,17 +44,25 @@ class OwnValues:
 class SharedConstraint:
     """A constraint on the own compiled variable and those of `agents` (in priority order).
 
+    `owners` maps others' variables to who owns them, `known` each robot to its interface; `key` is the constraint's
+    name in explanations.
+
     After `compile` it answers which own values go with what the others say. Made at the first look, then kept:
     there is one answer for each combination of the others' variables that the constraint looks at, however many
     values their owners have.
     """
 
     def __init__(
-        self, constraint: Constraint, robot: Robot, rank: Mapping[str, int], known: Mapping[str, tuple[str, ...]]
+        self,
+        key: str,
+        constraint: Constraint,
+        owners: Mapping[str, str],
+        rank: Mapping[str, int],
+        known: Mapping[str, tuple[str, ...]],
     ) -> None:
+        self.key = key
         scope = set(constraint.variables)
-        above = (parent.name for parent in robot.parents if scope.intersection(known[parent.name]))
-        self.agents = tuple(sorted(above, key=rank.__getitem__))
+        self.agents = tuple(sorted({owners[name] for name in scope if name in owners}, key=rank.__getitem__))
         self._constraint = constraint
         self._scope = scope
         self._seen = [

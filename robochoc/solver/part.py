@@ -1,0 +1,86 @@
+"""A robot's part of the team's problem: its own file, and what all robots know of each other.
+
+This is all that reaches a robot, be it an object in the simulator or a process of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple
+
+from robochoc.problem import Constraint, Domain, Model, Robot, Team
+from robochoc.solver.domain import CompiledDomain
+
+Interfaces = Mapping[str, tuple[str, ...]]
+"""The variables that each robot shows to its neighbours, by the robot's name."""
+
+Links = Mapping[str, tuple[str, ...]]
+"""The parents of each robot."""
+
+
+class Known(NamedTuple):
+    """A shared constraint, and its name in explanations: unique but for those that can only go together."""
+
+    key: str
+    constraint: Constraint
+
+
+class Part(NamedTuple):
+    """What one robot knows when the search begins.
+
+    `order`, `interfaces` and the declared `domains` of interface variables are common knowledge. `domain` is None
+    when the robot can compile its domain without a solver. `copies` are the totally known constraints over its
+    variables that lower robots hold, for protocols in which all robots of a scope have to know them. `links` is
+    for protocols that work on a pseudo-tree.
+    """
+
+    robot: Robot
+    order: Sequence[str]
+    interfaces: Interfaces
+    domain: CompiledDomain | None = None
+    copies: tuple[Known, ...] = ()
+    domains: Mapping[str, Domain] = MappingProxyType({})
+    links: Links | None = None
+
+
+def parts(
+    team: Team,
+    domains: Mapping[str, CompiledDomain] = MappingProxyType({}),
+    *,
+    everywhere: bool = False,
+    tree: bool = False,
+) -> dict[str, Part]:
+    """Each robot's part of `team`, in priority order.
+
+    `everywhere`: every robot of a constraint's scope knows it. `tree`: all know who is whose parent.
+    """
+    shown = {robot.name: robot.interface for robot in team.robots}
+    known = {name: team.variables[name].domain for names in shown.values() for name in names}
+    links = {robot.name: tuple(parent.name for parent in robot.parents) for robot in team.robots} if tree else None
+    copies: dict[str, list[Known]] = {robot.name: [] for robot in team.robots}
+    if everywhere:
+        for robot in team.robots:
+            for one in held(robot):
+                for owner in {team.owner[name] for name in one.constraint.variables} - {robot.name}:
+                    if one.constraint.model is not Model.PKC:
+                        copies[owner].append(one)
+    return {
+        robot.name: Part(robot, team.order, shown, domains.get(robot.name), tuple(copies[robot.name]), known, links)
+        for robot in team.robots
+    }
+
+
+def held(robot: Robot) -> Iterator[Known]:
+    """The constraints that `robot` holds towards its parents.
+
+    Constraints of one name with one parent share a key: a scenario that removes one of them removes all.
+    """
+    for parent in robot.parents:
+        for constraint in parent.constraints:
+            yield Known(constraint_key(robot.name, parent.name, constraint.name), constraint)
+
+
+def constraint_key(agent: str, parent: str, name: str) -> str:
+    """What a constraint that `agent` holds towards `parent` is called in explanations."""
+    return f"{agent}<{parent}:{name}"
