@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from problems import team_of
@@ -11,12 +10,13 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.observers.journal import Header, Recorder
 from robochoc.problem import Constraint, Relation, Semantics, Team
 from robochoc.registry import protocol_named, protocol_names
+from robochoc.registry import protocol_named, protocol_names
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 
 FOLDER = Path(__file__).parent / "golden"
 
 
-def odd_team() -> Team:
+def odd_team(*, n_ary: bool = True) -> Team:
     """Four robots, a ternary constraint among them: A + B + C is even, and neighbours differ."""
     rows = tuple((a, b, c) for a in (1, 2, 3) for b in (1, 2, 3) for c in (1, 2, 3) if (a + b + c) % 2 == 0)
     even = Relation("even", 3, Semantics.SUPPORTS, rows)
@@ -24,14 +24,15 @@ def odd_team() -> Team:
     pairs = (("A", "B"), ("B", "C"), ("A", "C"), ("C", "D"))
     constraints = [Constraint("C", differ, pair, pair) for pair in pairs]
     scope = ("A", "B", "C")
-    return team_of(dict.fromkeys("ABCD", (1, 2, 3)), [*constraints, Constraint("E", even, scope, scope)], "odd")
+    if n_ary:
+        constraints.append(Constraint("E", even, scope, scope))
+    return team_of(dict.fromkeys("ABCD", (1, 2, 3)), constraints, "odd")
 
 
-TEAMS: dict[str, Callable[[], Team]] = {
-    "queens3d-2": lambda: queens3d(2),
-    "queens3d-3-full": lambda: queens3d(3, "full"),
-    "odd": odd_team,
-}
+def fixed_teams(protocol: str) -> dict[str, Team]:
+    """Three small teams, by name; without the ternary constraint for a protocol that cannot take it."""
+    odd = odd_team(n_ary=protocol_named(protocol).traits.n_ary)
+    return {"queens3d-2": queens3d(2), "queens3d-3-full": queens3d(3, "full"), "odd": odd}
 
 
 def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
@@ -42,19 +43,24 @@ def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
     return recorder.content()
 
 
-def journals(protocol: str) -> dict[str, bytes]:
-    """All golden journals of a protocol, by file name."""
+def files() -> dict[str, tuple[str, str, ScheduleName]]:
+    """All golden journals: the protocol, the team and the schedule, by file name."""
     return {
-        f"{protocol}-{name}-{schedule}.jsonl": journal(make(), protocol, schedule)
-        for name, make in TEAMS.items()
-        if name != "odd" or protocol_named(protocol).traits.n_ary
+        f"{protocol}-{team}-{schedule}.jsonl": (protocol, team, schedule)
+        for protocol in protocol_names()
+        for team in fixed_teams(protocol)
         for schedule in ScheduleName
     }
 
 
+def content(file: str) -> bytes:
+    """What the journal called `file` should be."""
+    protocol, team, schedule = files()[file]
+    return journal(fixed_teams(protocol)[team], protocol, schedule)
+
+
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
-    for protocol in protocol_names():
-        for file, content in journals(protocol).items():
-            (FOLDER / file).write_bytes(content)
-            print(FOLDER / file)  # noqa: T201 - a script's output
+    for file in files():
+        (FOLDER / file).write_bytes(content(file))
+        print(FOLDER / file)  # noqa: T201 - a script's output
