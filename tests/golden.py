@@ -10,7 +10,6 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.observers.journal import Header, Recorder
 from robochoc.problem import Constraint, Relation, Semantics, Team
 from robochoc.registry import protocol_named, protocol_names
-from robochoc.registry import protocol_named, protocol_names
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 
 FOLDER = Path(__file__).parent / "golden"

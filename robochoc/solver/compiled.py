@@ -11,6 +11,7 @@ the domain is compiled, and are not counted; nor are look-ups of nogoods.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -53,6 +54,7 @@ class LocalProblem:
         self._constraints = in_order_of_lowest(shared, rank)
         for constraint in self._constraints:
             constraint.compile(own)
+        self._depths = [rank[constraint.agents[-1]] if constraint.agents else -1 for constraint in self._constraints]
         met = {agent for constraint in shared for agent in constraint.agents}
         self.neighbours = tuple(sorted({*self.parents, *self.children, *met}, key=rank.__getitem__))
         self._table: ConflictTable | None = self._looked_up() if len(self.values) >= LARGE else None
@@ -61,19 +63,20 @@ class LocalProblem:
         """Values of all own variables when the compiled variable takes `values[index]`."""
         return dict(zip(self._domain.variables, self._domain.solutions[index], strict=True))
 
-    def conflict(self, index: int, view: Mapping[str, Value]) -> Conflict | None:
+    def conflict(self, index: int, view: Mapping[str, Value], since: int = 0) -> Conflict | None:
         """Why `values[index]` is against `view`: what the first constraint that it breaks sees, or None.
 
-        Constraints whose other variables are not all known in `view` are passed over. The order is that of their
+        Constraints whose other variables are not all known in `view` are passed over, and so are those whose lowest
+        robot stands higher in the order than place `since`: who asks knows that they hold. The order is that of their
         lowest robot, the highest first, so the first conflict is also the one with the highest possible lowest
         variable. Of each robot only what the constraint looks at is named (`None` elsewhere).
         """
-        broken = self._broken(index, view)
+        broken = self._broken(index, view, since)
         return None if broken is None else broken[0].conflict(broken[1])
 
-    def explained(self, index: int, view: Mapping[str, Value]) -> tuple[Conflict, str] | None:
+    def explained(self, index: int, view: Mapping[str, Value], since: int = 0) -> tuple[Conflict, str] | None:
         """Like `conflict`, with the key of the constraint that is broken."""
-        broken = self._broken(index, view)
+        broken = self._broken(index, view, since)
         return None if broken is None else (broken[0].conflict(broken[1]), broken[0].key)
 
     def violated(self, index: int, view: Mapping[str, Value]) -> int:
@@ -92,13 +95,14 @@ class LocalProblem:
         wanted = [(place, part) for place, part in enumerate(value) if part is not None]
         return [index for index, own in enumerate(self.values) if all(own[place] == part for place, part in wanted)]
 
-    def _broken(self, index: int, view: Mapping[str, Value]) -> tuple[SharedConstraint, Others] | None:
+    def _broken(self, index: int, view: Mapping[str, Value], since: int) -> tuple[SharedConstraint, Others] | None:
         """The first constraint that `values[index]` breaks, and what it sees in `view`."""
         if self._table is not None:
-            checks, broken = self._table.look(index, view)
+            checks, broken = self._table.look(index, view, bisect_left(self._depths, since))
             self.checks += checks
             return broken
-        for constraint in self._constraints:
+        for place in range(bisect_left(self._depths, since), len(self._constraints)):
+            constraint = self._constraints[place]
             others = constraint.others(view)
             if others is None:
                 continue

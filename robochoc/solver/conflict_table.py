@@ -44,24 +44,31 @@ class ConflictTable:
 
     def __init__(self, constraints: Sequence[SharedConstraint], size: int) -> None:
         self._size = size
-        self._groups = [_Group(list(group)) for _, group in itertools.groupby(constraints, key=lambda c: c.agents)]
-        self._view: dict[str, Value] | None = None
+        grouped = [list(group) for _, group in itertools.groupby(constraints, key=lambda c: c.agents)]
+        self._groups = [_Group(group) for group in grouped]
+        self._firsts = list(itertools.accumulate((len(group) for group in grouped), initial=0))
+        self._view: tuple[dict[str, Value], int] | None = None
         self._last = _Look([], [], [])
 
-    def look(self, index: int, view: Mapping[str, Value]) -> tuple[int, tuple[SharedConstraint, Others] | None]:
-        """How many constraints are checked for the value at `index`, and which one it breaks in `view`, if any."""
-        if view != self._view:
-            self._view = dict(view)
-            self._last = self._look(view)
+    def look(
+        self, index: int, view: Mapping[str, Value], first: int = 0
+    ) -> tuple[int, tuple[SharedConstraint, Others] | None]:
+        """How many constraints are checked for the value at `index`, and which one it breaks in `view`, if any.
+
+        Constraints before the one numbered `first`, which begins a group, are left out.
+        """
+        if (view, first) != self._view:
+            self._view = dict(view), first
+            self._last = self._look(view, self._firsts.index(first))
         checks, broken, constraints = self._last
         place = broken[index]
         return checks[index], None if place < 0 else constraints[place]
 
-    def _look(self, view: Mapping[str, Value]) -> _Look:
+    def _look(self, view: Mapping[str, Value], begin: int) -> _Look:
         checks = np.zeros(self._size, np.int32)
         broken = np.full(self._size, -1, np.int32)
         constraints: list[tuple[SharedConstraint, Others]] = []
-        for group in self._groups:
+        for group in self._groups[begin:]:
             first, known = group.broken(view)
             open_still = broken < 0
             checks += np.where(open_still, np.minimum(first + 1, len(known)), 0)
