@@ -10,7 +10,8 @@ import sys
 import time
 from typing import cast
 
-from robochoc.communication.processes import ProcessesRun, StartMethod
+from robochoc.communication.crew import StartMethod
+from robochoc.communication.processes import ProcessesRun
 from robochoc.generators.queens3d import queens3d
 from robochoc.message import Message
 from robochoc.observers.events import AnyEvent, Registered

@@ -48,8 +48,27 @@ class Metrics:
 
 
 @dataclass(frozen=True)
+class Epoch:
+    """One epoch of a problem that changes over time, or whose robots were lost.
+
+    `robots` are those of the team then, in the files' order; `lost` names those whose loss ended the epoch.
+    """
+
+    verdict: Verdict
+    robots: tuple[str, ...]
+    assignment: dict[str, int] = field(default_factory=dict)
+    metrics: Metrics = field(default_factory=Metrics)
+    verified: bool = False
+    witness: str | None = None
+    lost: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Outcome:
-    """One team, one run. `assignment` maps every variable of the robots that fly to its value."""
+    """One team, one run. `assignment` maps every variable of the robots that fly to its value.
+
+    Where there were several epochs, the verdict is the last one's, and the metrics are their sums.
+    """
 
     team: str
     protocol: str
@@ -67,3 +86,5 @@ class Outcome:
     """Why, where that is not plain: a robot whose local problem has no solution, or the limit that was reached."""
     count: int | None = None
     """The number of solutions, where it was asked for."""
+    epochs: tuple[Epoch, ...] = ()
+    """What happened in each epoch; empty where there was but one, as nothing changed."""

@@ -220,13 +220,75 @@ class Robot:
 
 
 @dataclass(frozen=True)
+class RemoveAgent:
+    """The robot leaves, with its variables and every constraint it shares."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class AddAgent:
+    """A robot comes, with the lowest priority: it names parents only."""
+
+    robot: Robot
+
+
+@dataclass(frozen=True)
+class RemoveValue:
+    """A variable loses a value of its domain."""
+
+    variable: str
+    value: int
+
+
+@dataclass(frozen=True)
+class AddValue:
+    """A variable's domain gains a value."""
+
+    variable: str
+    value: int
+
+
+@dataclass(frozen=True)
+class AddConstraint:
+    """`agent` shares another constraint with `parent` from now on."""
+
+    agent: str
+    parent: str
+    constraint: Constraint
+
+
+@dataclass(frozen=True)
+class RemoveConstraint:
+    """All constraints called `name` that `agent` shares with `parent` go."""
+
+    agent: str
+    parent: str
+    name: str
+
+
+Change = RemoveAgent | AddAgent | RemoveValue | AddValue | AddConstraint | RemoveConstraint
+
+
+@dataclass(frozen=True)
+class Event:
+    """Changes that happen together, one after the other; they open an epoch.
+
+    `after` so many messages of the epoch before (None, or if there are not so many: once that is solved).
+    """
+
+    changes: tuple[Change, ...]
+    after: int | None = None
+
+
+@dataclass(frozen=True)
 class Team:
     """Robots that belong together, in priority order (the highest first)."""
 
     name: str
     robots: tuple[Robot, ...]
-    dynamic: bool = False
-    """Whether a scenario changes the problem over time (a DDisCSP)."""
+    scenario: tuple[Event, ...] = ()
+    """How the problem changes over time: then it is a DDisCSP, and this its function delta."""
 
     @cached_property
     def _by_name(self) -> dict[str, Robot]:
@@ -234,6 +296,18 @@ class Team:
 
     def __getitem__(self, name: str) -> Robot:
         return self._by_name[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._by_name
+
+    def get(self, name: str) -> Robot | None:
+        """The robot called `name`, if it is in the team."""
+        return self._by_name.get(name)
+
+    @property
+    def dynamic(self) -> bool:
+        """Whether a scenario changes the problem over time."""
+        return bool(self.scenario)
 
     @property
     def kind(self) -> Kind:

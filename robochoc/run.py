@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from enum import StrEnum
+from dataclasses import replace
 from typing import TypedDict, assert_never
 
-from robochoc.communication.run_result import Progress, RunResult
+from msgspec import UNSET
+
+from robochoc.change import changed
+from robochoc.communication.robot_link import RobotsLost
+from robochoc.communication.run_result import Progress
 from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.session import Session
 from robochoc.communication.simulator import Simulation
+from robochoc.epochs import Journey, Played
 from robochoc.observers.checker import cost, could_join, has_local_solution, objections
 from robochoc.observers.events import Began, Observer
-from robochoc.outcome import Metrics, Outcome, Verdict
+from robochoc.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
+from robochoc.orders import CannotTurn, Order, order_of
+from robochoc.outcome import Epoch, Metrics, Outcome, Verdict
 from robochoc.problem import Kind, Model, Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
@@ -22,59 +29,17 @@ from robochoc.registry import protocol_named
 from robochoc.solver.ace import AceProcess, SolverTimeout
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.central import Judge
-from robochoc.solver.compile import Compilation, Compiler, CompileTimeout, Limits, Source
+from robochoc.solver.compile import Compiler, CompileTimeout, Source
 from robochoc.solver.domain import CompiledDomain, TooManySolutions
 from robochoc.solver.encoding import Unsupported
 
+__all__ = ["CENTRAL", "OnLoss", "Options", "Refuted", "Runtime", "ScheduleName", "Withdrawal", "solve"]
+
 PAIR = 2
-CENTRAL = "central"
-"""The protocol that is none: one model of all files, which ACE decides."""
-
-
-class Runtime(StrEnum):
-    """Where robots live: each in its own OS process, or all in one thread."""
-
-    PROCESSES = "processes"
-    SIMULATOR = "simulator"
-
-
-class ScheduleName(StrEnum):
-    """How the simulator orders events: by time counted in checks, or any channel next."""
-
-    CONCURRENT = "concurrent"
-    RANDOM = "random"
-
-
-class Withdrawal(StrEnum):
-    """Who steps aside when the whole team has no solution: whoever finds no place, in priority order."""
-
-    MAXIMAL = "maximal"
 
 
 class Refuted(Exception):  # noqa: N818 - named for what happened to the claim
     """The checker refutes what the protocol claims: a fault of the protocol, or ours."""
-
-
-@dataclass(frozen=True)
-class Options:
-    """How to run. `timeout` is in seconds of wall-clock time; `seed`, `schedule` and `delay` are the simulator's.
-
-    `delay` is the longest a message takes, in constraint checks. `local` limits the compilation of each robot's
-    domain; `cache` says whether solutions of local problems are kept in the user's cache folder. `count` is for the
-    central judge: the number of all solutions. `verify` asks for a second opinion on a `no-solution`.
-    """
-
-    protocol: str = "abt"
-    runtime: Runtime = Runtime.PROCESSES
-    seed: int = 0
-    timeout: float | None = None
-    withdraw: Withdrawal | None = None
-    schedule: ScheduleName = ScheduleName.CONCURRENT
-    delay: int = 0
-    local: Limits = field(default_factory=Limits)
-    cache: bool = True
-    count: bool = False
-    verify: bool = False
 
 
 def solve(
@@ -85,20 +50,17 @@ def solve(
     progress: Callable[[Progress], None] | None = None,
     solver: AceProcess | None = None,
 ) -> Outcome:
-    """Let `team` solve its problem, and hold its answer against every constraint.
+    """Let `team` solve its problem, epoch by epoch if it changes, and hold each answer against every constraint.
 
     Who solves many teams may lend a `solver` that stays warm between them. When a limit is reached, the verdict is
     `unknown`. Raises `UnknownProtocol`, `Unsupported`, `RobotsLost` (processes), `CompileFailed` and `SolverLost`
     (the constraint solver), `SolverMissing`, and `Refuted` when a second opinion does not agree.
     """
-    run = _Run(team, options, observer, progress, solver)
-    outcome = run.centrally() if options.protocol == CENTRAL else run.distributed()
-    if outcome.verdict is Verdict.SOLUTION and outcome.count is None:
-        _check(team, outcome.assignment, outcome.withdrawn)
-        return replace(outcome, cost=cost(team, outcome.assignment), verified=True)
-    if options.verify and outcome.verdict is Verdict.NO_SOLUTION and options.protocol != CENTRAL:
-        return run.second_opinion(outcome)
-    return outcome
+    try:
+        run = _Run(team, options, observer, progress, solver)
+        return run.centrally() if options.protocol == CENTRAL else run.distributed()
+    except CannotTurn as refused:
+        raise Unsupported(str(refused)) from None
 
 
 class _TimeOver(Exception):  # noqa: N818 - a limit that was reached
@@ -124,6 +86,8 @@ class _Run:
         self._began = time.monotonic()
         self._deadline = None if options.timeout is None else self._began + options.timeout
         self._cache = SolutionCache() if options.cache else None
+        self._compile_s = 0.0
+        self._epochs: list[Epoch] = []
         self._outcome = Outcome(
             team=team.name,
             protocol=options.protocol,
@@ -134,90 +98,178 @@ class _Run:
 
     def distributed(self) -> Outcome:
         """The robots compile their domains, then the protocol runs; robots step aside if they are to."""
-        protocol = protocol_named(self._options.protocol)
-        name = self._options.protocol
-        _refuse(self._team, name, protocol.traits)
+        options = self._options
+        protocol = protocol_named(options.protocol)
+        _refuse(self._team, options, protocol.traits)
+        names = order_of(self._team, options.order, options.seed) if isinstance(options.order, Order) else options.order
+        journey = Journey(self._team, names, self._domains, self._left_s, options.spares)
         try:
-            compiled = self._compile()
+            return self._travel(journey, protocol)
         except (TooManySolutions, CompileTimeout, _TimeOver) as limit:
-            return replace(self._outcome, reason=str(limit), metrics=Metrics(compile_s=time.monotonic() - self._began))
-        compile_s = time.monotonic() - self._began if any(c.source is not Source.DIRECT for c in compiled) else 0.0
-        outcome = replace(self._outcome, metrics=Metrics(compile_s=compile_s))
-        domains = {one.robot: one.domain for one in compiled}
+            return replace(self._summary(), verdict=Verdict.UNKNOWN, assignment={}, verified=False, reason=str(limit))
+
+    def _travel(self, journey: Journey, protocol: type[Protocol]) -> Outcome:
+        """All epochs; then those step aside who find no place, if they are to."""
+        domains = self._domains(journey.team)
         alone = next((name for name, domain in domains.items() if not domain.values), None)
-        if alone is None:
-            outcome = _after(outcome, self._play(protocol, domains))
+        if alone is None or self._team.dynamic:
+            lost = self._play(journey, protocol, domains)
+            if lost:
+                raise RobotsLost(lost)
+            outcome = replace(self._summary(), withdrawn=tuple(journey.withdrawn))
         else:
-            outcome = replace(
-                outcome,
-                verdict=Verdict.NO_SOLUTION,
-                witness=alone,
-                reason=f"{alone} alone has none: its private constraints leave it no local solution",
-            )
+            reason = f"{alone} alone has none: its private constraints leave it no local solution"
+            verified = self._options.verify and self._confirmed(journey.team, alone)
+            epoch = Epoch(Verdict.NO_SOLUTION, journey.team.order, verified=verified, witness=alone)
+            outcome = replace(self._told(epoch), reason=reason)
+        if journey.regrets:
+            outcome = replace(outcome, reason="; ".join(journey.regrets))
         if outcome.verdict is Verdict.NO_SOLUTION and self._options.withdraw is Withdrawal.MAXIMAL:
-            outcome = self._withdrawn(outcome, self._play(FirstFit, domains))
+            outcome = self._placed(outcome, journey)
         return outcome
 
-    def _withdrawn(self, outcome: Outcome, result: RunResult) -> Outcome:
-        placed = replace(_after(outcome, result), witness=outcome.witness)
+    def _play(
+        self, journey: Journey, protocol: type[Protocol], domains: Mapping[str, CompiledDomain]
+    ) -> Mapping[str, str]:
+        """Play all epochs; returns the robots that are lost, if nobody is left."""
+        lost: Mapping[str, str] = {}
+        with self._session(protocol, journey.arranged(), domains) as session:
+            for played in journey.go(session, lambda number: self._announce(protocol, number)):
+                self._epochs.append(self._epoch(played))
+                lost = played.result.lost
+        return lost
+
+    def _placed(self, outcome: Outcome, journey: Journey) -> Outcome:
+        """Who finds a place among those that are left, in priority order; the others step aside."""
+        team = journey.arranged()
+        self._announce(FirstFit, 0)
+        with self._session(FirstFit, team, self._domains(team)) as session:
+            result = session.search(self._left_s())
+        if result.lost:
+            raise RobotsLost(result.lost)
+        placed = replace(outcome, verdict=result.verdict, metrics=outcome.metrics + result.metrics, verified=False)
         if result.verdict is not Verdict.SOLUTION:
             return placed
-        return replace(placed, withdrawn=tuple(name for name in self._team.order if not result.assignments[name]))
+        aside = tuple(name for name in team.order if not result.assignments[name])
+        assignment = _joined(result.assignments)
+        _check(journey.team, assignment, aside)
+        withdrawn = (*journey.withdrawn, *aside)
+        paid = cost(journey.team, assignment)
+        return replace(placed, assignment=assignment, withdrawn=withdrawn, cost=paid, verified=True)
 
-    def centrally(self, *, count: bool | None = None) -> Outcome:
-        """One model of all files, decided by ACE."""
-        count = self._options.count if count is None else count
-        _refuse(self._team, CENTRAL, Traits(partially_known=True))
-        judge = Judge(self._cache, self._deadline, lambda: self._show("ACE decides the whole team"), self._solver)
-        judgement = judge.judge(self._team, count=count)
+    # Epochs
+
+    def _epoch(self, played: Played) -> Epoch:
+        """What an epoch has come to, held against every constraint, or against the judge if that is asked for."""
+        team, result = played
+        epoch = Epoch(
+            verdict=result.verdict,
+            robots=team.order,
+            metrics=result.metrics,
+            witness=result.witness,
+            lost=tuple(result.lost),
+        )
+        if result.verdict is Verdict.SOLUTION:
+            assignment = _joined(result.assignments)
+            _check(team, assignment, ())
+            return replace(epoch, assignment=assignment, verified=True)
+        if result.verdict is Verdict.NO_SOLUTION and self._options.verify:
+            return replace(epoch, verified=self._confirmed(team, None))
+        return epoch
+
+    def _told(self, epoch: Epoch) -> Outcome:
+        """The outcome of a run that ended with `epoch`."""
+        solved = epoch.verdict is Verdict.SOLUTION
         return replace(
             self._outcome,
-            runtime=CENTRAL,
-            verdict=judgement.verdict,
-            assignment=judgement.assignment,
-            count=judgement.count,
-            verified=False,
-            metrics=Metrics(wall_s=time.monotonic() - self._began),
+            verdict=epoch.verdict,
+            assignment=epoch.assignment,
+            cost=0 if solved else None,
+            witness=epoch.witness,
+            verified=epoch.verified,
+            metrics=replace(epoch.metrics, compile_s=self._compile_s),
         )
 
-    def second_opinion(self, outcome: Outcome) -> Outcome:
+    def _summary(self) -> Outcome:
+        """The last epoch's verdict, with what all of them cost."""
+        if not self._epochs:
+            return replace(self._outcome, metrics=Metrics(compile_s=self._compile_s))
+        total = sum((epoch.metrics for epoch in self._epochs), Metrics())
+        several = len(self._epochs) > 1 or self._team.dynamic
+        outcome = self._told(replace(self._epochs[-1], metrics=total))
+        return replace(outcome, epochs=tuple(self._epochs) if several else ())
+
+    def centrally(self) -> Outcome:
+        """One model of all files, decided by ACE; if the problem changes over time, one for each epoch."""
+        _refuse(self._team, self._options, Traits(partially_known=True))
+        self._outcome = replace(self._outcome, runtime=CENTRAL)
+        team = replace(self._team, scenario=())
+        count = None
+        for event in (None, *self._team.scenario):
+            team = changed(team, event.changes) if event else team
+            began = time.monotonic()
+            judgement = self._judge().judge(team, count=self._options.count)
+            spent = Metrics(wall_s=time.monotonic() - began)
+            count = judgement.count
+            checked = judgement.verdict is Verdict.SOLUTION and count is None
+            if checked:
+                _check(team, judgement.assignment, ())
+            self._epochs.append(Epoch(judgement.verdict, team.order, judgement.assignment, spent, verified=checked))
+        return replace(self._summary(), count=count, cost=None if count is not None else self._summary().cost)
+
+    def _confirmed(self, team: Team, alone: str | None) -> bool:
         """Let the central judge decide what the robots have found to have no solution.
 
-        A robot that had none alone is looked at by the checker as well, as judge and compiler share their encoding.
+        A robot that had none `alone` is looked at by the checker as well, as judge and compiler share their encoding.
         Raises `Refuted` when one of them finds a solution.
         """
-        opinion = self.centrally(count=False)
-        alone = [robot for robot in self._team.robots if robot.name == outcome.witness and outcome.reason]
-        if opinion.verdict is Verdict.SOLUTION or any(has_local_solution(robot) for robot in alone):
-            raise Refuted(f"{outcome.protocol} says that {self._team.name} has no solution, and a judge has found one")
-        return replace(outcome, verified=opinion.verdict is Verdict.NO_SOLUTION)
+        opinion = self._judge().judge(team, count=False)
+        if opinion.verdict is Verdict.SOLUTION or (alone is not None and has_local_solution(team[alone])):
+            name = self._options.protocol
+            raise Refuted(f"{name} says that {team.name} has no solution, and a judge has found one")
+        return opinion.verdict is Verdict.NO_SOLUTION
 
-    def _compile(self) -> list[Compilation]:
-        """All robots' domains; up to the first that is empty, if that decides the matter."""
-        compiled = []
-        robots = self._team.robots
+    def _judge(self) -> Judge:
+        return Judge(self._cache, self._deadline, lambda: self._show("ACE decides the whole team"), self._solver)
+
+    # What an epoch needs
+
+    def _domains(self, team: Team) -> dict[str, CompiledDomain]:
+        """All robots' compiled domains; up to the first that is empty, if that decides the matter."""
+        began = time.monotonic()
+        domains = {}
+        solved = False
         with Compiler(self._options.local, self._cache, self._deadline, self._solver) as compiler:
-            for number, robot in enumerate(robots, 1):
-                self._show(f"compiling {robot.name} ({number} of {len(robots)})")
+            for number, robot in enumerate(team.robots, 1):
+                self._show(f"compiling {robot.name} ({number} of {len(team.robots)})")
                 try:
-                    compiled.append(compiler.compile(robot))
+                    compilation = compiler.compile(robot)
                 except SolverTimeout:
                     raise _TimeOver(f"the time (--timeout) was over while {robot.name} was compiled") from None
-                if not compiled[-1].domain.values and self._options.withdraw is None:
+                solved = solved or compilation.source is not Source.DIRECT
+                domains[robot.name] = compilation.domain
+                if not compilation.domain.values and self._options.withdraw is None and not self._team.dynamic:
                     break
-        return compiled
+        if solved:
+            self._compile_s += time.monotonic() - began
+        return domains
 
-    def _play(self, protocol: type[Protocol], domains: Mapping[str, CompiledDomain]) -> RunResult:
-        """One run of `protocol`, in the runtime asked for."""
-        left = None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
-        if self._observer:
-            self._observer(Began(t=0, protocol=protocol.__name__))
+    def _session(self, protocol: type[Protocol], team: Team, domains: Mapping[str, CompiledDomain]) -> Session:
+        """`protocol` in the runtime asked for."""
         watchers: _Watchers = {"observer": self._observer, "progress": self._progress}
         if self._options.runtime is Runtime.PROCESSES:
             from robochoc.communication.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
 
-            return ProcessesRun(self._team, protocol, domains=domains, **watchers).run(left)
-        return Simulation(self._team, protocol, _schedule(self._options), domains=domains, **watchers).run(left)
+            survive = self._options.on_loss is OnLoss.WITHDRAW
+            return ProcessesRun(team, protocol, domains=domains, survive=survive, **watchers)
+        return Simulation(team, protocol, _schedule(self._options), domains=domains, **watchers)
+
+    def _announce(self, protocol: type[Protocol], number: int) -> None:
+        if self._observer:
+            self._observer(Began(t=0, protocol=protocol.__name__, epoch=number or UNSET))
+
+    def _left_s(self) -> float | None:
+        return None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
 
     def _show(self, stage: str) -> None:
         if self._progress:
@@ -229,17 +281,8 @@ class _Watchers(TypedDict):
     progress: Callable[[Progress], None] | None
 
 
-def _after(outcome: Outcome, result: RunResult) -> Outcome:
-    """`outcome`, with what a run has come to; a solution's values are of all robots that have one."""
-    found = result.verdict is Verdict.SOLUTION
-    assignment = {name: value for own in result.assignments.values() for name, value in own.items()} if found else {}
-    return replace(
-        outcome,
-        verdict=result.verdict,
-        witness=result.witness,
-        metrics=outcome.metrics + result.metrics,
-        assignment=assignment,
-    )
+def _joined(assignments: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
+    return {name: value for own in assignments.values() for name, value in own.items()}
 
 
 def _schedule(options: Options) -> Schedule:
@@ -252,10 +295,12 @@ def _schedule(options: Options) -> Schedule:
             assert_never(never)
 
 
-def _refuse(team: Team, name: str, traits: Traits) -> None:
+def _refuse(team: Team, options: Options, traits: Traits) -> None:
     """Say in one sentence what the protocol, or this version, cannot take."""
-    if team.dynamic:
-        raise Unsupported(f"{team.name} has a scenario.xml; this version does not solve dynamic problems yet")
+    name = options.protocol
+    if team.dynamic and (options.withdraw or options.count):
+        what = "withdrawal" if options.withdraw else "count"
+        raise Unsupported(f"{team.name} has a scenario.xml: a {what} is for problems that do not change")
     if team.kind is Kind.DISWCSP and not traits.costs:
         raise Unsupported(f"{team.name} is a DisWCSP, and {name} does not minimise costs")
     for robot in team.robots:

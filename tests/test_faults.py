@@ -34,7 +34,7 @@ from faulty_protocols import (
     TalksNonsense,
 )
 
-from robochoc.communication import processes
+from robochoc.communication import crew, processes
 from robochoc.communication.processes import ProcessesRun
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.formats import write_team
@@ -284,7 +284,7 @@ def test_a_robot_ended_by_another_signal(signum: int, team: Path, tmp_path: Path
 def test_a_stopped_robot_does_not_outlive_the_time_limit(team: Path, tmp_path: Path) -> None:
     with running(solving(team, timeout_s=2), tmp_path / "run") as run:
         run.strike(signal.SIGSTOP, run.wait_for_robots(len(NAMES))[30])
-        assert run.end() < 2 + processes.LATE_WORDS_S + processes.FAREWELL_S + GONE_WITHIN_S
+        assert run.end() < 2 + processes.LATE_WORDS_S + crew.FAREWELL_S + GONE_WITHIN_S
         assert run.status() in {3, 4}
         nothing_is_left(run)
 

@@ -1,8 +1,8 @@
 """What the parent and a robot's process say to each other over their control pipe.
 
 The parent is the paper's master: it waits for the confirmation of all robots before it orders the start, opens
-queues between robots that want to talk, finds out when all is quiet, and stops the run. It carries no protocol
-message.
+queues between robots that want to talk, finds out when all is quiet, and ends each epoch. It carries no protocol
+message. When it closes the pipe, the robot ends.
 """
 
 from __future__ import annotations
@@ -20,10 +20,16 @@ class _Control(msgspec.Struct, frozen=True, tag=True, array_like=True):
     pass
 
 
+class OfEpoch(_Control, frozen=True):
+    """Words that say nothing once their epoch is over."""
+
+    epoch: int
+
+
 # From a robot to the parent
 
 
-class Ready(_Control, frozen=True):
+class Ready(OfEpoch, frozen=True):
     """I am there, with my problem compiled."""
 
 
@@ -33,16 +39,16 @@ class OpenQueues(_Control, frozen=True):
     receivers: list[str]
 
 
-class Counters(_Control, frozen=True):
-    """My protocol messages, `sent` and `received`; in answer to wave `wave`, or (0) because I have gone idle."""
+class Counters(OfEpoch, frozen=True):
+    """My protocol messages of this epoch, `sent` and `received`; in answer to wave `wave`, or (0) as I am idle."""
 
     wave: int
     sent: int
     received: int
 
 
-class Conclusion(_Control, frozen=True):
-    """I alone can tell how the search ends."""
+class Conclusion(OfEpoch, frozen=True):
+    """I alone can tell how the search ends; before `Ready`: a verdict stands in spite of the changes."""
 
     verdict: str
 
@@ -53,8 +59,8 @@ class Events(_Control, frozen=True):
     events: list[AnyEvent]
 
 
-class Report(_Control, frozen=True):
-    """My last words: values of my variables, and what I have counted."""
+class Report(OfEpoch, frozen=True):
+    """What this epoch has come to: values of my variables, and what I have counted."""
 
     assignment: dict[str, int]
     metrics: Metrics
@@ -70,10 +76,29 @@ class Failed(_Control, frozen=True):
 # From the parent to a robot
 
 
-class Start(_Control, frozen=True):
-    """All robots are there: begin the search. `began` is the run's beginning, on the monotonic clock."""
+class Begin(_Control, frozen=True):
+    """All robots are there: search. `began` is the run's beginning, on the monotonic clock.
+
+    `quiet`: no message of the epoch before was lost.
+    """
 
     began: float
+    quiet: bool
+
+
+class Pause(_Control, frozen=True):
+    """This epoch's search is over: be silent, and report."""
+
+
+class Change(_Control, frozen=True):
+    """A new epoch. `change` holds the robot's `Part` and what is `Void`, pickled: from the parent to its own child.
+
+    Robots in `gone` have left; if there are others of their names, queues to and from them are to be opened anew.
+    """
+
+    epoch: int
+    change: bytes
+    gone: list[str]
 
 
 class QueuesTo(_Control, frozen=True):
@@ -94,9 +119,5 @@ class Wave(_Control, frozen=True):
     number: int
 
 
-class Stop(_Control, frozen=True):
-    """The run is over: report and end."""
-
-
 FromRobot = Ready | OpenQueues | Counters | Conclusion | Events | Report | Failed
-FromParent = Start | QueuesTo | QueueFrom | Wave | Stop
+FromParent = Begin | Pause | Change | QueuesTo | QueueFrom | Wave

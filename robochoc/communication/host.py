@@ -16,8 +16,9 @@ from robochoc.message import Envelope, Message, encode
 from robochoc.observers.events import Concluded, Decided, Observer, Received, Sent, Settled
 from robochoc.outcome import Metrics, Verdict
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.explanation import Void
 from robochoc.solver.part import Part
 
 
@@ -39,6 +40,7 @@ class Host:
         self.clock = 0
         self.sent: dict[str, int] = {}
         self.bytes = 0
+        self._begun = False
         self._decoder = msgspec.msgpack.Decoder(protocol.messages)
         self._checks = 0
         self._reported: tuple[int | None, Verdict | None] = (None, None)
@@ -50,9 +52,32 @@ class Host:
         self._observer = observer
         self._now = now
 
-    def start(self) -> list[Envelope]:
-        """Begin the search; returns what the robot says first."""
-        return self._step(self.protocol.start)
+    def start(self, *, quiet: bool = True) -> list[Envelope]:
+        """Begin the search, or go on with it after a change; returns what the robot says first.
+
+        `quiet` says whether no message of the epoch before was lost.
+        """
+        protocol = self.protocol
+        if self._begun and isinstance(protocol, DynamicProtocol):
+            return self._step(lambda: protocol.resume(quiet=quiet))
+        self._begun = True
+        return self._step(protocol.start)
+
+    def change(self, part: Part, void: Void) -> None:
+        """A new epoch: the problem has changed to `part`, and counting begins again.
+
+        A protocol that can goes on with what it knows; any other is begun anew. Raises `Unsupported`.
+        """
+        problem, order = LocalProblem(part), PriorityOrder(part.order, part.links)
+        if isinstance(self.protocol, DynamicProtocol):
+            self.protocol.change(problem, order, void)
+            self.protocol.outbox.clear()
+        else:
+            self.protocol = type(self.protocol)(problem, order)
+            self._begun = False
+        self.clock = self.bytes = self._checks = 0
+        self.sent = {}
+        self._reported = (None, None)
 
     def handle(self, packet: Sequence[Envelope]) -> list[Envelope]:
         """Take in all waiting messages, let the protocol settle, and return what it says.

@@ -40,6 +40,8 @@ class RobotLink:
         self.process = process
         self.control = control
         self.report: Report | None = None
+        self.ended = False
+        """Whether its process is known to have ended."""
         self._reader = QueueReader(control.fileno())
         self._decoder = msgspec.msgpack.Decoder(FromRobot)
         self._encoder = msgspec.msgpack.Encoder()

@@ -11,6 +11,7 @@ import array
 import ctypes
 import multiprocessing
 import os
+import pickle
 import selectors
 import signal
 import socket
@@ -21,12 +22,14 @@ import traceback
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import assert_never
+from typing import NamedTuple, assert_never
 
 import msgspec
 
 from robochoc.communication.control import (
     QUEUES_AT_ONCE,
+    Begin,
+    Change,
     Conclusion,
     Counters,
     Events,
@@ -34,12 +37,11 @@ from robochoc.communication.control import (
     FromParent,
     FromRobot,
     OpenQueues,
+    Pause,
     QueueFrom,
     QueuesTo,
     Ready,
     Report,
-    Start,
-    Stop,
     Wave,
 )
 from robochoc.communication.host import Host
@@ -55,17 +57,24 @@ IDLE_S = 0.002
 """A robot that has heard nothing for so long reports its counters. Only when to ask; never whether it is over."""
 LOWEST_NICE = 19
 EVENTS_AT_ONCE = 500
-_CLOCK = struct.Struct("!Q")
+_STAMP = struct.Struct("!IQ")
 _ROOM_FOR_FDS = socket.CMSG_SPACE(QUEUES_AT_ONCE * array.array("i").itemsize)
 _PR_SET_PDEATHSIG = 1
 _libc = ctypes.CDLL(None)
 """Loaded before the fork: once for all robots."""
 
 
-def robot_process(
-    part: Part, protocol: type[Protocol], control: socket.socket, inherited: Sequence[socket.socket], *, observed: bool
-) -> None:
-    """What a robot's process runs, from its first breath to its report.
+class Beginning(NamedTuple):
+    """With what a robot begins: its part of the problem, the protocol, the epoch, and whether it is observed."""
+
+    part: Part
+    protocol: type[Protocol]
+    epoch: int
+    observed: bool
+
+
+def robot_process(begin: Beginning, control: socket.socket, inherited: Sequence[socket.socket]) -> None:
+    """What a robot's process runs, from its first breath to its last.
 
     `inherited` are the parent's ends of control pipes that a fork copied: closed here, so that the others see the
     end of the parent. Ctrl-C reaches the whole process group, and is left to the parent.
@@ -76,11 +85,11 @@ def robot_process(
     _end_with_the_parent()
     for copy in inherited:
         copy.close()
-    _take_place(part.robot.name, part.order)
+    _take_place(begin.part.robot.name, begin.part.order)
     link = _ControlPipe(control)
     try:
-        host = Host.of(protocol, part)
-        _RobotLoop(host, link, observed=observed).run()
+        host = Host.of(begin.protocol, begin.part)
+        _RobotLoop(host, link, begin.epoch, observed=begin.observed).run()
     except Unsupported as refusal:
         link.say(Failed(str(refusal), unsupported=True))
     except Exception as error:  # noqa: BLE001 - whatever it was, the parent has to know
@@ -163,20 +172,26 @@ class _ControlPipe:
 
 
 class _RobotLoop:
-    """The loop of one robot's process."""
+    """The loop of one robot's process.
 
-    def __init__(self, host: Host, link: _ControlPipe, *, observed: bool) -> None:
+    Every message is stamped with its epoch. What comes from an epoch that is over is lost; what comes before this
+    robot has been told to begin waits.
+    """
+
+    def __init__(self, host: Host, link: _ControlPipe, epoch: int, *, observed: bool) -> None:
         self._host = host
         self._link = link
+        self._epoch = epoch
         self._began = 0.0
         self._events: list[AnyEvent] = []
         if observed:
             host.observe(self._events.append, self._now)
-        self._readers: list[tuple[str, QueueReader]] = []
+        self._readers: dict[str, QueueReader] = {}
         self._writers: dict[str, QueueWriter] = {}
+        self._early: list[Envelope] = []
         self._sent = self._received = 0
         self._told: tuple[int, int] | None = None
-        self._concluded = False
+        self._searching = self._concluded = self._paused = False
         self._running = True
         self._selector = selectors.DefaultSelector()
         self._selector.register(link, selectors.EVENT_READ, self._hear_parent)
@@ -185,8 +200,8 @@ class _RobotLoop:
             self._selector.register(parent.sentinel, selectors.EVENT_READ, self._parent_gone)
 
     def run(self) -> None:
-        """Confirm, then wait and act until the parent says stop or is gone."""
-        self._say(Ready())
+        """Confirm, then wait and act until the parent hangs up or is gone."""
+        self._say_ready()
         while self._running:
             ready = self._selector.select(self._patience())
             if not ready:
@@ -195,20 +210,25 @@ class _RobotLoop:
             packet: list[Envelope] = []
             for key, _ in ready:
                 key.data(packet)
-            if packet:
-                self._received += len(packet)
-                self._send(self._host.handle(packet))
+            self._take_in(packet)
             if len(self._events) > EVENTS_AT_ONCE:
                 self._report_events()
 
     def _patience(self) -> float | None:
         """Seconds to wait: for ever, once the parent knows the counters."""
-        return None if self._told in (None, (self._sent, self._received)) else IDLE_S
+        return IDLE_S if self._searching and self._told != (self._sent, self._received) else None
 
     def _now(self) -> float:
         return time.monotonic() - self._began
 
     # Messages
+
+    def _take_in(self, packet: list[Envelope]) -> None:
+        if not self._searching:
+            self._early += packet
+        elif packet:
+            self._received += len(packet)
+            self._send(self._host.handle(packet))
 
     def _send(self, envelopes: Sequence[Envelope]) -> None:
         touched = {}
@@ -218,17 +238,20 @@ class _RobotLoop:
             if writer is None:
                 writer = self._writers[envelope.receiver] = QueueWriter()
                 strangers.append(envelope.receiver)
-            writer.put(_CLOCK.pack(envelope.clock) + envelope.content)
+            writer.put(_STAMP.pack(self._epoch, envelope.clock) + envelope.content)
             touched[envelope.receiver] = writer
         self._sent += len(envelopes)
         for start in range(0, len(strangers), QUEUES_AT_ONCE):
             self._say(OpenQueues(strangers[start : start + QUEUES_AT_ONCE]))
         for writer in touched.values():
             self._flush(writer)
+        self._conclude()
+
+    def _conclude(self) -> None:
         verdict = self._host.protocol.verdict
         if verdict is not None and not self._concluded:
             self._concluded = True
-            self._say(Conclusion(verdict))
+            self._say(Conclusion(self._epoch, verdict))
 
     def _flush(self, writer: QueueWriter) -> None:
         if writer.flush() or writer.fd is None:
@@ -242,11 +265,11 @@ class _RobotLoop:
 
     def _read(self, sender: str, reader: QueueReader, packet: list[Envelope]) -> None:
         for body in reader.get():
-            (clock,) = _CLOCK.unpack_from(body)
-            packet.append(Envelope(sender, self._host.name, body[_CLOCK.size :], clock))
+            epoch, clock = _STAMP.unpack_from(body)
+            if epoch == self._epoch and not self._paused:
+                packet.append(Envelope(sender, self._host.name, body[_STAMP.size :], clock))
         if reader.ended:  # the sender is gone; what that means is for the parent to say
-            self._selector.unregister(reader.fd)
-            reader.close()
+            self._forget(reader)
 
     # The parent
 
@@ -267,27 +290,73 @@ class _RobotLoop:
 
     def _obey(self, order: FromParent) -> None:
         match order:
-            case Start(began):
-                self._began = began
-                self._told = (-1, -1)
-                self._send(self._host.start())
+            case Begin():
+                self._begin(order)
             case QueuesTo(robots):
                 for robot in robots:
                     self._writers[robot].open(self._link.take_fd())
                     self._flush(self._writers[robot])
             case QueueFrom(robot):
-                reader = QueueReader(self._link.take_fd())
-                self._selector.register(
-                    reader.fd, selectors.EVENT_READ, lambda packet: self._read(robot, reader, packet)
-                )
+                self._listen(robot, QueueReader(self._link.take_fd()))
             case Wave(number):
                 self._say_counters(number)
-            case Stop():
-                self._report_events()
-                self._say(Report(self._host.protocol.assignment, replace(self._host.metrics(), memory=own_memory())))
-                self._running = False
+            case Pause():
+                self._pause()
+            case Change():
+                self._change(order)
             case never:
                 assert_never(never)
+
+    def _begin(self, order: Begin) -> None:
+        self._began = order.began
+        self._searching = True
+        self._told = (-1, -1)
+        self._send(self._host.start(quiet=order.quiet))
+        early, self._early = self._early, []
+        self._take_in(early)
+
+    def _pause(self) -> None:
+        """Be silent, and report: what still arrives is lost."""
+        self._searching, self._paused = False, True
+        self._early = []
+        self._report_events()
+        metrics = replace(self._host.metrics(), memory=own_memory())
+        self._say(Report(self._epoch, self._host.protocol.assignment, metrics))
+
+    def _change(self, order: Change) -> None:
+        """Go over to the next epoch: with a changed problem, and nothing under way."""
+        part, void = pickle.loads(order.change)  # noqa: S301 - from the own parent, over its own socket
+        for name in order.gone:
+            if name in self._readers:
+                self._forget(self._readers[name])
+            if name in self._writers:
+                self._drop(self._writers.pop(name))
+        self._epoch = order.epoch
+        self._sent = self._received = 0
+        self._early = []
+        self._searching = self._concluded = self._paused = False
+        self._host.change(part, void)
+        self._say_ready()
+
+    def _listen(self, sender: str, reader: QueueReader) -> None:
+        self._readers[sender] = reader
+        self._selector.register(reader.fd, selectors.EVENT_READ, lambda packet: self._read(sender, reader, packet))
+
+    def _forget(self, reader: QueueReader) -> None:
+        """Close a queue's end that somebody wrote to."""
+        self._readers = {name: other for name, other in self._readers.items() if other is not reader}
+        self._selector.unregister(reader.fd)
+        reader.close()
+
+    def _drop(self, writer: QueueWriter) -> None:
+        """Close a queue's end that somebody read from."""
+        if writer.fd is not None and writer.fd in self._selector.get_map():
+            self._selector.unregister(writer.fd)
+        writer.close()
+
+    def _say_ready(self) -> None:
+        self._conclude()
+        self._say(Ready(self._epoch))
 
     def _report_idle(self) -> None:
         self._report_events()
@@ -295,7 +364,7 @@ class _RobotLoop:
 
     def _say_counters(self, wave: int) -> None:
         self._told = (self._sent, self._received)
-        self._say(Counters(wave, *self._told))
+        self._say(Counters(self._epoch, wave, *self._told))
 
     def _report_events(self) -> None:
         if self._events:

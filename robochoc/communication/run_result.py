@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from operator import add
 from typing import NamedTuple, Self
@@ -23,13 +23,15 @@ class Progress(NamedTuple):
 class RunResult:
     """How a run ended. `assignments` maps each robot to its variables' values (empty: it has none).
 
-    `witness` is the robot that could tell the verdict alone; None when it follows from quiescence or a limit.
+    `witness` is the robot that could tell the verdict alone; None when it follows from quiescence or a limit. `lost`
+    says why, by name, robots were lost whose loss broke the search off.
     """
 
     verdict: Verdict
     witness: str | None
     assignments: dict[str, dict[str, int]]
     metrics: Metrics
+    lost: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(

@@ -29,6 +29,10 @@ class Schedule(ABC):
     def get(self) -> Sequence[Envelope]:
         """The next packet, all for one robot, oldest first in each channel; empty when nothing is under way."""
 
+    @abstractmethod
+    def clear(self) -> None:
+        """Lose all that is under way; all clocks begin again."""
+
     def done(self, robot: str, clock: int) -> None:  # noqa: B027 - not every schedule has to know
         """`robot` has finished with its packet (or its start), and its NCCC clock stands at `clock`."""
 
@@ -79,6 +83,11 @@ class Concurrent(Schedule):
             return packet
         return ()
 
+    def clear(self) -> None:
+        """Lose all that is under way; nobody is busy."""
+        for state in (self._busy_until, self._inboxes, self._last_arrival, self._agenda):
+            state.clear()
+
     def done(self, robot: str, clock: int) -> None:
         """The robot is free from `clock` on, for what has come or will come."""
         self._busy_until[robot] = clock
@@ -125,6 +134,11 @@ class RandomChannels(Schedule):
                 break
             packet.append(self._take(self._chance.choice(more)))
         return packet
+
+    def clear(self) -> None:
+        """Lose all that is under way."""
+        self._channels.clear()
+        self._waiting.clear()
 
     def _take(self, place: int) -> Envelope:
         """The head of the waiting channel at `place`; an empty channel leaves the list, unordered."""

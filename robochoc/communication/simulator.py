@@ -12,23 +12,23 @@ from types import MappingProxyType
 from robochoc.communication.host import Host
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.schedule import Schedule
+from robochoc.communication.session import Epoch, Session
 from robochoc.message import Envelope
 from robochoc.observers.events import Observer
 from robochoc.outcome import Verdict
 from robochoc.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.domain import CompiledDomain
-from robochoc.solver.part import parts
+from robochoc.solver.part import Part
 
 PROGRESS_EVERY = 256
 """Packets between two reports of progress."""
 
 
-class Simulation:
-    """One run of one team in this thread.
+class Simulation(Session):
+    """One team in this thread. `observer` is told of all events, with the schedule's time.
 
     `domains` holds the compiled domains of robots whose private constraints need a solver (`solver/compile.py`).
-    `observer` is told of all events, with the schedule's time.
     """
 
     def __init__(
@@ -41,52 +41,80 @@ class Simulation:
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
-        traits = protocol.traits
-        given = parts(team, domains, everywhere=traits.everywhere, tree=traits.tree)
-        self._hosts = {name: Host.of(protocol, part) for name, part in given.items()}
+        self._protocol = protocol
         self._schedule = schedule
+        self._observer = observer
         self._progress = progress
+        self._quiet = True
         self._verdict: Verdict | None = None
         self._witness: str | None = None
-        if observer:
-            for host in self._hosts.values():
-                host.observe(observer, lambda: float(schedule.now))
+        self._hosts = {name: self._host(part) for name, part in Epoch(team, domains).parts(protocol).items()}
 
-    def run(self, timeout: float | None = None) -> RunResult:
-        """Run to a verdict, or until `timeout` seconds of wall-clock time are over (`unknown`).
-
-        Every robot starts before any message arrives, as the paper's master orders the start when all are there.
-        """
+    def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
+        """See `Session.search`; a limit on messages is looked at after each packet."""
         began = time.monotonic()
-        for host in self._hosts.values():
-            self._pass_on(host, host.start())
-        packets = 0
-        while self._verdict is None:
-            elapsed_s = time.monotonic() - began
-            if timeout is not None and elapsed_s > timeout:
-                self._verdict = Verdict.UNKNOWN
-                break
-            if self._progress and packets % PROGRESS_EVERY == 0:
-                self._progress(Progress(self._sent(), elapsed_s))
-            packet = self._schedule.get()
-            if not packet:
-                self._verdict = Verdict.SOLUTION
-                break
-            host = self._hosts[packet[0].receiver]
-            self._pass_on(host, host.handle(packet))
-            packets += 1
+        if self._verdict is None:
+            self._play(began, timeout, messages)
+            self._schedule.clear()
         return RunResult.of(
-            self._verdict,
+            self._verdict or Verdict.UNKNOWN,
             self._witness,
             {name: host.protocol.assignment for name, host in self._hosts.items()},
             [host.metrics() for host in self._hosts.values()],
             time.monotonic() - began,
         )
 
+    def change(self, epoch: Epoch) -> None:
+        """See `Session.change`."""
+        self._verdict = self._witness = None
+        before = self._hosts
+        self._hosts = {}
+        for name, part in epoch.parts(self._protocol).items():
+            if name in before and name not in epoch.fresh:
+                self._hosts[name] = before[name]
+                before[name].change(part, epoch.void)
+                self._note_verdict(before[name])
+            else:
+                self._hosts[name] = self._host(part)
+
+    def close(self) -> None:
+        """Nothing to leave behind."""
+
+    def _host(self, part: Part) -> Host:
+        host = Host.of(self._protocol, part)
+        if self._observer:
+            host.observe(self._observer, lambda: float(self._schedule.now))
+        return host
+
+    def _play(self, began: float, timeout: float | None, messages: int | None) -> None:
+        """Every robot starts before any message arrives; then packet by packet."""
+        quiet, self._quiet = self._quiet, False
+        for host in self._hosts.values():
+            self._pass_on(host, host.start(quiet=quiet))
+        packets = 0
+        while self._verdict is None:
+            elapsed_s = time.monotonic() - began
+            if timeout is not None and elapsed_s > timeout:
+                return
+            if messages is not None and self._sent() >= messages:
+                return
+            if self._progress and packets % PROGRESS_EVERY == 0:
+                self._progress(Progress(self._sent(), elapsed_s))
+            packet = self._schedule.get()
+            if not packet:
+                self._verdict, self._quiet = Verdict.SOLUTION, True
+                return
+            host = self._hosts[packet[0].receiver]
+            self._pass_on(host, host.handle(packet))
+            packets += 1
+
     def _pass_on(self, host: Host, said: Sequence[Envelope]) -> None:
         for envelope in said:
             self._schedule.put(envelope)
         self._schedule.done(host.name, host.clock)
+        self._note_verdict(host)
+
+    def _note_verdict(self, host: Host) -> None:
         if host.protocol.verdict is not None:
             self._verdict, self._witness = host.protocol.verdict, host.name
 

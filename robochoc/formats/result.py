@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 
-from robochoc.outcome import Metrics, Outcome, Verdict
+from robochoc.outcome import Epoch, Metrics, Outcome, Verdict
 
 
 class BadResult(ValueError):  # noqa: N818 - named for what was found
@@ -24,6 +22,19 @@ class _MetricsForm(msgspec.Struct):
     memory: int = 0
 
 
+class _EpochForm(msgspec.Struct, omit_defaults=True):
+    verdict: Verdict
+    robots: list[str]
+    assignment: dict[str, int]
+    messages: int
+    bytes: int
+    ncccs: int
+    checks: int
+    wall_s: float
+    verified: bool
+    lost: list[str] = []
+
+
 class _Form(msgspec.Struct, omit_defaults=True):
     team: str
     protocol: str
@@ -33,7 +44,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     assignment: dict[str, int]
     cost: float | int | None
     withdrawn: list[str]
-    epochs: list[Any]
+    epochs: list[_EpochForm]
     metrics: _MetricsForm
     verified: bool
     count: int | None = None
@@ -62,13 +73,36 @@ def result_json(outcome: Outcome) -> bytes:
         assignment=outcome.assignment,
         cost=outcome.cost,
         withdrawn=list(outcome.withdrawn),
-        epochs=[],
+        epochs=[_epoch(epoch) for epoch in outcome.epochs],
         metrics=metrics,
         verified=outcome.verified,
         count=outcome.count,
         reason=outcome.reason,
     )
     return msgspec.json.encode(form)
+
+
+def _epoch(epoch: Epoch) -> _EpochForm:
+    spent = epoch.metrics
+    return _EpochForm(
+        verdict=epoch.verdict,
+        robots=list(epoch.robots),
+        assignment=epoch.assignment,
+        messages=sum(spent.messages.values()),
+        bytes=spent.bytes,
+        ncccs=spent.ncccs,
+        checks=spent.checks,
+        wall_s=round(spent.wall_s, 6),
+        verified=epoch.verified,
+        lost=list(epoch.lost),
+    )
+
+
+def _epoch_of(form: _EpochForm) -> Epoch:
+    metrics = Metrics({"messages": form.messages}, form.bytes, form.ncccs, form.checks, form.wall_s)
+    return Epoch(
+        form.verdict, tuple(form.robots), form.assignment, metrics, verified=form.verified, lost=tuple(form.lost)
+    )
 
 
 def read_result(content: bytes) -> Outcome:
@@ -92,4 +126,5 @@ def read_result(content: bytes) -> Outcome:
         verified=form.verified,
         count=form.count,
         reason=form.reason,
+        epochs=tuple(map(_epoch_of, form.epochs)),
     )

@@ -43,6 +43,8 @@ class RobotFile:
     """The children for which `variable` is left out: what they must be told follows from the scopes."""
     lines: Mapping[str, int]
     """Where the robot's variables stand."""
+    context: Context
+    """What constraints that a scenario adds can refer to."""
 
 
 def read_robot(path: Path | str) -> Robot:
@@ -88,7 +90,7 @@ class _Reader:
         unsaid = frozenset(
             attribute(agent, "name") for agent in self._agents("agents_children") if agent.get("variable") is None
         )
-        return RobotFile(robot, line(presentation), copies, unsaid, self._own)
+        return RobotFile(robot, line(presentation), copies, unsaid, self._own, context)
 
     def _elements(self, section: str, tag: str, count: str) -> Iterator[etree._Element]:
         """The elements of a section of the instance, whose count is checked."""

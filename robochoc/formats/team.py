@@ -13,7 +13,7 @@ from robochoc.formats.diagnostics import Diagnostic, InvalidInput, encodable
 from robochoc.formats.members import Members
 from robochoc.formats.neighbours import cycles, disagreements, missing_files, mixed_kinds, shared_variables
 from robochoc.formats.robot import RobotFile, read_robot_file
-from robochoc.formats.scenario import SCENARIO, check_scenario
+from robochoc.formats.scenario import SCENARIO, has_scenario, read_scenario
 from robochoc.formats.scopes import misplaced, misplaced_parts, untold
 from robochoc.problem import Robot, Team, natural, priority_order
 
@@ -51,17 +51,23 @@ def read_team(folder: Path | str) -> Team:
             files[path.stem] = read_robot_file(path)
         except InvalidInput as invalid:
             found.extend(invalid.diagnostics)
-    dynamic = False
-    try:
-        dynamic = check_scenario(folder)
-    except InvalidInput as invalid:
-        found.extend(invalid.diagnostics)
     members = Members(folder, files, frozenset(path.stem for path in paths) - files.keys())
     found.extend(islice(_mistakes(members), MAX_BETWEEN))
-    if found:
+    team = None if found else _whole(members)
+    if has_scenario(folder):
+        try:
+            scenario = read_scenario(folder, team, files)
+            team = team and replace(team, scenario=scenario)
+        except InvalidInput as invalid:
+            found.extend(invalid.diagnostics)
+    if team is None or found:
         raise InvalidInput(found)
+    return team
+
+
+def _whole(members: Members) -> Team:
     order = priority_order(members.agreed)
-    return Team(encodable(folder.resolve().name), tuple(_informed(members, name) for name in order), dynamic)
+    return Team(encodable(members.folder.resolve().name), tuple(_informed(members, name) for name in order))
 
 
 def _mistakes(members: Members) -> Iterator[Diagnostic]:

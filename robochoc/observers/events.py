@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import msgspec
+from msgspec import UNSET, UnsetType
 
 
 class Event(msgspec.Struct, frozen=True, tag=True, tag_field="event", kw_only=True):
@@ -15,9 +16,13 @@ class Event(msgspec.Struct, frozen=True, tag=True, tag_field="event", kw_only=Tr
 
 
 class Began(Event, frozen=True):
-    """A run of `protocol` begins; times start again from 0. Withdrawing is a run of its own after the search."""
+    """A run of `protocol` begins, or its epoch `epoch`. Withdrawing is a run of its own after the search.
+
+    Counts start again from 0; times are compared within a run, or an epoch, only.
+    """
 
     protocol: str
+    epoch: int | UnsetType = UNSET
 
 
 class Registered(Event, frozen=True):

@@ -102,8 +102,7 @@ class ABT(Protocol):
             return
         if self._coherent(nogood):
             self._check_add_link(nogood)
-            for index in self.problem.alike(nogood.value):
-                self.store.add(index, nogood.lhs)
+            self._learn(nogood)
             self.value = None
         else:
             # The sender's picture of others was old, and it has forgotten my value: say it again.
@@ -143,8 +142,16 @@ class ABT(Protocol):
             return
         culprit = self.order.lowest(lhs)
         value = lhs.pop(culprit)
-        self.send(culprit, Nogood(lhs, value))
+        self.send(culprit, self._nogood(lhs, value))
         self._update(culprit, None)
+
+    def _nogood(self, lhs: dict[str, Value], value: Value) -> Nogood:
+        return Nogood(lhs, value)
+
+    def _learn(self, nogood: Nogood) -> None:
+        """Store a nogood that was told against all values that look alike to it."""
+        for index in self.problem.alike(nogood.value):
+            self.store.add(index, nogood.lhs)
 
     def _consistent(self, index: int) -> bool:
         """Whether the view allows the value at `index`; if a constraint does not, its nogood is stored."""

@@ -16,6 +16,12 @@ LeftSide = Mapping[str, Value]
 """A conjunction of assignments of higher-priority robots; None where a variable of a robot does not matter."""
 
 
+Explanation = frozenset[str]
+"""Keys of constraints and domains (`solver/explanation.py`): a nogood holds as long as all of them stand."""
+
+NOTHING: Explanation = frozenset()
+
+
 def contradicts(value: Value, other: Value) -> bool:
     """Whether two pictures of one robot's value cannot both be true: they differ where both say something."""
     return any(part != told for part, told in zip(value, other, strict=True) if part is not None and told is not None)
@@ -29,11 +35,16 @@ def joined(value: Value | None, other: Value) -> Value:
 
 
 class NogoodStore:
-    """The left sides of the nogoods that rule out own values, by the value's place in the domain."""
+    """The left sides of the nogoods that rule out own values, by the value's place in the domain.
+
+    Beside each stands its explanation: keys of the constraints and domains it was derived from (empty where the
+    protocol keeps none).
+    """
 
     def __init__(self, order: PriorityOrder, size: int) -> None:
         self._order = order
         self._by_value: list[LeftSide | None] = [None] * size
+        self._because: list[Explanation] = [NOTHING] * size
 
     def __getitem__(self, index: int) -> LeftSide | None:
         return self._by_value[index]
@@ -41,11 +52,16 @@ class NogoodStore:
     def __iter__(self) -> Iterator[LeftSide]:
         return (lhs for lhs in self._by_value if lhs is not None)
 
-    def add(self, index: int, lhs: LeftSide) -> None:
+    def because(self, index: int) -> Explanation:
+        """The explanation of the nogood against the value at `index`."""
+        return self._because[index]
+
+    def add(self, index: int, lhs: LeftSide, because: Explanation = NOTHING) -> None:
         """Store `lhs` against the value at `index`, unless the nogood that is there already is better."""
         present = self._by_value[index]
         if present is None or self._better(lhs, present):
             self._by_value[index] = lhs
+            self._because[index] = because
 
     def forget(self, agent: str, value: Value | None = None) -> None:
         """Drop every nogood that rests on another value of `agent` than `value` (None: on any)."""
@@ -55,6 +71,12 @@ class NogoodStore:
         if stale:
             self._by_value = [None if id(lhs) in stale else lhs for lhs in self._by_value]
 
+    def drop(self, keys: Explanation) -> None:
+        """Drop every nogood that was derived from anything in `keys`."""
+        for index, because in enumerate(self._because):
+            if not keys.isdisjoint(because):
+                self._by_value[index] = None
+
     def resolve(self) -> dict[str, Value]:
         """The union of all left sides: what rules out the whole domain when every value has a nogood."""
         union: dict[str, Value] = {}
@@ -62,6 +84,10 @@ class NogoodStore:
             for agent, value in lhs.items():
                 union[agent] = joined(union.get(agent), value)
         return union
+
+    def explanation(self) -> Explanation:
+        """The union of all explanations: what `resolve` was derived from, but for the domain."""
+        return NOTHING.union(*self._because)
 
     def _distinct(self) -> Iterable[LeftSide]:
         """Each left side once, in the order of the values: many values often share one."""

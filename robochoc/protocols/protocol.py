@@ -15,6 +15,7 @@ from robochoc.outcome import Verdict
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.explanation import Void
 
 
 class Protocol(ABC):
@@ -59,3 +60,22 @@ class Protocol(ABC):
     def assignment(self) -> dict[str, int]:
         """The own variables' values as decided; empty while unassigned."""
         return {} if self.value is None else self.problem.solution(self.value)
+
+
+class DynamicProtocol(Protocol):
+    """A protocol that goes on when the problem changes, with what still stands of what it has found out.
+
+    Between two epochs the host calls `change`, and once all robots have changed, `resume`. Other protocols are begun
+    anew on the changed problem.
+    """
+
+    @abstractmethod
+    def change(self, problem: LocalProblem, order: PriorityOrder, void: Void) -> None:
+        """Take in the changed problem, and drop what rests on anything in `void`. Nobody is searching: say nothing.
+
+        A verdict that stands in spite of the changes is kept, and ends the epoch at once.
+        """
+
+    @abstractmethod
+    def resume(self, *, quiet: bool) -> None:
+        """Go on with the search; before any message. `quiet`: no message of the epoch before was lost."""

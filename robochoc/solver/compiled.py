@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 
 from robochoc.message import Value
 from robochoc.solver.domain import compiled_domain
-from robochoc.solver.part import Part, held
+from robochoc.solver.explanation import held
+from robochoc.solver.part import Part
 from robochoc.solver.shared import Conflict, Others, OwnValues, SharedConstraint, in_order_of_lowest
 
 if TYPE_CHECKING:

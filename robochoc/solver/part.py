@@ -5,25 +5,19 @@ This is all that reaches a robot, be it an object in the simulator or a process 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-from robochoc.problem import Constraint, Domain, Model, Robot, Team
+from robochoc.problem import Domain, Model, Robot, Team
 from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.explanation import Known, held
 
 Interfaces = Mapping[str, tuple[str, ...]]
 """The variables that each robot shows to its neighbours, by the robot's name."""
 
 Links = Mapping[str, tuple[str, ...]]
 """The parents of each robot."""
-
-
-class Known(NamedTuple):
-    """A shared constraint, and its name in explanations: unique but for those that can only go together."""
-
-    key: str
-    constraint: Constraint
 
 
 class Part(NamedTuple):
@@ -69,18 +63,3 @@ def parts(
         robot.name: Part(robot, team.order, shown, domains.get(robot.name), tuple(copies[robot.name]), known, links)
         for robot in team.robots
     }
-
-
-def held(robot: Robot) -> Iterator[Known]:
-    """The constraints that `robot` holds towards its parents.
-
-    Constraints of one name with one parent share a key: a scenario that removes one of them removes all.
-    """
-    for parent in robot.parents:
-        for constraint in parent.constraints:
-            yield Known(constraint_key(robot.name, parent.name, constraint.name), constraint)
-
-
-def constraint_key(agent: str, parent: str, name: str) -> str:
-    """What a constraint that `agent` holds towards `parent` is called in explanations."""
-    return f"{agent}<{parent}:{name}"

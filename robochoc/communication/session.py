@@ -1,0 +1,66 @@
+"""A session: a team that searches, and goes on when its problem changes. What every runtime offers."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from types import MappingProxyType, TracebackType
+from typing import NamedTuple, Self
+
+from robochoc.communication.run_result import RunResult
+from robochoc.problem import Team
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.explanation import Void
+from robochoc.solver.part import Part, parts
+
+
+class Epoch(NamedTuple):
+    """What the team has to solve from now on.
+
+    `domains` holds the compiled domains of robots whose private constraints need a solver (`solver/compile.py`);
+    `void` is what of the epoch before no longer stands; the robots in `fresh` begin anew, though there may have been
+    others of their names before.
+    """
+
+    team: Team
+    domains: Mapping[str, CompiledDomain] = MappingProxyType({})
+    void: Void = Void(frozenset(), frozenset())
+    fresh: frozenset[str] = frozenset()
+
+    def parts(self, protocol: type[Protocol]) -> dict[str, Part]:
+        """What each robot knows when it speaks `protocol`."""
+        return parts(self.team, self.domains, everywhere=protocol.traits.everywhere, tree=protocol.traits.tree)
+
+
+class Session(ABC):
+    """One team and one protocol in one runtime. Whoever opens it closes it: it is a context manager."""
+
+    @abstractmethod
+    def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
+        """Search until there is a verdict, for at most `timeout` seconds or (about) so many `messages`.
+
+        When a limit comes first the verdict is `unknown`. The metrics are those of this search. Robots begin only
+        when all are there, as the paper's master orders the start. Raises `RobotsLost` where robots can be lost.
+        """
+
+    @abstractmethod
+    def change(self, epoch: Epoch) -> None:
+        """Give every robot its part of the changed problem; the next `search` works on that. Raises as `search`."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Leave nothing behind."""
+
+    def run(self, timeout: float | None = None) -> RunResult:
+        """One search, then the end."""
+        with self:
+            return self.search(timeout)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

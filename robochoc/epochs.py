@@ -1,0 +1,130 @@
+"""Epoch by epoch: what a team goes through while its problem changes (the paper's dynamic DisCSP, Section 3.1).
+
+An epoch ends when its problem is solved, when the scenario's next event comes, or when robots are lost. What changes
+the problem opens the next one. A protocol that can (`DynamicProtocol`) goes on with what still stands; any other
+begins anew, so that the two can be compared.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+from typing import NamedTuple
+
+from robochoc.change import BadChange, changed, rejoined, without
+from robochoc.communication.run_result import RunResult
+from robochoc.communication.session import Epoch, Session
+from robochoc.formats import InvalidInput, read_robot
+from robochoc.orders import reordered
+from robochoc.outcome import Verdict
+from robochoc.problem import AddAgent, Event, Team
+from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.explanation import Void, void
+
+Compile = Callable[[Team], Mapping[str, CompiledDomain]]
+
+
+class Played(NamedTuple):
+    """An epoch that is over: its team, as the files have it, and how it ended."""
+
+    team: Team
+    result: RunResult
+
+
+class Journey:
+    """A team on its way through its scenario, and through losses.
+
+    `order` is the priority order asked for (None: the files'). `compile_` gives a team's compiled domains; `left_s`
+    says how many seconds there are left (None: no limit). Of the robots that are lost, `spares` come back: their
+    files are read again, and they join at the end of the order. `withdrawn` names those that are out, and `regrets`
+    says why somebody could not come back.
+    """
+
+    def __init__(
+        self,
+        team: Team,
+        order: Sequence[str] | None,
+        compile_: Compile,
+        left_s: Callable[[], float | None],
+        spares: int = 0,
+    ) -> None:
+        self.team = replace(team, scenario=())
+        self.withdrawn: list[str] = []
+        self.regrets: list[str] = []
+        self._events = deque(team.scenario)
+        self._order = order
+        self._compile = compile_
+        self._left_s = left_s
+        self._spares = spares
+
+    def arranged(self) -> Team:
+        """The team as the robots see it: in the order of the run. Raises `CannotTurn`."""
+        return self.team if self._order is None else reordered(self.team, self._order)
+
+    def go(self, session: Session, announce: Callable[[int], None]) -> Iterator[Played]:
+        """One epoch after the other; the last is the one whose verdict counts. A time limit may end it earlier.
+
+        Before each, `announce` is told its number.
+        """
+        for number in count():
+            announce(number)
+            after = self._events[0].after if self._events else None
+            result = session.search(self._left_s(), after)
+            yield Played(self.team, result)
+            left_s = self._left_s()
+            if result.lost:
+                new, fresh = self._after_loss(result.lost)
+            elif self._events and (result.verdict is not Verdict.UNKNOWN or left_s is None or left_s > 0):
+                new, fresh = self._after_event(self._events.popleft())
+            else:
+                return
+            if not new.robots:
+                return
+            self._go_over(session, new, fresh)
+
+    def _go_over(self, session: Session, new: Team, fresh: Collection[str]) -> None:
+        before = self.arranged()
+        self.team = new
+        if self._order is not None:
+            stay = [name for name in self._order if name in new and name not in fresh]
+            self._order = (*stay, *(name for name in new.order if name not in stay))
+        now = self.arranged()
+        keys, agents = void(before, now)
+        session.change(Epoch(now, self._compile(now), Void(keys, agents | set(fresh)), frozenset(fresh)))
+
+    def _after_event(self, event: Event) -> tuple[Team, Collection[str]]:
+        """The team after `event`; what it says of robots that were lost is passed over."""
+        team = self.team
+        fresh = set()
+        for change in event.changes:
+            try:
+                team = changed(team, [change])
+            except BadChange:
+                if not self.withdrawn:
+                    raise
+                continue
+            if isinstance(change, AddAgent):
+                fresh.add(change.robot.name)
+                self.withdrawn = [name for name in self.withdrawn if name != change.robot.name]
+        return team, fresh
+
+    def _after_loss(self, lost: Mapping[str, str]) -> tuple[Team, Collection[str]]:
+        """The team that remains, with those that come back, in the order in which they do."""
+        team = self.team
+        back: list[str] = []
+        for name in lost:
+            if self._spares:
+                self._spares -= 1
+                try:
+                    team = rejoined(team, read_robot(Path(team[name].file)))
+                    back.append(name)
+                except (InvalidInput, BadChange, OSError) as why:
+                    self.regrets.append(f"{name} could not come back: {why}")
+        out = [name for name in lost if name not in back]
+        self.withdrawn += out
+        if back and self._order is None:
+            self._order = team.order
+        return without(team, out), back

@@ -1,0 +1,66 @@
+"""How to run: the options of `robochoc.run.solve`, and of the command line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from robochoc.orders import Order
+from robochoc.solver.compile import Limits
+
+CENTRAL = "central"
+"""The protocol that is none: one model of all files, which ACE decides."""
+
+
+class Runtime(StrEnum):
+    """Where robots live: each in its own OS process, or all in one thread."""
+
+    PROCESSES = "processes"
+    SIMULATOR = "simulator"
+
+
+class ScheduleName(StrEnum):
+    """How the simulator orders events: by time counted in checks, or any channel next."""
+
+    CONCURRENT = "concurrent"
+    RANDOM = "random"
+
+
+class Withdrawal(StrEnum):
+    """Who steps aside when the whole team has no solution: whoever finds no place, in priority order."""
+
+    MAXIMAL = "maximal"
+
+
+class OnLoss(StrEnum):
+    """What the loss of a robot means: the run fails, or the robot leaves the problem and the others go on."""
+
+    FAIL = "fail"
+    WITHDRAW = "withdraw"
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to run. `timeout` is in seconds of wall-clock time; `seed`, `schedule` and `delay` are the simulator's.
+
+    `delay` is the longest a message takes, in constraint checks. `local` limits the compilation of each robot's
+    domain; `cache` says whether solutions of local problems are kept in the user's cache folder. `count` is for the
+    central judge: the number of all solutions. `verify` asks for a second opinion on a `no-solution`. `order` is the
+    robots' total priority order, by name or as the list of them; None: the files'. `seed` is also `Order.RANDOM`'s.
+    With `on_loss` set to withdraw, robots whose processes end leave the problem; up to `spares` of them come back.
+    """
+
+    protocol: str = "abt"
+    runtime: Runtime = Runtime.PROCESSES
+    seed: int = 0
+    timeout: float | None = None
+    withdraw: Withdrawal | None = None
+    schedule: ScheduleName = ScheduleName.CONCURRENT
+    delay: int = 0
+    local: Limits = field(default_factory=Limits)
+    cache: bool = True
+    count: bool = False
+    verify: bool = False
+    order: Order | tuple[str, ...] | None = None
+    on_loss: OnLoss = OnLoss.FAIL
+    spares: int = 0

@@ -1,0 +1,116 @@
+"""Dynamic Asynchronous Backtracking.
+
+Omomowo, Arana, Ahriz: "DynABT: dynamic asynchronous backtracking for dynamic DisCSPs", AIMSA 2008; on nogood
+justifications for dynamic problems: Schiex and Verfaillie, "Nogood recording for static and dynamic constraint
+satisfaction problems", IJAIT 3 (1994). For when a robot is "lost if hit by a meteor" (paper, Section 3.1).
+
+ABT (`protocols/abt.py`) whose nogoods carry an *explanation*, `because`: the constraints they were derived from, and
+the domains whose values they were derived from. A direct conflict is explained by its constraint, a resolvent by the
+union of what it resolves and by the own domain, which has no other values. When the problem changes:
+
+    removeConstraint   nogoods explained by a constraint that is gone are dropped; so is a no-solution
+    addConstraint      a link to the new lower end is made, and the value is told there
+    adjustNogood       values that are gone take their nogoods along; a domain that grew voids its resolvents
+
+The changes are propagated by the runtime, to all robots before any goes on; the paper has the robots tell each other.
+Messages under way when a search was broken off, or had concluded, are lost: so links are asked for once more and
+values told once more before the search goes on. After a search that came to rest nothing was lost, and only what is
+new is told.
+"""
+
+from __future__ import annotations
+
+from robochoc.message import Value
+from robochoc.outcome import Verdict
+from robochoc.protocols import abt
+from robochoc.protocols.abt import ABT, AddLink, Ok
+from robochoc.protocols.nogood import NOTHING, Explanation, NogoodStore
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import DynamicProtocol
+from robochoc.protocols.traits import Traits
+from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.explanation import Void, domain_key
+
+
+class Nogood(abt.Nogood, frozen=True):
+    """While all of `lhs` and all that is named in `because` stands, the receiver cannot take `value`."""
+
+    because: list[str]
+
+
+class DynABT(ABT, DynamicProtocol):
+    """One agent of DynABT. Beside ABT's state: `proof`, the explanation of the empty nogood it has derived."""
+
+    messages = Ok | Nogood | AddLink
+    traits = Traits(paper="Omomowo, Arana, Ahriz 2008", dynamic=True, privacy="constraints of lower robots")
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.proof: Explanation = NOTHING
+        self.untold = list(self.lower)
+        """Lower robots that do not know the own value."""
+
+    def change(self, problem: LocalProblem, order: PriorityOrder, void: Void) -> None:
+        """The propagation phase: keep what still stands."""
+        for agent in void.agents:
+            self._update(agent, None)
+        self.store.drop(void.keys)
+        if not void.keys.isdisjoint(self.proof):
+            self.verdict, self.proof = None, NOTHING
+        self._adjust_nogoods(problem, order, void)
+        self.untold = [child for child in problem.children if child not in self.lower or child in void.agents]
+        self.higher = {*problem.parents, *(self.higher - void.agents)}
+        self.lower = list(dict.fromkeys((*problem.children, *(c for c in self.lower if c not in void.agents))))
+        self.problem, self.order = problem, order
+
+    def resume(self, *, quiet: bool) -> None:
+        """Tell what the others may have missed, and check the view."""
+        if not quiet:
+            for agent in sorted(self.higher.difference(self.problem.parents), key=self.order.rank.__getitem__):
+                self.send(agent, AddLink())
+        before = self.value
+        self._check_agent_view()
+        current = self._current()
+        if current is not None and self.value == before:
+            for child in self.untold if quiet else self.lower:
+                self.send(child, Ok(current))
+
+    def _adjust_nogoods(self, problem: LocalProblem, order: PriorityOrder, void: Void) -> None:
+        """The store and the value, in the places that values have in the changed domain."""
+        old, self.store = self.store, NogoodStore(order, len(problem.values))
+        known = {} if problem.agent in void.agents else {value: i for i, value in enumerate(self.problem.values)}
+        for index, value in enumerate(problem.values):
+            place = known.get(value)
+            lhs = None if place is None else old[place]
+            if place is not None and lhs is not None:
+                self.store.add(index, lhs, old.because(place))
+        current = self._current() if known else None
+        self.value = None if current is None or current not in problem.values else problem.values.index(current)
+
+    # What ABT does, with explanations
+
+    def _backtrack(self) -> None:
+        super()._backtrack()
+        if self.verdict is Verdict.NO_SOLUTION:
+            self.proof = self._explanation()
+
+    def _nogood(self, lhs: dict[str, Value], value: Value) -> Nogood:
+        return Nogood(lhs, value, sorted(self._explanation()))
+
+    def _learn(self, nogood: abt.Nogood) -> None:
+        because = frozenset(nogood.because) if isinstance(nogood, Nogood) else NOTHING
+        for index in self.problem.alike(nogood.value):
+            self.store.add(index, nogood.lhs, because)
+
+    def _consistent(self, index: int) -> bool:
+        if self.store[index] is not None:
+            return False
+        conflict = self.problem.explained(index, self.view)
+        if conflict is None:
+            return True
+        lhs, key = conflict
+        self.store.add(index, lhs, frozenset({key}))
+        return False
+
+    def _explanation(self) -> Explanation:
+        return self.store.explanation() | {domain_key(self.problem.agent)}

@@ -1,0 +1,73 @@
+"""What explanations of nogoods are made of, and what a change of the problem makes void.
+
+A nogood that was derived from some constraints and domains holds as long as these stand (DynABT: Omomowo, Arana and
+Ahriz 2008). Constraints and domains are named by keys, the same in every robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from robochoc.problem import Constraint, Robot, Team
+
+
+class Known(NamedTuple):
+    """A shared constraint and its key."""
+
+    key: str
+    constraint: Constraint
+
+
+class Void(NamedTuple):
+    """What a change has made void: `keys` of constraints and domains that no longer rule out what they did.
+
+    Of `agents` not even the values mean what they meant: they have left, or show other variables than before.
+    """
+
+    keys: frozenset[str]
+    agents: frozenset[str]
+
+
+def held(robot: Robot) -> Iterator[Known]:
+    """The constraints that `robot` holds towards its parents.
+
+    Constraints of one name with one parent share a key: a scenario that removes one of them removes all.
+    """
+    for parent in robot.parents:
+        for constraint in parent.constraints:
+            yield Known(f"{robot.name}<{parent.name}:{constraint.name}", constraint)
+
+
+def domain_key(agent: str) -> str:
+    """The key of an agent's domain: that it has no other values than those it has."""
+    return f"{agent}="
+
+
+def void(old: Team, new: Team) -> Void:
+    """What of `old` does not stand in `new`: constraints that are gone, domains that have grown, robots that left."""
+    keys = set()
+    agents = set()
+    for robot in old.robots:
+        now = new.get(robot.name)
+        if now is None or now.interface != robot.interface:
+            agents.add(robot.name)
+        if now is None or _has_grown(robot, now):
+            keys.add(domain_key(robot.name))
+        present = list(held(now)) if now else []
+        keys.update(one.key for one in held(robot) if one not in present)
+    return Void(frozenset(keys), frozenset(agents))
+
+
+def _has_grown(old: Robot, new: Robot) -> bool:
+    """Whether `new` may have a local solution that `old` did not have."""
+    if [variable.name for variable in old.variables] != [variable.name for variable in new.variables]:
+        return True
+    if any(constraint not in new.private for constraint in old.private):
+        return True
+    return any(
+        value not in before.domain
+        for before, after in zip(old.variables, new.variables, strict=True)
+        if before.domain != after.domain
+        for value in after.domain
+    )
