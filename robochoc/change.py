@@ -90,7 +90,8 @@ def rejoined(team: Team, robot: Robot) -> Team:
 
     parents = [replace(one, constraints=kept(one.constraints)) for one in robot.parents if one.name in team]
     below = [replace(one, constraints=kept(one.constraints)) for one in robot.children if one.name in team]
-    before = {one.name for one in (*team[robot.name].parents, *team[robot.name].children)}
+    then = team[robot.name]
+    before = {one.name for one in then.parents} | {one.name for one in then.children}
     strangers = [name for name in ([one.name for one in parents] + [one.name for one in below]) if name not in before]
     if strangers:
         message = f"'{robot.name}' names '{strangers[0]}', which does not know it"

@@ -73,7 +73,7 @@ def random_team(chance: Random, *, n_ary: bool = True) -> Team:
     }
     density = chance.uniform(0.3, 0.95)
     constraints = [
-        _random_constraint(chance, domains, pair)
+        random_constraint(chance, domains, pair)
         for pair in itertools.combinations(domains, 2)
         if chance.random() < density
     ]
@@ -97,7 +97,7 @@ def solutions(team: Team) -> Iterator[dict[str, int]]:
 teams = st.integers(0, 2**32).map(lambda seed: random_team(Random(seed)))
 
 
-def _random_constraint(chance: Random, domains: Mapping[str, Sequence[int]], pair: Sequence[str]) -> Constraint:
+def random_constraint(chance: Random, domains: Mapping[str, Sequence[int]], pair: Sequence[str]) -> Constraint:
     scope = list(pair)
     chance.shuffle(scope)
     if chance.random() < 0.5:

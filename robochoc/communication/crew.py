@@ -79,8 +79,8 @@ class Crew:
 
     def words(self, robot: RobotLink) -> list[FromRobot]:
         """What `robot` says. One that has hung up is about to end, which its sentinel tells soon, if not before."""
-        if robot.control not in self._selector.get_map():
-            return []
+        if self.robots.get(robot.name) is not robot or robot.control not in self._selector.get_map():
+            return []  # dismissed, or ended, since it began to speak
         words = robot.words()
         if robot.hung_up:
             self._selector.unregister(robot.control)

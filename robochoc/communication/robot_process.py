@@ -264,6 +264,8 @@ class _RobotLoop:
             self._selector.unregister(writer.fd)
 
     def _read(self, sender: str, reader: QueueReader, packet: list[Envelope]) -> None:
+        if self._readers.get(sender) is not reader:
+            return  # closed by an order that came in the same moment
         for body in reader.get():
             epoch, clock = _STAMP.unpack_from(body)
             if epoch == self._epoch and not self._paused:

@@ -64,7 +64,7 @@ class LocalProblem:
         """Values of all own variables when the compiled variable takes `values[index]`."""
         return dict(zip(self._domain.variables, self._domain.solutions[index], strict=True))
 
-    def conflict(self, index: int, view: Mapping[str, Value], since: int = 0) -> Conflict | None:
+    def conflict(self, index: int, view: Mapping[str, Value], since: int = -1) -> Conflict | None:
         """Why `values[index]` is against `view`: what the first constraint that it breaks sees, or None.
 
         Constraints whose other variables are not all known in `view` are passed over, and so are those whose lowest
@@ -75,7 +75,7 @@ class LocalProblem:
         broken = self._broken(index, view, since)
         return None if broken is None else broken[0].conflict(broken[1])
 
-    def explained(self, index: int, view: Mapping[str, Value], since: int = 0) -> tuple[Conflict, str] | None:
+    def explained(self, index: int, view: Mapping[str, Value], since: int = -1) -> tuple[Conflict, str] | None:
         """Like `conflict`, with the key of the constraint that is broken."""
         broken = self._broken(index, view, since)
         return None if broken is None else (broken[0].conflict(broken[1]), broken[0].key)

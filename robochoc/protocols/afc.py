@@ -1,0 +1,237 @@
+"""Asynchronous Forward Checking.
+
+Meisels, Zivan: "Asynchronous forward-checking for DisCSPs", Constraints 12(1), 2007, with a static order. The methods
+bear the names of its procedures:
+
+    receive_CPA    `_receive_cpa`      forward_check      `_forward_check`
+    assign_CPA     `_assign_cpa`       process_Not_OK     `_process_not_ok`
+    backtrack      `_backtrack`        update_AgentView   `_update_agent_view`
+
+One current partial assignment (CPA) goes from robot to robot in priority order. Whoever adds a value to it tells all
+robots below, and these filter their domains at the same time. One that has no value left tells the rest; whoever
+holds the CPA then sends it back to the robot whose value was the last that did harm.
+
+Why delays do no harm: there is one CPA, and its step counter (SC) grows with every value that is added and travels
+back with it. So nobody has heard of a later step than the CPA that reaches it, every step's CPA is a new one, and
+what contradicts a later one never comes back. What a `NotOk` says stays true for ever, however late it arrives.
+
+Complete, asynchronous in forward checking only, for satisfaction. Seven things the paper leaves open: constraints may
+be n-ary (the lowest robot of the scope checks them, once the CPA names all the others); messages are read by packets:
+views are updated message by message, and the domain is filtered, or the CPA handled, once the inbox has been drained;
+`NotOk` goes to all robots that have no value in the inconsistent assignment which it names; of two inconsistent
+assignments that are known, one the beginning of the other, the shorter one is kept; filtering is incremental, and
+what a new CPA has in common with the last one is not checked again; a robot whose domain is empty from the start
+says so at once; the last robot concludes that a solution stands, since all others still hold what the CPA names.
+"""
+
+from __future__ import annotations
+
+from typing import assert_never, cast
+
+from robochoc.message import Message, Value
+from robochoc.outcome import Verdict
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import Traits
+from robochoc.solver.compiled import LocalProblem
+
+Assignments = tuple[Value, ...]
+"""A partial assignment: the values of the robots from the first one on, in priority order."""
+
+
+class CPA(Message, frozen=True):
+    """The current partial assignment comes to the receiver, who is to add its value; `sc` is the step counter."""
+
+    assignments: Assignments
+    sc: int
+
+
+class FcCPA(Message, frozen=True):
+    """A copy of the CPA of step `sc`, for forward checking (`FC_CPA`)."""
+
+    assignments: Assignments
+    sc: int
+
+
+class NotOk(Message, frozen=True):
+    """Nobody can extend `assignments` to a solution; found at step `sc` (`Not_OK`)."""
+
+    assignments: Assignments
+    sc: int
+
+
+class BacktrackCPA(Message, frozen=True):
+    """The CPA comes back: `assignments`, whose last value is the receiver's, cannot be extended (`backtrack_CPA`)."""
+
+    assignments: Assignments
+    sc: int
+
+
+class AFC(Protocol):
+    """One agent of AFC. State: the AgentView, which is `view`, `sc` and `consistent`, and the filtered `domain`.
+
+    While `consistent` does not hold, `view` is an assignment that cannot be extended to a solution.
+    """
+
+    messages = CPA | FcCPA | NotOk | BacktrackCPA
+    traits = Traits(paper="Meisels & Zivan 2007", privacy="constraints of lower robots")
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.rank = order.rank[problem.agent]
+        self.view: Assignments = ()
+        self.sc = 0
+        self.consistent = True
+        self.domain = FilteredDomain(problem, order)
+        self._held: CPA | BacktrackCPA | None = None
+
+    def start(self) -> None:
+        """The first robot makes the CPA; the others wait."""
+        if not self.problem.values:
+            self.conclude(Verdict.NO_SOLUTION)
+        elif self.rank == 0:
+            self._assign_cpa(0)
+
+    def receive(self, sender: str, message: Message) -> None:  # noqa: ARG002 - who speaks does not matter
+        """Dispatch on the message's type."""
+        if self.verdict is not None:
+            return
+        match cast("CPA | FcCPA | NotOk | BacktrackCPA", message):
+            case CPA() | BacktrackCPA() as held:
+                self._held = held
+            case FcCPA(assignments, sc):
+                self._update_agent_view(assignments, sc)
+            case NotOk(assignments, sc):
+                self._process_not_ok(assignments, sc)
+            case never:
+                assert_never(never)
+
+    def settle(self) -> None:
+        """The inbox is empty: handle the CPA if it is here, and check forward otherwise."""
+        if self.verdict is not None:
+            return
+        held, self._held = self._held, None
+        if held is not None:
+            self._receive_cpa(held)
+        elif self.consistent:
+            self._forward_check()
+
+    # The one who holds the CPA
+
+    def _receive_cpa(self, held: CPA | BacktrackCPA) -> None:
+        """Add a value to the CPA, unless it is known that this is in vain."""
+        self.sc = max(self.sc, held.sc)
+        above = held.assignments[: self.rank]
+        if not self.consistent and begins(self.view, above):
+            self._backtrack(self.view)
+            return
+        self.view, self.consistent = above, True
+        self.domain.filter(above)
+        inconsistent = self.domain.inconsistent()
+        if inconsistent is not None:
+            self._backtrack(inconsistent)
+        elif isinstance(held, CPA) or self.value is None:
+            self._assign_cpa(0)
+        else:
+            self._assign_cpa(self.value + 1)
+
+    def _assign_cpa(self, first: int) -> None:
+        """Add the first value that is left from place `first` on, and tell all robots below."""
+        self.value = self.domain.first(first)
+        if self.value is None:
+            self._backtrack(self.view)
+            return
+        self.sc += 1
+        assignments = (*self.view, self.problem.values[self.value])
+        below = self.order.names[self.rank + 1 :]
+        if not below:
+            self.conclude(Verdict.SOLUTION)
+            return
+        self.send(below[0], CPA(assignments, self.sc))
+        for robot in below[1:]:
+            self.send(robot, FcCPA(assignments, self.sc))
+
+    def _backtrack(self, inconsistent: Assignments) -> None:
+        """Send the CPA back to the last robot of an assignment that cannot be extended."""
+        self.view, self.consistent, self.value = inconsistent, False, None
+        if inconsistent:
+            self.send(self.order.names[len(inconsistent) - 1], BacktrackCPA(inconsistent, self.sc))
+        else:
+            self.conclude(Verdict.NO_SOLUTION)
+
+    # The others
+
+    def _update_agent_view(self, assignments: Assignments, sc: int) -> None:
+        """Believe the CPA of a later step; what could not be extended before is not consistent when it goes on."""
+        if sc <= self.sc:
+            return
+        self.sc = sc
+        self.value = None  # a robot above has taken another value since
+        if self.consistent or not begins(self.view, assignments):
+            self.view, self.consistent = assignments, True
+
+    def _forward_check(self) -> None:
+        """Filter the domain; if no value is left, tell all robots that may come to hold the CPA."""
+        self.domain.filter(self.view)
+        inconsistent = self.domain.inconsistent()
+        if inconsistent is None:
+            return
+        self.view, self.consistent = inconsistent, False
+        for robot in self.order.names[len(inconsistent) :]:
+            if robot != self.problem.agent:
+                self.send(robot, NotOk(inconsistent, self.sc))
+
+    def _process_not_ok(self, inconsistent: Assignments, sc: int) -> None:
+        """Believe it when it is about the view, or about a CPA as late; otherwise it is obsolete."""
+        if self.consistent or not begins(self.view, inconsistent):
+            if sc < self.sc and not begins(inconsistent, self.view):
+                return
+            self.view, self.consistent = inconsistent, False
+        self.sc = max(self.sc, sc)
+
+
+class FilteredDomain:
+    """The own values and what is known of them under a partial assignment, without a check done twice.
+
+    For each value that is ruled out it keeps how many robots it takes, from the first one on, to rule it out. A
+    partial assignment that begins like the last one leaves values alone that the common beginning rules out, and of
+    the others checks only constraints that reach below it.
+    """
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        self._problem = problem
+        self._order = order
+        self._assignments: Assignments = ()
+        self._ruled_out: list[int | None] = [None] * len(problem.values)
+
+    def filter(self, assignments: Assignments) -> None:
+        """Look at the values under `assignments`."""
+        if assignments == self._assignments:
+            return
+        common = agreement(assignments, self._assignments)
+        self._assignments = assignments
+        view = dict(zip(self._order.names, assignments, strict=False))
+        for index, depth in enumerate(self._ruled_out):
+            if depth is None or depth > common:
+                conflict = self._problem.conflict(index, view, common)
+                self._ruled_out[index] = None if conflict is None else self._order.depth(conflict) + 1
+
+    def first(self, place: int) -> int | None:
+        """The first value from `place` on that is left."""
+        return next((index for index in range(place, len(self._ruled_out)) if self._ruled_out[index] is None), None)
+
+    def inconsistent(self) -> Assignments | None:
+        """The shortest beginning of the assignments that rules out every value; None when one is left."""
+        depths = [depth for depth in self._ruled_out if depth is not None]
+        return None if len(depths) < len(self._ruled_out) else self._assignments[: max(depths, default=0)]
+
+
+def begins(beginning: Assignments, assignments: Assignments) -> bool:
+    """Whether `assignments` are `beginning` and perhaps more."""
+    return assignments[: len(beginning)] == beginning
+
+
+def agreement(left: Assignments, right: Assignments) -> int:
+    """For how many robots, from the first one on, two partial assignments name the same values."""
+    pairs = enumerate(zip(left, right, strict=False))
+    return next((place for place, (one, other) in pairs if one != other), min(len(left), len(right)))

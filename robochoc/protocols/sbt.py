@@ -1,0 +1,90 @@
+"""Synchronous Backtracking.
+
+Yokoo, Durfee, Ishida, Kuwabara: "The distributed constraint satisfaction problem: formalization and algorithms",
+IEEE TKDE 10(5), 1998, Section on synchronous backtracking (first in ICDCS 1992); as a baseline also in Zivan,
+Meisels: "Synchronous vs asynchronous search on DisCSPs", EUMAS 2003.
+
+Chronological backtracking, distributed: one current partial assignment (CPA) goes from robot to robot in priority
+order. Who holds it adds the first own value that agrees with it and sends it on; who has none left sends it back.
+One robot acts at a time, so no message is ever obsolete.
+
+Complete, synchronous, for satisfaction. Four things are left open: constraints may be n-ary (the lowest robot of the
+scope checks them, when it holds the CPA); the way back carries no assignments, for the robot before still has its
+own; a robot whose domain is empty from the start says so at once; the last robot concludes that a solution stands,
+since all others still hold the values that the CPA names.
+"""
+
+from __future__ import annotations
+
+from typing import assert_never, cast
+
+from robochoc.message import Message, Value
+from robochoc.outcome import Verdict
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import Traits
+from robochoc.solver.compiled import LocalProblem
+
+
+class CPA(Message, frozen=True):
+    """The current partial assignment: the values of all robots before the receiver, in priority order."""
+
+    assignments: tuple[Value, ...]
+
+
+class Backtrack(Message, frozen=True):
+    """Nobody below has a value left that goes with the receiver's: it has to take its next one."""
+
+
+class SBT(Protocol):
+    """One agent of synchronous backtracking. State: `cpa`, as it came last, and the value that was added to it."""
+
+    messages = CPA | Backtrack
+    traits = Traits(
+        paper="Yokoo et al. 1992, 1998; Zivan & Meisels 2003", synchronous=True, privacy="constraints of lower robots"
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.rank = order.rank[problem.agent]
+        self.cpa: tuple[Value, ...] = ()
+        self._view: dict[str, Value] = {}
+
+    def start(self) -> None:
+        """The first robot makes the CPA; the others wait for it."""
+        if not self.problem.values:
+            self.conclude(Verdict.NO_SOLUTION)
+        elif self.rank == 0:
+            self._assign(0)
+
+    def receive(self, sender: str, message: Message) -> None:  # noqa: ARG002 - only neighbours in the order speak
+        """Dispatch on the message's type."""
+        if self.verdict is not None:
+            return
+        match cast("CPA | Backtrack", message):
+            case CPA(assignments):
+                self.cpa = assignments
+                self._view = dict(zip(self.order.names, assignments, strict=False))
+                self._assign(0)
+            case Backtrack():
+                self._assign(0 if self.value is None else self.value + 1)
+            case never:
+                assert_never(never)
+
+    def _assign(self, first: int) -> None:
+        """Add the first value from place `first` on that agrees with the CPA, and send it on; none: send it back."""
+        candidates = range(first, len(self.problem.values))
+        self.value = next((index for index in candidates if self.problem.conflict(index, self._view) is None), None)
+        if self.value is None:
+            self._backtrack()
+        elif self.rank + 1 == len(self.order.names):
+            self.conclude(Verdict.SOLUTION)
+        else:
+            self.send(self.order.names[self.rank + 1], CPA((*self.cpa, self.problem.values[self.value])))
+
+    def _backtrack(self) -> None:
+        """The domain is exhausted: back to the robot before, of which the first has none."""
+        if self.rank == 0:
+            self.conclude(Verdict.NO_SOLUTION)
+        else:
+            self.send(self.order.names[self.rank - 1], Backtrack())
