@@ -38,7 +38,7 @@ class Journey:
     """A team on its way through its scenario, and through losses.
 
     `order` is the priority order asked for (None: the files'). `compile_` gives a team's compiled domains; `left_s`
-    says how many seconds there are left (None: no limit). Of the robots that are lost, `spares` come back: their
+    says how many seconds there are left, `messages` how many may be sent in all (None: no limit). Of the robots that are lost, `spares` come back: their
     files are read again, and they join at the end of the order. `withdrawn` names those that are out, and `regrets`
     says why somebody could not come back.
     """
@@ -49,6 +49,8 @@ class Journey:
         order: Sequence[str] | None,
         compile_: Compile,
         left_s: Callable[[], float | None],
+        *,
+        messages: int | None = None,
         spares: int = 0,
     ) -> None:
         self.team = replace(team, scenario=())
@@ -58,6 +60,7 @@ class Journey:
         self._order = order
         self._compile = compile_
         self._left_s = left_s
+        self._messages = messages
         self._spares = spares
 
     def arranged(self) -> Team:
@@ -71,19 +74,26 @@ class Journey:
         """
         for number in count():
             announce(number)
-            after = self._events[0].after if self._events else None
-            result = session.search(self._left_s(), after)
+            limits = [self._messages, self._events[0].after if self._events else None]
+            enough = min((limit for limit in limits if limit is not None), default=None)
+            result = session.search(self._left_s(), enough)
+            if self._messages is not None:
+                self._messages -= sum(result.metrics.messages.values())
             yield Played(self.team, result)
-            left_s = self._left_s()
             if result.lost:
                 new, fresh = self._after_loss(result.lost)
-            elif self._events and (result.verdict is not Verdict.UNKNOWN or left_s is None or left_s > 0):
+            elif self._events and not (result.verdict is Verdict.UNKNOWN and self._is_over):
                 new, fresh = self._after_event(self._events.popleft())
             else:
                 return
             if not new.robots:
                 return
             self._go_over(session, new, fresh)
+
+    @property
+    def _is_over(self) -> bool:
+        """Whether the time is over, or all messages have been sent."""
+        return self._left_s() == 0 or (self._messages is not None and self._messages <= 0)
 
     def _go_over(self, session: Session, new: Team, fresh: Collection[str]) -> None:
         before = self.arranged()

@@ -41,7 +41,7 @@ class OnLoss(StrEnum):
 
 @dataclass(frozen=True)
 class Options:
-    """How to run. `timeout` is in seconds of wall-clock time; `seed`, `schedule` and `delay` are the simulator's.
+    """How to run. `timeout` is in seconds of wall-clock time, `messages` a limit on their number; `seed`, `schedule` and `delay` are the simulator's.
 
     `delay` is the longest a message takes, in constraint checks. `local` limits the compilation of each robot's
     domain; `cache` says whether solutions of local problems are kept in the user's cache folder. `count` is for the
@@ -62,5 +62,6 @@ class Options:
     count: bool = False
     verify: bool = False
     order: Order | tuple[str, ...] | None = None
+    messages: int | None = None
     on_loss: OnLoss = OnLoss.FAIL
     spares: int = 0

@@ -102,7 +102,9 @@ class _Run:
         protocol = protocol_named(options.protocol)
         _refuse(self._team, options, protocol.traits)
         names = order_of(self._team, options.order, options.seed) if isinstance(options.order, Order) else options.order
-        journey = Journey(self._team, names, self._domains, self._left_s, options.spares)
+        journey = Journey(
+            self._team, names, self._domains, self._left_s, messages=options.messages, spares=options.spares
+        )
         try:
             return self._travel(journey, protocol)
         except (TooManySolutions, CompileTimeout, _TimeOver) as limit:

@@ -1,0 +1,249 @@
+"""Nogood-based Asynchronous Forward Checking (AFC-ng).
+
+Ezzahir, Bessiere, Wahbi, Benelallam, Bouyakhf: "Asynchronous inter-level forward-checking for DisCSPs", CP 2009;
+Wahbi, Ezzahir, Bessiere, Bouyakhf: "Nogood-based asynchronous forward checking algorithms", Constraints 18(3),
+2013, Section 3, whose names the methods bear:
+
+    Assign          `_assign`              Revise       `_revise`
+    SendCPA         `_send_cpa`            Backtrack    `_backtrack`
+    ProcessCPA      `_process_cpa`         Compatible   `_compatible`
+    ProcessNogood   `_process_nogood`      CheckAssign  `_check_assign`
+    UpdateAgentView `_update_agent_view`
+
+Complete, for satisfaction. A current partial assignment (CPA) grows along the priority order; its copies let lower
+robots check forward. A robot without values left tells the lowest robot among the causes, whoever holds the CPA, so
+several may backtrack at once; of the CPAs that follow, the strongest wins.
+
+In the paper a CPA goes to all lower robots, here to the next one and to those that share a constraint with its
+sender. That is enough: no other robot can check anything by it; whatever it says of higher robots is in later CPAs
+too, which are weighed by all counters; and the next robot, who alone may go on, misses none. It spares more than
+half of all messages where constraints are few.
+
+What the paper leaves open, or is settled otherwise here: messages are read by packets, and the view is revised once
+the inbox has been drained, so weak CPAs in a packet cost no checks; a CPA with the very counters of the view is not
+stronger (a late copy would erase what was assigned since); a value that has a nogood is not checked again, nor is a
+constraint with robots that all stand above the first one whose value has changed; constraints may be n-ary, and a
+nogood names only the variables that matter (see `abt`); a robot whose domain is empty says so when the search begins.
+
+The last robot's CPA is a solution, and all robots hold its values when it is found: the first leaves its value only
+for a nogood without a left side, which no value of a solution can get; the second only for that or a new CPA of the
+first, and so on. `Solved` tells them that they may be silent.
+
+>>> from robochoc.communication.schedule import Concurrent
+>>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(4), AFCng, Concurrent(seed=0)).run()
+>>> result.verdict.value, result.witness
+('no-solution', 'Robot1.1')
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import assert_never, cast
+
+from robochoc.message import Message, Value
+from robochoc.outcome import Verdict
+from robochoc.protocols.nogood import NogoodStore, contradicts
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import Traits
+from robochoc.solver.compiled import LocalProblem
+
+Assignment = tuple[Value, int]
+"""A robot's value, and the counter that says how many it has taken so far."""
+
+
+class CPA(Message, frozen=True):
+    """The current partial assignment: what all robots from the highest down to the sender have taken (`cpa`)."""
+
+    assignments: list[Assignment]
+
+
+class Nogood(Message, frozen=True):
+    """While all of `lhs` stands, the receiver cannot take `value` (`ngd`)."""
+
+    lhs: dict[str, Value]
+    value: Value
+
+
+class Solved(Message, frozen=True):
+    """A solution has been found, and the search is over (`stp`)."""
+
+    solution: dict[str, Value]
+
+
+class AFCng(Protocol):
+    """One agent of AFC-ng. State: `view` and its `counters` (AgentView), `store` (NogoodStore), `counter` (t_i).
+
+    `above` are the robots whose values a CPA tells, the highest first; the view knows the first few of them.
+    `successors` may take a value once this robot has one, and `told` are all who get its CPAs. For each own value,
+    `checked` is the place in the order down to which all constraints are known to hold in the view.
+    """
+
+    messages = CPA | Nogood | Solved
+    traits = Traits(
+        paper="Ezzahir et al. 2009; Wahbi, Ezzahir, Bessiere, Bouyakhf 2013", privacy="constraints of lower robots"
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.above = self._above()
+        self.successors = self._successors()
+        self.told = [*self.successors, *(child for child in problem.children if child not in self.successors)]
+        self.view: dict[str, Value] = {}
+        self.counters = [0] * len(self.above)
+        self.counter = 0
+        self.store = NogoodStore(order, len(problem.values))
+        self.checked = [0] * len(problem.values)
+        self.solved = False
+
+    def start(self) -> None:
+        """The first robot takes a value; who has none at all ends the search."""
+        self.settle()
+
+    def receive(self, sender: str, message: Message) -> None:  # noqa: ARG002 - a CPA says itself who has sent it
+        """Dispatch on the message's type."""
+        if self.over:
+            return
+        match cast("CPA | Nogood | Solved", message):
+            case CPA(assignments):
+                self._process_cpa(assignments)
+            case Nogood() as nogood:
+                self._process_nogood(nogood)
+            case Solved(solution):
+                self._process_solved(solution)
+            case never:
+                assert_never(never)
+
+    def settle(self) -> None:
+        """The inbox is empty: check forward, then go back or on."""
+        if not self.over:
+            self._revise()
+            self._check_assign()
+
+    @property
+    def over(self) -> bool:
+        """Whether this robot knows how the search ended, and so is silent."""
+        return self.solved or self.verdict is not None
+
+    # What the messages do
+
+    def _process_cpa(self, assignments: Sequence[Assignment]) -> None:
+        """Take in a CPA that is stronger than the view: the first counter that differs is larger."""
+        counters = [counter for _, counter in assignments]
+        if counters <= self.counters[: len(counters)]:
+            return
+        self.counters[: len(counters)] = counters
+        self._update_agent_view([value for value, _ in assignments])
+        self.value = None
+
+    def _process_nogood(self, nogood: Nogood) -> None:
+        """Accept a nogood that agrees with the view; otherwise it is obsolete."""
+        if not self._compatible(nogood.lhs):
+            return
+        for index in self.problem.alike(nogood.value):
+            self.store.add(index, nogood.lhs)
+        if self.value is not None and self.store[self.value] is not None:
+            self.value = None
+
+    def _process_solved(self, solution: Mapping[str, Value]) -> None:
+        (self.value,) = self.problem.alike(solution[self.problem.agent])
+        self.solved = True
+
+    # The search
+
+    def _check_assign(self) -> None:
+        """No value is left: back; the CPA is here and waits for a value: on."""
+        if next(self._left(), None) is None:
+            self._backtrack()
+        elif self.value is None and len(self.view) == len(self.above):
+            self._assign()
+
+    def _assign(self) -> None:
+        """Take the first value that is left, and hand the CPA on."""
+        self.value = next(self._left())
+        self.counter += 1
+        self._send_cpa((self.problem.values[self.value], self.counter))
+        self._detect_solution()
+
+    def _send_cpa(self, own: Assignment) -> None:
+        cpa = CPA([*zip(self.view.values(), self.counters, strict=True), own])
+        for robot in self.told:
+            self.send(robot, cpa)
+
+    def _detect_solution(self) -> None:
+        """Once the lowest robot has a value, the CPA is a solution."""
+        if not self.successors and self.value is not None:
+            self._stop({**self.view, self.problem.agent: self.problem.values[self.value]})
+
+    def _stop(self, solution: dict[str, Value]) -> None:
+        """Tell `solution` to all robots in it."""
+        self.solved = True
+        for robot in solution:
+            if robot != self.problem.agent:
+                self.send(robot, Solved(solution))
+
+    def _backtrack(self) -> None:
+        """Resolve the stored nogoods, one for each value; tell the lowest robot among their causes, and wait for it."""
+        lhs = self.store.resolve()
+        if not lhs:
+            self.conclude(Verdict.NO_SOLUTION)
+            return
+        culprit = self.order.lowest(lhs)
+        value = lhs.pop(culprit)
+        self.send(culprit, Nogood(lhs, value))
+        self._update_agent_view(list(self.view.values())[: self.above.index(culprit)])
+        self.value = None
+
+    def _revise(self) -> None:
+        """Rule out all values that the view forbids, each by the highest possible lowest robot.
+
+        Values are taken in the order of what is known of them, so that large domains are looked up at one go.
+        """
+        depth = self._depth()
+        for index in sorted(self._left(), key=self.checked.__getitem__):
+            if self.checked[index] == depth:
+                break
+            conflict = self.problem.conflict(index, self.view, since=self.checked[index])
+            if conflict is None:
+                self.checked[index] = depth
+            else:
+                self.store.add(index, conflict)
+                self.checked[index] = self.order.depth(conflict)
+
+    def _left(self) -> Iterator[int]:
+        """The values that no nogood rules out."""
+        return (index for index in range(len(self.problem.values)) if self.store[index] is None)
+
+    # The view
+
+    def _update_agent_view(self, values: Sequence[Value]) -> None:
+        """Know `values` of the highest robots, and nothing of the others; nogoods that rest on others go."""
+        old = self.view
+        self.view = dict(zip(self.above, values, strict=False))
+        changed = [agent for agent in self.above if old.get(agent) != self.view.get(agent)]
+        for agent in changed:
+            if agent in old:
+                self.store.forget(agent, self.view.get(agent))
+        if changed:
+            first = self.order.rank[changed[0]]
+            self.checked = [min(place, first) for place in self.checked]
+
+    def _compatible(self, lhs: Mapping[str, Value]) -> bool:
+        return all(agent in self.view and not contradicts(value, self.view[agent]) for agent, value in lhs.items())
+
+    def _depth(self) -> int:
+        """The place in the order of the first robot that the view does not know; the own one when it is complete."""
+        known = len(self.view)
+        return self.order.rank[self.above[known]] if known < len(self.above) else self._rank
+
+    def _above(self) -> Sequence[str]:
+        return self.order.names[: self._rank]
+
+    def _successors(self) -> Sequence[str]:
+        return self.order.names[self._rank + 1 : self._rank + 2]
+
+    @property
+    def _rank(self) -> int:
+        return self.order.rank[self.problem.agent]
