@@ -37,10 +37,10 @@ class Played(NamedTuple):
 class Journey:
     """A team on its way through its scenario, and through losses.
 
-    `order` is the priority order asked for (None: the files'). `compile_` gives a team's compiled domains; `left_s`
-    says how many seconds there are left, `messages` how many may be sent in all (None: no limit). Of the robots that are lost, `spares` come back: their
-    files are read again, and they join at the end of the order. `withdrawn` names those that are out, and `regrets`
-    says why somebody could not come back.
+    `order` is the priority order asked for (None: the files'). `compile_` gives a team's compiled domains. `left_s`
+    says how many seconds there are left, `messages` how many may be sent in all (None: no limit). Of the robots that
+    are lost, `spares` come back: their files are read again, and they join at the end of the order. `withdrawn` names
+    those that are out, and `regrets` says why somebody could not come back.
     """
 
     def __init__(

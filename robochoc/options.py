@@ -41,13 +41,15 @@ class OnLoss(StrEnum):
 
 @dataclass(frozen=True)
 class Options:
-    """How to run. `timeout` is in seconds of wall-clock time, `messages` a limit on their number; `seed`, `schedule` and `delay` are the simulator's.
+    """How to run.
 
-    `delay` is the longest a message takes, in constraint checks. `local` limits the compilation of each robot's
-    domain; `cache` says whether solutions of local problems are kept in the user's cache folder. `count` is for the
-    central judge: the number of all solutions. `verify` asks for a second opinion on a `no-solution`. `order` is the
-    robots' total priority order, by name or as the list of them; None: the files'. `seed` is also `Order.RANDOM`'s.
-    With `on_loss` set to withdraw, robots whose processes end leave the problem; up to `spares` of them come back.
+    `timeout` is in seconds of wall-clock time, `messages` a limit on their number. `seed`, `schedule` and `delay` are
+    the simulator's; `delay` is the longest a message takes, in constraint checks. `order` is the robots' total
+    priority order, by name or as the list of them (None: the files'); `seed` is `Order.RANDOM`'s too. `local` limits
+    the compilation of each robot's domain; `cache` says whether solutions of local problems are kept in the user's
+    cache folder. `count` is for the central judge: the number of all solutions. `verify` asks for a second opinion on
+    a `no-solution`. With `on_loss` set to withdraw, robots whose processes end leave the problem; up to `spares` of
+    them come back.
     """
 
     protocol: str = "abt"
