@@ -7,6 +7,7 @@ is for others.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 from typing import assert_never
 
@@ -55,6 +56,19 @@ def changed(team: Team, changes: Iterable[Change]) -> Team:
             case never:
                 assert_never(never)
     return team
+
+
+def changed_by(team: Team, events: int) -> Team:
+    """`team` after so many events of its scenario; changes that it cannot take, of robots that are lost, are left out.
+
+    It has no scenario any more.
+    """
+    now = replace(team, scenario=())
+    for event in team.scenario[:events]:
+        for change in event.changes:
+            with suppress(BadChange):
+                now = changed(now, [change])
+    return now
 
 
 def without(team: Team, names: Iterable[str]) -> Team:

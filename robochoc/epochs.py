@@ -20,7 +20,7 @@ from robochoc.communication.session import Epoch, Session
 from robochoc.formats import InvalidInput, read_robot
 from robochoc.orders import reordered
 from robochoc.outcome import Verdict
-from robochoc.problem import AddAgent, Event, Team
+from robochoc.problem import AddAgent, Event, RemoveAgent, Team
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.explanation import Void, void
 
@@ -115,6 +115,8 @@ class Journey:
             except BadChange:
                 if not self.withdrawn:
                     raise
+                if isinstance(change, RemoveAgent):  # it was lost, and now it has left
+                    self.withdrawn = [name for name in self.withdrawn if name != change.name]
                 continue
             if isinstance(change, AddAgent):
                 fresh.add(change.robot.name)

@@ -88,3 +88,8 @@ class Outcome:
     """The number of solutions, where it was asked for."""
     epochs: tuple[Epoch, ...] = ()
     """What happened in each epoch; empty where there was but one, as nothing changed."""
+
+    @property
+    def events(self) -> int:
+        """How many events of the scenario have happened: they, and losses, open epochs."""
+        return sum(not epoch.lost for epoch in self.epochs[:-1])

@@ -33,6 +33,7 @@ NEXT_STEP = "give what 'robochoc solve --json' or '--journal' wrote"
 @invalid_input_fails
 def animate(saved: Path, output: Path | None, folder: Path | None, port: int, *, serve: bool) -> None:
     """Make the 3D scene of what `robochoc solve --json` printed, or of the journal that `--journal` wrote."""
+    from robochoc.change import changed_by
     from robochoc.cli.scene import serve_scene, write_page
     from robochoc.formats import read_team
     from robochoc.view.scene import scene_of
@@ -43,7 +44,7 @@ def animate(saved: Path, output: Path | None, folder: Path | None, port: int, *,
         raise click.UsageError("--port is for --serve")
     outcome = _outcome(saved)
     folder = folder or _usual_folder(outcome)
-    team = read_team(folder) if folder else None
+    team = changed_by(read_team(folder), outcome.events) if folder else None
     if team and not (team.variables.keys() >= outcome.assignment.keys() and {*team.order} >= {*outcome.withdrawn}):
         raise Failure(
             INVALID, f"{folder}: this is not the team of {saved}, {outcome.team} (give its folder with --team)"

@@ -4,10 +4,24 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from typing import assert_never
 
+from robochoc.change import changed_by
 from robochoc.formats import on_one_line
+from robochoc.formats.diagnostics import shortened
 from robochoc.outcome import Metrics, Outcome, Verdict
-from robochoc.problem import Team, natural
+from robochoc.problem import (
+    AddAgent,
+    AddConstraint,
+    AddValue,
+    Change,
+    Event,
+    RemoveAgent,
+    RemoveConstraint,
+    RemoveValue,
+    Team,
+    natural,
+)
 
 WIDTH = 100
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
@@ -15,7 +29,8 @@ _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 
 def report(team: Team, outcome: Outcome) -> str:
     """The verdict, why, where everybody flies, and what it cost, in a few lines."""
-    lines = [f"{on_one_line(outcome.team)}: {_verdict(outcome)}"]
+    lines = [f"{on_one_line(outcome.team)}: {_verdict(outcome)}", *_epochs(team, outcome)]
+    team = changed_by(team, outcome.events)
     if outcome.assignment:
         lines += _board(team, outcome.assignment) or _list(team, outcome.assignment)
     if outcome.withdrawn:
@@ -24,6 +39,52 @@ def report(team: Team, outcome: Outcome) -> str:
         lines += _wrapped(outcome.withdrawn)
     lines.append(f"  {outcome.protocol}, {_place(team, outcome)}: {_metrics(outcome)}")
     return "\n".join(lines)
+
+
+def _epochs(team: Team, outcome: Outcome) -> list[str]:
+    """A line for each epoch: what opened it, and how it ended."""
+    if not outcome.epochs:
+        return []
+    rows = [("epoch", "opened by", "robots", "verdict", "messages", "NCCCs")]
+    events = iter(team.scenario)
+    opened = "the start"
+    for number, epoch in enumerate(outcome.epochs):
+        verdict = f"{epoch.verdict}{', confirmed' * (epoch.verified and epoch.verdict is Verdict.NO_SOLUTION)}"
+        sent = sum(epoch.metrics.messages.values())
+        robots = len(epoch.robots)
+        rows.append((f"{number}", opened, f"{robots}", verdict, f"{sent:,}", f"{epoch.metrics.ncccs:,}"))
+        after_loss = f"the loss of {shortened(', '.join(epoch.lost))}"
+        opened = after_loss if epoch.lost else _said(next(events, None))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    numbers = {0, 2, 4, 5}
+    return [
+        "  " + "  ".join(f"{cell:{'>' if place in numbers else '<'}{widths[place]}}" for place, cell in enumerate(row))
+        for row in rows
+    ]
+
+
+def _said(event: Event | None) -> str:
+    """An event in a few words."""
+    words = [_change_said(change) for change in event.changes] if event else []
+    return shortened(on_one_line(", ".join(words))) or "nothing"
+
+
+def _change_said(change: Change) -> str:
+    match change:
+        case RemoveAgent(name):
+            return f"-{name}"
+        case AddAgent(robot):
+            return f"+{robot.name}"
+        case RemoveValue(variable, value):
+            return f"{variable} without {value}"
+        case AddValue(variable, value):
+            return f"{variable} with {value}"
+        case AddConstraint(agent, parent, constraint):
+            return f"+{constraint.name} ({parent}, {agent})"
+        case RemoveConstraint(agent, parent, name):
+            return f"-{name} ({parent}, {agent})"
+        case never:
+            assert_never(never)
 
 
 def _place(team: Team, outcome: Outcome) -> str:
@@ -37,20 +98,24 @@ def _place(team: Team, outcome: Outcome) -> str:
 
 
 def _verdict(outcome: Outcome) -> str:
-    why = outcome.reason or (f"{outcome.witness} has derived the empty nogood" if outcome.witness else "")
-    proof = f"no solution ({why})" if why else "no solution"
+    why = outcome.witness and f"{outcome.witness} has derived the empty nogood"
+    if outcome.reason and not outcome.epochs:
+        why = outcome.reason
+    lost = {name for epoch in outcome.epochs for name in epoch.lost}.intersection(outcome.withdrawn)
+    left = f" for the robots that are left, without {shortened(', '.join(sorted(lost, key=natural)))}" if lost else ""
     match outcome.verdict:
         case Verdict.NO_SOLUTION:
+            proof = f"no solution{left} ({why})" if why else f"no solution{left}"
             return f"{proof}, confirmed centrally" if outcome.verified else proof
         case Verdict.UNKNOWN:
-            return f"unknown: {outcome.reason or 'the time was over before a verdict'}"
+            return f"unknown: {outcome.reason or 'a limit was reached before a verdict'}"
         case _ if outcome.count is not None:
             return f"{outcome.count:,} solution{'s' * (outcome.count != 1)}"
-        case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.withdrawn:
+        case Verdict.SOLUTION | Verdict.OPTIMAL if lost.issuperset(outcome.withdrawn):
+            return f"{outcome.verdict}{left}, checked against every constraint"
+        case Verdict.SOLUTION | Verdict.OPTIMAL:
             who = "some step" if outcome.assignment else "all step"
             return f"no solution for the whole team ({why}); {who} aside, checked against every constraint"
-        case Verdict.SOLUTION | Verdict.OPTIMAL:
-            return f"{outcome.verdict}, checked against every constraint"
 
 
 def _metrics(outcome: Outcome) -> str:

@@ -1,0 +1,249 @@
+"""Asynchronous Weak-Commitment search.
+
+Yokoo: "Asynchronous weak-commitment search for solving distributed constraint satisfaction problems", CP 1995;
+Yokoo, Durfee, Ishida, Kuwabara: "The distributed constraint satisfaction problem: formalization and algorithms",
+IEEE TKDE 10(5), 1998, Section 5, whose names the methods bear:
+
+    check_agent_view   `_check_agent_view`     received (ok?, ...)      `_received_ok`
+    backtrack          `_backtrack`            received (nogood, ...)   `_received_nogood`
+
+Complete, asynchronous, for satisfaction. A robot keeps to what robots of higher priority say, and takes the value
+with the fewest conflicts with the others. At a dead end it tells the nogood to all robots in it and raises its
+priority above all its neighbours', so that a bad choice above is left without an exhaustive search below. Priority
+changes only with a new nogood. **All nogoods are kept, so that search ends; the space is exponential.**
+
+Why it ends, and right: there are finitely many nogoods, and each robot says each only once, so from some moment on
+no priority changes, and then values settle from the highest priority downwards. When nobody speaks any more, whoever
+is at a dead end has said its nogood before; all robots in it know it and each other's values, so the lowest of them
+is at a dead end itself, higher up; of those the highest would have found the empty nogood.
+
+What the papers leave open: constraints and nogoods may be over many robots; the lowest at present answers for them,
+so all of a scope have to know the constraint and each other's values. A nogood is new if this robot has never sent
+it. The conflicts to be minimised are broken constraints (each look counts as a check) and nogoods that stand (not
+counted); of equals the first in the domain is taken. Against each value the shortest nogood that stands goes into the
+new nogood, or else the first broken constraint. Of robots with several variables, a nogood names only those that
+matter. Messages are read by packets. That nobody speaks any more, and so a solution stands, is for the runtime to see.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, assert_never, cast
+
+from robochoc.message import Message, Value
+from robochoc.outcome import Verdict
+from robochoc.protocols.nogood import LeftSide, joined
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import Traits
+from robochoc.solver.compiled import LocalProblem
+
+
+class Ok(Message, frozen=True):
+    """The sender's value and its present priority, told to all neighbours (`ok?`)."""
+
+    value: Value
+    priority: int
+
+
+class Nogood(Message, frozen=True):
+    """These assignments, one of which is the receiver's, cannot all stand; with the priorities last heard of."""
+
+    nogood: dict[str, tuple[Value, int]]
+
+
+class AddLink(Message, frozen=True):
+    """A nogood has made the sender and the receiver neighbours: each tells the other its value from now on."""
+
+
+class Kept(NamedTuple):
+    """A nogood as one of its robots keeps it: what the others say, and the own value that does not go with it."""
+
+    others: LeftSide
+    own: Value
+
+
+def stands(value: Value, told: Value | None) -> bool:
+    """Whether `told` is known to be as `value` says, wherever that is not None."""
+    return told is not None and all(part is None or part == known for part, known in zip(value, told, strict=True))
+
+
+class NogoodList:
+    """All nogoods received. Each waits at one assignment that does not stand, and is not looked at before it does."""
+
+    def __init__(self) -> None:
+        self._known: set[frozenset[tuple[str, Value]]] = set()
+        self._waiting: dict[str, dict[Value, list[Kept]]] = {}
+        self._awake: list[Kept] = []
+
+    def add(self, agent: str, nogood: dict[str, Value]) -> None:
+        """Keep `nogood`, which names `agent`, whose list this is."""
+        key = frozenset(nogood.items())
+        if key not in self._known:
+            self._known.add(key)
+            own = nogood.pop(agent)
+            self._awake.append(Kept(nogood, own))
+
+    def told(self, agent: str, value: Value) -> None:
+        """`agent` has taken `value`: wake those that waited for it."""
+        waiting = self._waiting.get(agent, {})
+        for part in [part for part in waiting if stands(part, value)]:
+            self._awake += waiting.pop(part)
+
+    def standing(self, view: LeftSide) -> list[Kept]:
+        """Those whose others all say in `view` what the nogood says of them."""
+        awake = []
+        for kept in self._awake:
+            missing = next((agent for agent, value in kept.others.items() if not stands(value, view.get(agent))), None)
+            if missing is None:
+                awake.append(kept)
+            else:
+                self._waiting.setdefault(missing, {}).setdefault(kept.others[missing], []).append(kept)
+        self._awake = awake
+        return awake
+
+
+class AWC(Protocol):
+    """One agent of AWC. State: `view` (agent_view) and `priorities` of others, `nogoods`, own `priority`."""
+
+    messages = Ok | Nogood | AddLink
+    traits = Traits(paper="Yokoo 1995; Yokoo et al. 1998", everywhere=True)
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.view: dict[str, Value] = {}
+        self.priorities: dict[str, int] = {}
+        self.priority = 0
+        self.neighbours = list(problem.neighbours)
+        self.nogoods = NogoodList()
+        self.sent: set[frozenset[tuple[str, Value]]] = set()
+        self._alike: dict[Value, list[int]] = {}
+        self._higher: dict[str, Value] = {}
+        self._standing: list[list[LeftSide]] = []
+        self._conflicts: dict[int, LeftSide | None] = {}
+
+    def start(self) -> None:
+        """Choose a first value and tell it."""
+        self._check_agent_view()
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        if self.verdict is not None:
+            return
+        match cast("Ok | Nogood | AddLink", message):
+            case Ok(value, priority):
+                self._received_ok(sender, value, priority)
+            case Nogood(nogood):
+                self._received_nogood(nogood)
+            case AddLink():
+                self._add_neighbour(sender)
+            case never:
+                assert_never(never)
+
+    def settle(self) -> None:
+        """The inbox is empty: check the view."""
+        if self.verdict is None:
+            self._check_agent_view()
+
+    # What the messages do
+
+    def _received_ok(self, agent: str, value: Value, priority: int) -> None:
+        self.view[agent] = value
+        self.priorities[agent] = priority
+        self.nogoods.told(agent, value)
+
+    def _received_nogood(self, nogood: dict[str, tuple[Value, int]]) -> None:
+        """Keep it; robots in it that are no neighbours become ones, and meanwhile it is believed about them."""
+        for agent, (value, priority) in nogood.items():
+            if agent != self.problem.agent and agent not in self.neighbours:
+                self.send(agent, AddLink())
+                self._add_neighbour(agent)
+                self._received_ok(agent, value, priority)
+        self.nogoods.add(self.problem.agent, {agent: value for agent, (value, _) in nogood.items()})
+
+    def _add_neighbour(self, agent: str) -> None:
+        if agent not in self.neighbours:
+            self.neighbours.append(agent)
+        self.send(agent, self._ok())
+
+    # The search
+
+    def _check_agent_view(self) -> None:
+        """Keep the value if all higher robots allow it, else take another that they allow, else backtrack."""
+        self._look_up()
+        if self.value is not None and self._reason(self.value) is None:
+            return
+        allowed = self._allowed()
+        if allowed:
+            self._take(allowed)
+        else:
+            self._backtrack()
+
+    def _backtrack(self) -> None:
+        """Tell the robots that leave no value, unless they have been told before; then go above all neighbours."""
+        nogood: dict[str, Value] = {}
+        for index in range(len(self.problem.values)):
+            for agent, value in (self._reason(index) or {}).items():
+                nogood[agent] = joined(nogood.get(agent), value)
+        if not nogood:
+            self.conclude(Verdict.NO_SOLUTION)
+            return
+        key = frozenset(nogood.items())
+        if key in self.sent:
+            return
+        self.sent.add(key)
+        told = Nogood({agent: (value, self.priorities[agent]) for agent, value in nogood.items()})
+        for agent in nogood:
+            self.send(agent, told)
+        self.priority = 1 + max(self.priorities.values())
+        self._look_up()
+        self._take(self._allowed())
+
+    def _take(self, allowed: list[int]) -> None:
+        """Take the value with the fewest conflicts, the first of equals, and tell all neighbours."""
+        self.value = allowed[0] if len(allowed) == 1 else min(allowed, key=self._violations)
+        for agent in self.neighbours:
+            self.send(agent, self._ok())
+
+    def _violations(self, index: int) -> int:
+        """How many constraints and nogoods the value at `index` breaks, whatever the priorities."""
+        return self.problem.violated(index, self.view) + len(self._standing[index])
+
+    def _allowed(self) -> list[int]:
+        return [index for index in range(len(self.problem.values)) if self._reason(index) is None]
+
+    def _reason(self, index: int) -> LeftSide | None:
+        """What higher robots say against the value at `index`: the shortest nogood, else a broken constraint."""
+        against = [others for others in self._standing[index] if others.keys() <= self._higher.keys()]
+        if against:
+            return min(against, key=len)
+        if index not in self._conflicts:
+            self._conflicts[index] = self.problem.conflict(index, self._higher)
+        return self._conflicts[index]
+
+    # The view
+
+    def _look_up(self) -> None:
+        """See who is higher now and which nogoods stand; forget the conflicts with what has changed."""
+        higher = {agent: value for agent, value in self.view.items() if self._is_higher(agent)}
+        if higher != self._higher:
+            self._conflicts = {
+                index: conflict
+                for index, conflict in self._conflicts.items()
+                if conflict is not None and all(higher.get(agent) == self._higher[agent] for agent in conflict)
+            }
+            self._higher = higher
+        self._standing = [[] for _ in self.problem.values]
+        for others, own in self.nogoods.standing(self.view):
+            if own not in self._alike:
+                self._alike[own] = list(self.problem.alike(own))
+            for index in self._alike[own]:
+                self._standing[index].append(others)
+
+    def _is_higher(self, agent: str) -> bool:
+        """Whether `agent` has higher priority than this robot; of equals, who comes first in the static order."""
+        other = (-self.priorities[agent], self.order.rank[agent])
+        return other < (-self.priority, self.order.rank[self.problem.agent])
+
+    def _ok(self) -> Ok:
+        assert self.value is not None  # noqa: S101 - chosen at the start, and only ever exchanged for another
+        return Ok(self.problem.values[self.value], self.priority)
