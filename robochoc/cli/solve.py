@@ -24,16 +24,17 @@ WITHDRAWALS = ("maximal",)
 
 
 class SolveCommand(click.Command):
-    """Lets `--withdraw` stand alone: the word after it is its value only when it is one."""
+    """Lets `--withdraw` and `--spare` stand alone: the word after them is their value only when it can be one."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Give a bare `--withdraw` its value."""
+        """Give a bare option its value."""
         plain = args.index("--") if "--" in args else len(args)
         for place, word in enumerate(args[:plain]):
-            if word == "--withdraw" and args[place + 1 : place + 2] not in (
-                [known] for known in (*WITHDRAWALS, "fewest")
-            ):
+            following = args[place + 1] if place + 1 < len(args) else ""
+            if word == "--withdraw" and following not in (*WITHDRAWALS, "fewest"):
                 args = [*args[:place], f"--withdraw={WITHDRAWALS[0]}", *args[place + 1 :]]
+            elif word == "--spare" and not following.isdecimal():
+                args = [*args[:place], "--spare=1", *args[place + 1 :]]
         return super().parse_args(ctx, args)
 
 
@@ -95,6 +96,31 @@ class Products:
         " without a word): nobody who stepped aside could be added; fewer might do."
     ),
 )
+@click.option(
+    "--messages",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Give up after (about) so many messages: verdict unknown, exit status 3.",
+)
+@click.option(
+    "--on-loss",
+    type=click.Choice(["fail", "withdraw"]),
+    help=(
+        "When a robot's process dies. fail: the run ends, exit status 4 (the default); withdraw: the robot leaves the"
+        " problem with its constraints, the others go on."
+    ),
+)
+@click.option(
+    "--spare",
+    "spares",
+    type=click.IntRange(0),
+    default=0,
+    metavar="[=N]",
+    help=(
+        "N robots that die (1, without a number) come back: their files are read again, and they join at the end of"
+        " the order. Implies --on-loss withdraw."
+    ),
+)
 @click.option("--count", is_flag=True, help="With --protocol central: count all solutions.")
 @click.option(
     "--verify",
@@ -132,16 +158,18 @@ def solve(
 
     Every solution is held against every constraint of every file before it is told.
     """
-    from robochoc.run import Options, Runtime, ScheduleName, Withdrawal
+    from robochoc.run import OnLoss, Options, Runtime, ScheduleName, Withdrawal
 
     _check_settings(settings)
     withdraw = settings.pop("withdraw")
+    on_loss = settings.pop("on_loss") or ("withdraw" if settings["spares"] else "fail")
     options = Options(
         local=limits(settings.pop("local_solutions"), settings.pop("local_timeout")),
         cache=not settings.pop("no_cache"),
         runtime=Runtime(settings.pop("runtime")),
         schedule=ScheduleName(settings.pop("schedule")),
         withdraw=Withdrawal(withdraw) if withdraw else None,
+        on_loss=OnLoss(on_loss),
         **settings,
     )
     folders, statuses = _teams(paths)
@@ -164,6 +192,12 @@ def _check_settings(settings: dict[str, Any]) -> None:
     if settings["timeout"] is not None and not settings["timeout"] > 0:
         raise click.UsageError("--timeout takes a number of seconds")
     central = settings["protocol"] == "central"
+    if (settings["on_loss"] or settings["spares"]) and (central or settings["runtime"] != "processes"):
+        raise click.UsageError("--on-loss and --spare are for processes, which can die")
+    if settings["spares"] and settings["on_loss"] == "fail":
+        raise click.UsageError("--spare brings robots back that died; --on-loss fail ends the run instead")
+    if central and settings["messages"]:
+        raise click.UsageError("--messages is for robots that solve it together, not for --protocol central")
     if settings["count"] and not central:
         raise click.UsageError("--count is for --protocol central")
     if central and settings["withdraw"]:
