@@ -63,7 +63,7 @@ def changed_by(team: Team, events: int) -> Team:
 
     It has no scenario any more.
     """
-    now = replace(team, scenario=())
+    now = replace(team, scenario=()) if team.scenario else team
     for event in team.scenario[:events]:
         for change in event.changes:
             with suppress(BadChange):

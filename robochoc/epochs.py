@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import NamedTuple
 
-from robochoc.change import BadChange, changed, rejoined, without
+from robochoc.change import BadChange, changed, changed_by, rejoined, without
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.formats import InvalidInput, read_robot
@@ -53,7 +52,7 @@ class Journey:
         messages: int | None = None,
         spares: int = 0,
     ) -> None:
-        self.team = replace(team, scenario=())
+        self.team = changed_by(team, events=0)
         self.withdrawn: list[str] = []
         self.regrets: list[str] = []
         self._events = deque(team.scenario)

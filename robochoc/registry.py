@@ -3,15 +3,30 @@
 from __future__ import annotations
 
 import difflib
-from importlib.metadata import entry_points
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
 
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import Traits
 
 GROUP = "robochoc.protocols"
 
 
 class UnknownProtocol(LookupError):  # noqa: N818 - named for what was asked for
-    """No installed package offers a protocol of that name."""
+    """No installed package offers a protocol of that name, or what it offers cannot be used."""
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What the package `package` offers as the protocol `name`: the class at `place`, or why there is none."""
+
+    name: str
+    place: str
+    """Module and class, as the package names them: `robochoc.protocols.abt:ABT`."""
+    package: str
+    protocol: type[Protocol] | None
+    broken: str = ""
+    """Why it cannot be used; empty when it can."""
 
 
 def protocol_names() -> tuple[str, ...]:
@@ -19,15 +34,41 @@ def protocol_names() -> tuple[str, ...]:
     return tuple(sorted(entry.name for entry in entry_points(group=GROUP)))
 
 
-def protocol_named(name: str) -> type[Protocol]:
-    """The class of the protocol called `name`. Raises `UnknownProtocol`, which names those there are."""
+def offers() -> tuple[Offer, ...]:
+    """All that installed packages offer, by name; what cannot be used too, with the reason."""
+    return tuple(_offer(entry) for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name))
+
+
+def offer_named(name: str) -> Offer:
+    """What is offered as `name`. Raises `UnknownProtocol`, which names those there are."""
     found = list(entry_points(group=GROUP, name=name))
     if not found:
         names = protocol_names()
         near = difflib.get_close_matches(name, names, 1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise UnknownProtocol(f"no protocol {name!r} is installed, only: {', '.join(names)}{hint}")
-    loaded = found[0].load()
+    return _offer(found[0])
+
+
+def protocol_named(name: str) -> type[Protocol]:
+    """The class of the protocol called `name`. Raises `UnknownProtocol`, which names those there are."""
+    offer = offer_named(name)
+    if offer.protocol is None:
+        raise UnknownProtocol(f"{offer.place}, installed as protocol {name!r}, {offer.broken}")
+    return offer.protocol
+
+
+def _offer(entry: EntryPoint) -> Offer:
+    """What stands behind `entry`: code of whoever wrote the package, which may fail in any way."""
+    package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "unknown"
+    try:
+        loaded = entry.load()
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - one broken package must not hide the others
+        reason = f"cannot be imported: {type(error).__name__}: {error}"
+        return Offer(entry.name, entry.value, package, None, reason)
     if not (isinstance(loaded, type) and issubclass(loaded, Protocol)):
-        raise UnknownProtocol(f"{found[0].value}, installed as protocol {name!r}, is no subclass of Protocol")
-    return loaded
+        return Offer(entry.name, entry.value, package, None, "is no subclass of Protocol")
+    traits: object = loaded.traits
+    if not isinstance(traits, Traits):
+        return Offer(entry.name, entry.value, package, None, "declares traits that are no Traits")
+    return Offer(entry.name, entry.value, package, loaded)

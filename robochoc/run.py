@@ -9,7 +9,7 @@ from typing import TypedDict, assert_never
 
 from msgspec import UNSET
 
-from robochoc.change import changed
+from robochoc.change import changed, changed_by
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress
 from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
@@ -205,7 +205,7 @@ class _Run:
         """One model of all files, decided by ACE; if the problem changes over time, one for each epoch."""
         _refuse(self._team, self._options, Traits(partially_known=True))
         self._outcome = replace(self._outcome, runtime=CENTRAL)
-        team = replace(self._team, scenario=())
+        team = changed_by(self._team, events=0)
         count = None
         for event in (None, *self._team.scenario):
             team = changed(team, event.changes) if event else team

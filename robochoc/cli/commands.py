@@ -12,6 +12,7 @@ from robochoc.cli.cache import cache
 from robochoc.cli.compile import compile_team
 from robochoc.cli.export import export
 from robochoc.cli.generate import generate
+from robochoc.cli.protocols import protocols
 from robochoc.cli.solve import solve
 from robochoc.cli.validate import validate
 
@@ -42,7 +43,7 @@ def cli() -> None:
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
 
 
-for command in (solve, validate, generate, animate, compile_team, export, cache):
+for command in (solve, validate, generate, animate, compile_team, export, cache, protocols):
     cli.add_command(command)
 
 

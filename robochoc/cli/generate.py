@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -47,3 +48,38 @@ def queens3d(n: int, model: str, robots: str, output: Path | None, *, force: boo
     folder = output or Path("instances") / team.name
     write_team(team, folder, replace=force)
     click.echo(f"{folder}: {len(team.robots)} robots; next: robochoc solve {folder}")
+
+
+@generate.command("random", short_help="Model B: random binary constraints, as many and as tight as asked.")
+@click.option("--agents", required=True, type=click.IntRange(1, 1000), help="Robots, of one variable each.")
+@click.option("--domain", required=True, type=click.IntRange(1, 1000), help="Values of each variable.")
+@click.option("--density", required=True, type=float, help="Part of all pairs of robots that is constrained, 0 to 1.")
+@click.option("--tightness", required=True, type=float, help="Part of all pairs of values that is forbidden, 0 to 1.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="The same seed, the same problem.")
+@click.option("--connected", is_flag=True, help="Draw graphs of constraints until one is connected.")
+@click.option(
+    "-o",
+    "--output",
+    type=InputPath(),
+    help="Folder to write  [default: instances/random-AGENTS-DOMAIN-DENSITY-TIGHTNESS-SEED[-connected]]",
+)
+@click.option("--force", is_flag=True, help="Replace the folder if it is there.")
+@invalid_input_fails
+def random_problem(output: Path | None, *, force: bool, **problem: Any) -> None:  # noqa: ANN401 - `random_csp`'s own
+    """Uniform random problems (Model B; Prosser 1996, Gent et al. 2001), the usual benchmark of protocols.
+
+    Of all pairs of robots exactly the part DENSITY is constrained, and each constraint forbids exactly the part
+    TIGHTNESS of all pairs of values. Robot3 has the variable V3. At --agents 20 --domain 10 --density 0.2, about half
+    of the problems have a solution at --tightness 0.65; there they are hardest.
+    """
+    from robochoc.formats import write_team
+    from robochoc.generators.random_csp import random_csp
+
+    try:
+        team = random_csp(**problem)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+    folder = output or Path("instances") / team.name
+    write_team(team, folder, replace=force)
+    constraints = sum(len(robot.shared) for robot in team.robots)
+    click.echo(f"{folder}: {len(team.robots)} robots, {constraints} constraints; next: robochoc solve {folder}")

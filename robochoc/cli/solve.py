@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import click
 
 from robochoc.cli.failure import INVALID, LIMIT, Failure, failures_told, worst
 from robochoc.cli.local import limits, local_options
+from robochoc.cli.order import GIVEN, OrderName, order_for
 from robochoc.cli.paths import InputPath, OutputFile
 
 if TYPE_CHECKING:
@@ -57,7 +58,21 @@ class Products:
     default="abt",
     show_default=True,
     metavar="NAME",
-    help="abt: the robots solve it together; central: no robots, ACE decides all files merged into one model.",
+    help=(
+        "abt: the robots solve it together; central: no robots, ACE decides all files merged into one model. All that"
+        " there are: robochoc protocols."
+    ),
+)
+@click.option(
+    "--order",
+    type=OrderName(),
+    default=GIVEN,
+    show_default=True,
+    metavar="NAME|FILE",
+    help=(
+        "Priority order of the robots: given (the files'), lexicographic, max-degree, min-width, dom-deg, dfs, random"
+        " (from --seed), or a text file with a robot's name a line, the highest priority first."
+    ),
 )
 @click.option(
     "--runtime",
@@ -66,7 +81,9 @@ class Products:
     show_default=True,
     help="processes: one OS process per robot; simulator: one thread, repeatable.",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the simulator.")
+@click.option(
+    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the simulator and of --order random."
+)
 @click.option(
     "--schedule",
     type=click.Choice(["concurrent", "random"]),
@@ -163,6 +180,7 @@ def solve(
     _check_settings(settings)
     withdraw = settings.pop("withdraw")
     on_loss = settings.pop("on_loss") or ("withdraw" if settings["spares"] else "fail")
+    order = settings.pop("order")
     options = Options(
         local=limits(settings.pop("local_solutions"), settings.pop("local_timeout")),
         cache=not settings.pop("no_cache"),
@@ -181,7 +199,7 @@ def solve(
     if products and len(folders) > 1:
         raise click.UsageError(f"--html, --journal and --serve are for one team; {len(folders)} were found")
     for folder in folders:
-        statuses.append(_solve_one(folder, options, products, as_json=as_json))
+        statuses.append(_solve_one(folder, options, products, order, as_json=as_json))
     context.exit(worst(statuses))
 
 
@@ -191,21 +209,28 @@ def _check_settings(settings: dict[str, Any]) -> None:
         raise click.UsageError("--delay and --schedule are the simulator's; add --runtime simulator")
     if settings["timeout"] is not None and not settings["timeout"] > 0:
         raise click.UsageError("--timeout takes a number of seconds")
-    central = settings["protocol"] == "central"
-    if (settings["on_loss"] or settings["spares"]) and (central or settings["runtime"] != "processes"):
+    if settings["delay"] and settings["schedule"] != "concurrent":
+        raise click.UsageError("--delay is for --schedule concurrent: in a random one any message may take any time")
+    if settings["protocol"] == "central":
+        _check_central(settings)
+    elif settings["count"]:
+        raise click.UsageError("--count is for --protocol central")
+    if (settings["on_loss"] or settings["spares"]) and settings["runtime"] != "processes":
         raise click.UsageError("--on-loss and --spare are for processes, which can die")
     if settings["spares"] and settings["on_loss"] == "fail":
         raise click.UsageError("--spare brings robots back that died; --on-loss fail ends the run instead")
-    if central and settings["messages"]:
-        raise click.UsageError("--messages is for robots that solve it together, not for --protocol central")
-    if settings["count"] and not central:
-        raise click.UsageError("--count is for --protocol central")
-    if central and settings["withdraw"]:
-        raise click.UsageError("--withdraw is for robots that solve it together, not for --protocol central")
-    if central and settings["verify"]:
+
+
+def _check_central(settings: dict[str, Any]) -> None:
+    """There are no robots, and no second opinion."""
+    if settings["verify"]:
         raise click.UsageError("--verify asks ACE, which is --protocol central itself")
-    if settings["delay"] and settings["schedule"] != "concurrent":
-        raise click.UsageError("--delay is for --schedule concurrent: in a random one any message may take any time")
+    asked = {name: settings[name] for name in ("withdraw", "messages", "on_loss", "spares")}
+    asked["order"] = settings["order"] != GIVEN
+    for name, value in asked.items():
+        if value:
+            option = "--" + name.removesuffix("s" if name == "spares" else "").replace("_", "-")
+            raise click.UsageError(f"{option} is for robots that solve it together, not for --protocol central")
 
 
 def _teams(paths: tuple[Path, ...]) -> tuple[list[Path], list[int]]:
@@ -223,13 +248,14 @@ def _teams(paths: tuple[Path, ...]) -> tuple[list[Path], list[int]]:
     return list(folders), statuses
 
 
-def _solve_one(folder: Path, options: Options, products: Products, *, as_json: bool) -> int:
+def _solve_one(folder: Path, options: Options, products: Products, order: str | Path, *, as_json: bool) -> int:
     """Solve the team in `folder`, tell the outcome, and return the exit status."""
     from robochoc.formats import on_one_line, read_team
 
     try:
         with failures_told(folder):
             team = read_team(folder)
+            options = replace(options, order=order_for(team, order))
             with _journal(team, options, products.journal) as recorder:
                 outcome = _run(team, options, recorder)
                 _tell(team, outcome, as_json=as_json)
@@ -262,10 +288,20 @@ def _journal(team: Team, options: Options, path: Path | None) -> Iterator[Record
     if path is None:
         yield None
         return
+    from msgspec import UNSET
+
     from robochoc.formats import write_atomically
     from robochoc.observers.journal import Header, Recorder
 
-    recorder = Recorder(Header(team=team.name, protocol=options.protocol, runtime=options.runtime, seed=options.seed))
+    recorder = Recorder(
+        Header(
+            team=team.name,
+            protocol=options.protocol,
+            runtime=options.runtime,
+            seed=options.seed,
+            order=options.order or UNSET,
+        )
+    )
     try:
         yield recorder
     finally:

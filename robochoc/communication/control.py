@@ -7,10 +7,14 @@ message. When it closes the pipe, the robot ends.
 
 from __future__ import annotations
 
+from multiprocessing.reduction import ForkingPickler
+
 import msgspec
 
 from robochoc.observers.events import AnyEvent
 from robochoc.outcome import Metrics
+from robochoc.solver.explanation import Void
+from robochoc.solver.part import Part
 
 QUEUES_AT_ONCE = 16
 """How many queues a robot asks for in one go. The parent holds so many descriptors more meanwhile."""
@@ -91,7 +95,7 @@ class Pause(_Control, frozen=True):
 
 
 class Change(_Control, frozen=True):
-    """A new epoch. `change` holds the robot's `Part` and what is `Void`, pickled: from the parent to its own child.
+    """A new epoch. `change` holds the robot's `Part` and what is `Void` (see `sealed`).
 
     Robots in `gone` have left; if there are others of their names, queues to and from them are to be opened anew.
     """
@@ -117,6 +121,20 @@ class Wave(_Control, frozen=True):
     """Tell me your counters."""
 
     number: int
+
+
+def sealed(part: Part, void: Void) -> bytes:
+    """What `Change` holds."""
+    return bytes(ForkingPickler.dumps((part, void)))
+
+
+def unsealed(change: bytes) -> tuple[Part, Void]:
+    """What `sealed` was given. Only for bytes from the own parent, over the socket that only the two of them have.
+
+    A process is started with the same means (`multiprocessing`); no message of a protocol ever comes here.
+    """
+    part, void = ForkingPickler.loads(change)
+    return part, void
 
 
 FromRobot = Ready | OpenQueues | Counters | Conclusion | Events | Report | Failed

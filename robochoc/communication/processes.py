@@ -10,7 +10,6 @@ Why fork, why queues are opened on demand, and what was measured: docs/design.md
 
 from __future__ import annotations
 
-import pickle
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
@@ -32,6 +31,7 @@ from robochoc.communication.control import (
     Ready,
     Report,
     Wave,
+    sealed,
 )
 from robochoc.communication.crew import Crew, StartMethod
 from robochoc.communication.quiescence import Counts, FourCounters
@@ -138,7 +138,7 @@ class ProcessesRun(Session):
                 self._lose(name, robot.fate())
             else:
                 robot.report = None
-                self._tell(robot, Change(self._number, pickle.dumps((part, epoch.void)), left))
+                self._tell(robot, Change(self._number, sealed(part, epoch.void), left))
 
     def close(self) -> None:
         """End all processes."""

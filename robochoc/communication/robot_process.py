@@ -11,7 +11,6 @@ import array
 import ctypes
 import multiprocessing
 import os
-import pickle
 import selectors
 import signal
 import socket
@@ -43,6 +42,7 @@ from robochoc.communication.control import (
     Ready,
     Report,
     Wave,
+    unsealed,
 )
 from robochoc.communication.host import Host
 from robochoc.communication.queues import READ_BYTES, QueueReader, QueueWriter, unpack
@@ -327,7 +327,7 @@ class _RobotLoop:
 
     def _change(self, order: Change) -> None:
         """Go over to the next epoch: with a changed problem, and nothing under way."""
-        part, void = pickle.loads(order.change)  # noqa: S301 - from the own parent, over its own socket
+        part, void = unsealed(order.change)
         for name in order.gone:
             if name in self._readers:
                 self._forget(self._readers[name])

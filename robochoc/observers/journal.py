@@ -30,6 +30,8 @@ class Header(Event, frozen=True, kw_only=True, tag="Journal"):
     protocol: str
     runtime: str
     seed: int
+    order: str | tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
+    """The priority order, by name or as the list of robots; left out where it was the files'."""
     version: int = VERSION
 
 

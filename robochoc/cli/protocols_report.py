@@ -1,0 +1,135 @@
+"""What `robochoc protocols` tells: a row a protocol, for people or for machines."""
+
+from __future__ import annotations
+
+import inspect
+import shutil
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import msgspec
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from robochoc import __version__
+from robochoc.formats import on_one_line
+from robochoc.protocols.traits import Traits
+from robochoc.registry import Offer, offers
+from robochoc.run import CENTRAL
+from robochoc.solver import central
+
+NARROWEST = 100
+"""A table is not squeezed into less: the terminal may break its lines, but no word is cut."""
+UNBROKEN = 1000
+"""Where no terminal reads it, a protocol has a line of its own."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One protocol, or the judge, which is none. `traits` is None where it is `broken`."""
+
+    name: str
+    place: str
+    package: str
+    traits: Traits | None
+    broken: str = ""
+    module: str = ""
+    """Where its docstring stands."""
+
+
+def rows() -> list[Row]:
+    """All that `robochoc solve --protocol` takes; the first of two with one name is the one that runs."""
+    found: dict[str, Row] = {}
+    hidden = []
+    for offer in offers():
+        row = _row(offer)
+        if row.name in found:
+            reason = f"is hidden by that of the package {found[row.name].package}"
+            hidden.append(Row(row.name, row.place, row.package, None, reason))
+        else:
+            found[row.name] = row
+    return [*found.values(), _judge(), *hidden]
+
+
+def json_report(found: Sequence[Row], *, explain: bool = False) -> bytes:
+    """A line each: one JSON object. `explain` adds the docstring."""
+    encode = msgspec.json.Encoder().encode
+    return b"".join(encode(_object(row, explain=explain)) + b"\n" for row in found)
+
+
+def print_table(found: Sequence[Row]) -> None:
+    """The table, on standard output, and below it what is wrong with what is broken."""
+    columns = max(shutil.get_terminal_size().columns, NARROWEST) if sys.stdout.isatty() else UNBROKEN
+    console = Console(width=columns, highlight=False, soft_wrap=True)
+    console.print(_table(found))
+    for row in found:
+        if row.broken:
+            console.print(on_one_line(f"{row.name}: {row.place} (package {row.package}) {row.broken}"), markup=False)
+    console.print("next: robochoc protocols NAME explains one; robochoc solve TEAM --protocol NAME", markup=False)
+
+
+def explained(row: Row) -> str:
+    """Where the protocol comes from, and what its author says of it."""
+    head = f"{row.name}: {row.place}, from the package {row.package}"
+    return f"{head}\n\n{_docstring(row) or 'Its module has no docstring.'}"
+
+
+def _row(offer: Offer) -> Row:
+    if offer.protocol is None:
+        return Row(offer.name, offer.place, offer.package, None, offer.broken)
+    return Row(offer.name, offer.place, offer.package, offer.protocol.traits, module=offer.protocol.__module__)
+
+
+def _judge() -> Row:
+    """The central judge, with the traits that a protocol of its powers would have."""
+    traits = Traits(paper="no protocol: ACE decides all files merged", partially_known=True, privacy="none")
+    return Row(CENTRAL, f"{central.Judge.__module__}:Judge", f"robochoc {__version__}", traits, module=central.__name__)
+
+
+def _object(row: Row, *, explain: bool) -> dict[str, object]:
+    traits = asdict(row.traits) if row.traits else {}
+    known = {"name": row.name, "place": row.place, "package": row.package, "distributed": row.name != CENTRAL, **traits}
+    if row.broken:
+        known["broken"] = row.broken
+    if explain:
+        known["doc"] = _docstring(row)
+    return known
+
+
+def _docstring(row: Row) -> str:
+    """Of its module; empty where there is none."""
+    module = sys.modules.get(row.module)
+    return inspect.cleandoc(module.__doc__ or "") if module else ""
+
+
+def _table(found: Sequence[Row]) -> Table:
+    table = Table(box=None, header_style="bold")
+    for heading in ("name", "for", "complete", "synchronous", "constraints", "dynamic"):
+        table.add_column(heading, no_wrap=True)
+    table.add_column("paper")
+    table.add_column("privacy")
+    for row in found:
+        table.add_row(escape(on_one_line(row.name)), *map(escape, _cells(row)))
+    return table
+
+
+def _cells(row: Row) -> list[str]:
+    traits = row.traits
+    if traits is None:
+        return [*["-"] * 5, "broken: see below", ""]
+    constraints = ("n-ary" if traits.n_ary else "binary") + (", PKC" if traits.partially_known else "")
+    return [
+        "optimisation" if traits.costs else "satisfaction",
+        _yes(said=traits.complete),
+        "-" if row.name == CENTRAL else _yes(said=traits.synchronous),
+        constraints,
+        _yes(said=traits.dynamic),
+        on_one_line(traits.paper),
+        on_one_line(traits.privacy),
+    ]
+
+
+def _yes(*, said: bool) -> str:
+    return "yes" if said else "no"

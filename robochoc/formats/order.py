@@ -1,0 +1,57 @@
+"""A priority order as a text file: a robot's name a line, the highest priority first; `#` begins a comment."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from robochoc.formats.diagnostics import Diagnostic, InvalidInput, Report, shortened, suggestion
+from robochoc.problem import Team
+
+MAX_BYTES = 1024 * 1024
+_MISSING_SHOWN = 10
+
+
+def read_order(path: Path, team: Team) -> tuple[str, ...]:
+    """The order in the file `path`, of all robots of `team`. Raises `InvalidInput` with every mistake."""
+    report = Report(str(path))
+    lines = _text(path).splitlines()
+    known = frozenset(team.order)
+    places: dict[str, int] = {}
+    for number, line in enumerate(lines, start=1):
+        name = line.partition("#")[0].strip()
+        if not name:
+            continue
+        if name not in known:
+            hint = suggestion(name, team.order, "robots")
+            report.add(number, f"'{shortened(name)}' is no robot of {team.name}", hint)
+        elif name in places:
+            report.add(number, f"'{name}' stands here again", f"name each robot once; it is in line {places[name]}")
+        else:
+            places[name] = number
+    missing = [name for name in team.order if name not in places]
+    if missing:
+        many = len(missing) > 1
+        shown = " ".join(missing[:_MISSING_SHOWN]) + (" ..." if len(missing) > _MISSING_SHOWN else "")
+        message = f"{len(missing)} robot{'s are' if many else ' is'} missing: {shown}"
+        report.add(max(1, len(lines)), message, f"add {'them' if many else 'it'}, a name a line, where it belongs")
+    report.finish()
+    return tuple(places)
+
+
+def _text(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise _invalid(path, f"cannot be read: {reason}", "check the path and its permissions") from None
+    if len(content) > MAX_BYTES:
+        raise _invalid(path, f"is larger than {MAX_BYTES // 2**20} MiB", "an order is a robot's name a line")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise _invalid(path, "is not UTF-8", "an order is a text file with a robot's name a line") from None
+
+
+def _invalid(path: Path, message: str, hint: str) -> InvalidInput:
+    return InvalidInput([Diagnostic(str(path), 0, message, hint)])
