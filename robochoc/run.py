@@ -100,7 +100,7 @@ class _Run:
         """The robots compile their domains, then the protocol runs; robots step aside if they are to."""
         options = self._options
         protocol = protocol_named(options.protocol)
-        _refuse(self._team, options, protocol.traits)
+        _refuse_unfit(self._team, options, protocol.traits)
         names = order_of(self._team, options.order, options.seed) if isinstance(options.order, Order) else options.order
         journey = Journey(
             self._team, names, self._domains, self._left_s, messages=options.messages, spares=options.spares
@@ -203,7 +203,9 @@ class _Run:
 
     def centrally(self) -> Outcome:
         """One model of all files, decided by ACE; if the problem changes over time, one for each epoch."""
-        _refuse(self._team, self._options, Traits(partially_known=True))
+        _refuse(self._team, CENTRAL, Traits(partially_known=True))
+        if self._options.count:
+            _refuse_scenario(self._team, "--count")
         self._outcome = replace(self._outcome, runtime=CENTRAL)
         team = changed_by(self._team, events=0)
         count = None
@@ -297,16 +299,29 @@ def _schedule(options: Options) -> Schedule:
             assert_never(never)
 
 
-def _refuse(team: Team, options: Options, traits: Traits) -> None:
-    """Say in one sentence what the protocol, or this version, cannot take."""
-    name = options.protocol
-    if team.dynamic and (options.withdraw or options.count):
-        what = "withdrawal" if options.withdraw else "count"
-        raise Unsupported(f"{team.name} has a scenario.xml: a {what} is for problems that do not change")
+def _refuse_unfit(team: Team, options: Options, traits: Traits) -> None:
+    """Say in one sentence what the options ask for and the protocol, or this version, cannot do."""
+    for events in range(len(team.scenario) + 1):
+        _refuse(changed_by(team, events), options.protocol, traits)
+    if options.withdraw is not None:
+        _refuse(team, "--withdraw", FirstFit.traits)
+        _refuse_scenario(team, "--withdraw")
+    if options.spares:
+        _refuse(team, "--spare", Traits())
+
+
+def _refuse_scenario(team: Team, option: str) -> None:
+    if team.dynamic:
+        raise Unsupported(f"{team.name} has a scenario.xml; {option} is for problems that do not change")
+
+
+def _refuse(team: Team, name: str, traits: Traits) -> None:
+    """Say in one sentence what whoever is called `name` cannot take of `team`."""
     if team.kind is Kind.DISWCSP and not traits.costs:
         raise Unsupported(f"{team.name} is a DisWCSP, and {name} does not minimise costs")
     for robot in team.robots:
-        for constraint in robot.shared:
+        parts = (part for child in robot.children for part in child.constraints)
+        for constraint in (*robot.shared, *parts):
             if constraint.model is Model.PKC and not traits.partially_known:
                 raise Unsupported(
                     f"{robot.name} shares a partially known constraint (PKC, {constraint.name}), which {name}"

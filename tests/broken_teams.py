@@ -107,6 +107,15 @@ NEIGHBOURS = [
         (R1, 'name="C3"', ("'V3' is no variable of 'Robot1' or 'Robot2'", "Robot2.xml:3")),
     ),
     case(
+        "a part over what its owner shows to nobody",
+        [
+            (R2, 'nbVariables="1"', ""),
+            (R2, '<variable name="V2"', '<variable name="W2" domain="D1"/>\n    <variable name="V2"'),
+            (R1, '"ne" scope="V1 V2"', '"ne" scope="V1 W2"'),
+        ],
+        (R1, 'name="C3"', ("looks at 'W2', which 'Robot2' shows to nobody", "hold its part", "Robot2.xml:8")),
+    ),
+    case(
         "a child told what is not one's own",
         [(R2, 'variable="V2"', 'variable="V1"')],
         (R2, 'variable="V1"', ("told 'V1'", "known own variables: V2")),

@@ -171,29 +171,6 @@ def test_alone_in_the_world(tmp_path: Path) -> None:
     assert read_team(tmp_path).robots == (alone,)
 
 
-def test_a_scenario_makes_a_team_dynamic(tmp_path: Path) -> None:
-    write_files(
-        tmp_path,
-        {
-            **TEAM,
-            "late/Robot5.xml": "<instance/>",
-            "scenario.xml": """\
-<scenario>
-  <event after="solved"><remove_agent name="Robot3"/></event>
-  <event after="200 messages">
-    <add_agent file="late/Robot5.xml"/>
-    <remove_value variable="V1" value="3"/><add_value variable="V1" value="-3"/>
-    <add_constraint agent="Robot2" parent="Robot1"><constraint name="C" reference="ne" scope="V1 V2"/></add_constraint>
-    <remove_constraint agent="Robot2" parent="Robot1" name="C1"/>
-  </event>
-</scenario>
-""",
-        },
-    )
-    assert read_team(tmp_path).dynamic
-    assert find_teams(tmp_path) == [tmp_path]
-
-
 def test_teams_are_found_in_natural_order(tmp_path: Path) -> None:
     for name in ["b10", "b9", "a/deep/er", ".hidden", "b9/late", "empty"]:
         (tmp_path / name).mkdir(parents=True)

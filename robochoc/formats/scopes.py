@@ -57,17 +57,37 @@ def _place(members: Members, robot: Robot, parent: Parent, constraint: Constrain
 
 
 def misplaced_parts(members: Members) -> Iterator[Diagnostic]:
-    """Parents' parts of PKC constraints over variables that are neither the parent's nor the child's."""
+    """Parents' parts of PKC constraints over variables of others than the two, or that the child does not show."""
     for robot in members.robots:
         for child in robot.children:
             if members.is_parent(robot.name, child.name):
-                own, others = members.files[robot.name].lines, members.files[child.name].lines
                 for part in child.constraints:
-                    foreign = [name for name in part.variables if name not in own and name not in others]
-                    if foreign:
-                        message = f"'{shortened(foreign[0])}' is no variable of '{robot.name}' or '{child.name}'"
-                        hint = f"{suggestion(foreign[0], others, 'variables')} ({members.place(child.name)})"
-                        yield Diagnostic(robot.file, part.line, message, hint)
+                    mistake = _foreign_to_both(members, robot, child.name, part) or _unshown(members, child.name, part)
+                    if mistake:
+                        yield Diagnostic(robot.file, part.line, *mistake)
+
+
+def _foreign_to_both(members: Members, robot: Robot, child: str, part: Constraint) -> tuple[str, str] | None:
+    own, others = members.files[robot.name].lines, members.files[child].lines
+    for name in part.variables:
+        if name not in own and name not in others:
+            hint = f"{suggestion(name, others, 'variables')} ({members.place(child)})"
+            return f"'{shortened(name)}' is no variable of '{robot.name}' or '{child}'", hint
+    return None
+
+
+def _unshown(members: Members, child: str, part: Constraint) -> tuple[str, str] | None:
+    """A variable of `child` in its parent's part that the child, by its own file, shows to nobody."""
+    if members.broken:
+        return None
+    file = members.files[child]
+    below = (members.needed(child, other.name) for other in file.robot.children if other.name in members.files)
+    shown = {*file.robot.interface}.union(*below)
+    for name in part.variables:
+        if name in file.lines and name not in shown:
+            message = f"the part looks at '{shortened(name)}', which '{child}' shows to nobody"
+            return message, f"let '{child}' hold its part of the PKC as well ({members.place(child, name)})"
+    return None
 
 
 def untold(members: Members) -> Iterator[Diagnostic]:

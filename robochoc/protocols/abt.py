@@ -17,6 +17,12 @@ checked once the inbox has been drained; a nogood names only the variables that 
 it rules out all values that look alike there (neighbourhood partial interchangeability). That nobody speaks any
 more, and so a solution stands, is for the runtime to see (`communication/quiescence.py`).
 
+Of a partially known constraint (PKC) each robot holds a part that it never shows: Brito, Meisels, Meseguer, Zivan,
+"Distributed constraint satisfaction with partially known constraints", Constraints 14 (2009), ABT in a single phase.
+The lower robot tells its value up as well, and the higher one refuses, by a nogood, the pairs that its own part
+forbids (`_refuse_below`). Such a value is forgotten once it is refused, as that of a culprit is: another one, or the
+same again, is sure to come. Without a PKC nothing changes.
+
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
 >>> outcome = solve(queens3d(4), Options(protocol="abt", runtime=Runtime.SIMULATOR))
@@ -38,7 +44,7 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class Ok(Message, frozen=True):
-    """The sender's value, told to lower-priority neighbours (`ok?`)."""
+    """The sender's value, told to lower-priority neighbours and to those with whom it shares a PKC (`ok?`)."""
 
     value: Value
 
@@ -55,10 +61,18 @@ class AddLink(Message, frozen=True):
 
 
 class ABT(Protocol):
-    """One agent of ABT. State: `view` (myAgentView), `store` (myNogoodStore), Gamma- and Gamma+."""
+    """One agent of ABT. State: `view` (myAgentView), `store` (myNogoodStore), Gamma- and Gamma+.
+
+    Of lower robots that share a PKC, `below` holds the values they told, and `allowed` the own value under which each
+    was found to be allowed by the own parts.
+    """
 
     messages = Ok | Nogood | AddLink
-    traits = Traits(paper="Yokoo et al. 1992; Bessiere et al. 2005", privacy="constraints of lower robots")
+    traits = Traits(
+        paper="Yokoo et al. 1992; Bessiere et al. 2005; PKC: Brito et al. 2009",
+        partially_known=True,
+        privacy="constraints of lower robots; of PKCs every robot's part, but for the pairs that were asked about",
+    )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
@@ -66,6 +80,8 @@ class ABT(Protocol):
         self.store = NogoodStore(order, len(problem.values))
         self.higher = set(problem.parents)
         self.lower = list(problem.children)
+        self.below: dict[str, Value] = {}
+        self.allowed: dict[str, int] = {}
 
     def start(self) -> None:
         """Choose a first value and tell it."""
@@ -86,14 +102,19 @@ class ABT(Protocol):
                 assert_never(never)
 
     def settle(self) -> None:
-        """The inbox is empty: check the view."""
+        """The inbox is empty: check the view, then hold what lower robots told against the own parts."""
         if self.verdict is None:
             self._check_agent_view()
+            self._refuse_below()
 
     # What the messages do
 
     def _process_info(self, sender: str, value: Value) -> None:
-        self._update(sender, value)
+        if sender in self.problem.children:
+            self.below[sender] = value
+            self.allowed.pop(sender, None)
+        else:
+            self._update(sender, value)
 
     def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
         """Accept a nogood about the present value that agrees with the view; otherwise it is obsolete."""
@@ -126,8 +147,8 @@ class ABT(Protocol):
             if self.value is None:
                 self._backtrack()
                 continue
-            for child in self.lower:
-                self.send(child, Ok(self.problem.values[self.value]))
+            for neighbour in (*self.lower, *self.problem.partners):
+                self.send(neighbour, Ok(self.problem.values[self.value]))
             return
 
     def _choose_value(self) -> int | None:
@@ -152,6 +173,22 @@ class ABT(Protocol):
         """Store a nogood that was told against all values that look alike to it."""
         for index in self.problem.alike(nogood.value):
             self.store.add(index, nogood.lhs)
+
+    def _refuse_below(self) -> None:
+        """Tell lower robots whose values the own parts forbid; each pair of values is looked at once (PKC)."""
+        if self.value is None:
+            return
+        for child, told in list(self.below.items()):
+            if self.allowed.get(child) == self.value:
+                continue
+            refused = self.problem.refuses(self.value, child, told)
+            if refused is None:
+                self.allowed[child] = self.value
+            else:
+                lhs = dict(refused)
+                value = lhs.pop(child)
+                self.send(child, Nogood(lhs, value))
+                del self.below[child]
 
     def _consistent(self, index: int) -> bool:
         """Whether the view allows the value at `index`; if a constraint does not, its nogood is stored."""

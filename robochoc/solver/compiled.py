@@ -2,22 +2,26 @@
 
 Paper, Section 4.1: every robot is one variable to a protocol. Its values are the robot's local solutions, seen from
 the interface variables that neighbours know (`solver/domain.py`); the constraints it checks are those shared with
-its parents (`solver/shared.py`).
+its parents (`solver/shared.py`), and its parts of those that are partially known (PKC), towards its children too.
 
 Constraint checks are counted here, and only here: one check is one evaluation of one shared constraint for one
 value of the own domain (Meisels, Kaplansky, Razgon and Zivan 2002). Private constraints are settled once, when
-the domain is compiled, and are not counted; nor are look-ups of nogoods.
+the domain is compiled, and are not counted; nor are look-ups of nogoods and filters.
 """
 
 from __future__ import annotations
 
+import itertools
 from bisect import bisect_left
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from robochoc.message import Value
+from robochoc.problem import Model
 from robochoc.solver.domain import compiled_domain
-from robochoc.solver.explanation import held
+from robochoc.solver.explanation import Known, held, held_below
+from robochoc.solver.filters import Filters
 from robochoc.solver.part import Part
 from robochoc.solver.shared import Conflict, Others, OwnValues, SharedConstraint, in_order_of_lowest
 
@@ -33,7 +37,8 @@ class LocalProblem:
 
     `values[i]` is the i-th value as neighbours see it; `solution(i)` are the own variables' values behind it.
     `parents` and `children` are the links that the files name, `neighbours` are they and all others in a constraint
-    that this robot knows; each in priority order. `checks` counts constraint checks so far. Raises `Unsupported`
+    that this robot knows; each in priority order. `partners` are the parents with whom a partially known constraint
+    is shared: they have to hear of the own value too. `checks` counts constraint checks so far. Raises `Unsupported`
     when the robot has private constraints among its variables and comes without its compiled domain.
     """
 
@@ -48,17 +53,27 @@ class LocalProblem:
         self.checks = 0
         own = OwnValues(robot.interface, self._domain.values)
         owners = {name: agent for agent, names in part.interfaces.items() for name in names if agent != self.agent}
-        shared = [
-            SharedConstraint(key, constraint, owners, rank, part.interfaces)
-            for key, constraint in (*held(robot), *part.copies)
-        ]
-        self._constraints = in_order_of_lowest(shared, rank)
-        for constraint in self._constraints:
+
+        def ready(known: Known) -> SharedConstraint:
+            constraint = SharedConstraint(known.key, known.constraint, owners, rank, part.interfaces)
             constraint.compile(own)
+            return constraint
+
+        above = [(known.constraint.model, ready(known)) for known in held(robot)]
+        copies = [ready(known) for known in part.copies]
+        shared = [*(constraint for _, constraint in above), *copies]
+        self._constraints = in_order_of_lowest(shared, rank)
         self._depths = [rank[constraint.agents[-1]] if constraint.agents else -1 for constraint in self._constraints]
         met = {agent for constraint in shared for agent in constraint.agents}
         self.neighbours = tuple(sorted({*self.parents, *self.children, *met}, key=rank.__getitem__))
         self._table: ConflictTable | None = self._looked_up() if len(self.values) >= LARGE else None
+        self._below = _by_robot(ready(known) for _, known in held_below(robot))
+        parts_above = [constraint for model, constraint in above if model is Model.PKC]
+        secretive = {*part.secretive, *_by_robot(parts_above)}
+        self.partners = tuple(parent for parent in self.parents if parent in secretive)
+        below = itertools.chain.from_iterable(self._below.values())
+        self._filtering = _by_robot([*copies, *below, *parts_above])
+        self._part = part
 
     def solution(self, index: int) -> dict[str, int]:
         """Values of all own variables when the compiled variable takes `values[index]`."""
@@ -79,6 +94,36 @@ class LocalProblem:
         """Like `conflict`, with the key of the constraint that is broken."""
         broken = self._broken(index, view, since)
         return None if broken is None else (broken[0].conflict(broken[1]), broken[0].key)
+
+    def refuses(self, index: int, child: str, value: Value) -> Conflict | None:
+        """What cannot both be, by the own parts towards `child`: of `values[index]` and `value`, what the part sees.
+
+        None: the parts allow the pair. The pair is named like a conflict, but with this robot's own value in it.
+        """
+        for constraint in self._below.get(child, ()):
+            others = constraint.others({child: value})
+            if others is None:
+                continue
+            self.checks += 1
+            if not constraint.mask(others) >> index & 1:
+                return {self.agent: constraint.own_part(index), **constraint.conflict(others)}
+        return None
+
+    def filter(self, index: int, receiver: str) -> bytes:
+        """Which values of `receiver` go with `values[index]`, by all that this robot has to check towards it.
+
+        That is, towards a child, what is totally known (where all robots of a scope know it) and the own parts;
+        towards a parent the own parts; for anybody else everything goes. Every pair that a constraint can tell apart
+        is one check, so that the count says nothing of the answers. See `solver/filters.py`.
+        """
+        evaluated, allowed = self._filters.of(index, receiver)
+        self.checks += evaluated
+        return allowed
+
+    @property
+    def places(self) -> Sequence[int]:
+        """For each own value its place in filters. Raises `Unsupported` when there are too many for a filter."""
+        return self._filters.places
 
     def violated(self, index: int, view: Mapping[str, Value]) -> int:
         """How many constraints `values[index]` breaks, of those whose other variables are all known in `view`."""
@@ -112,7 +157,20 @@ class LocalProblem:
                 return constraint, others
         return None
 
+    @cached_property
+    def _filters(self) -> Filters:
+        return Filters(self._part, self.values, self._filtering)
+
     def _looked_up(self) -> ConflictTable:
         from robochoc.solver.conflict_table import ConflictTable  # noqa: PLC0415 - numpy is for large domains only
 
         return ConflictTable(self._constraints, len(self.values))
+
+
+def _by_robot(constraints: Iterable[SharedConstraint]) -> dict[str, list[SharedConstraint]]:
+    """Those that are shared with one other robot, by its name."""
+    found: dict[str, list[SharedConstraint]] = {}
+    for constraint in constraints:
+        if len(constraint.agents) == 1:
+            found.setdefault(constraint.agents[0], []).append(constraint)
+    return found

@@ -39,6 +39,13 @@ def held(robot: Robot) -> Iterator[Known]:
             yield Known(f"{robot.name}<{parent.name}:{constraint.name}", constraint)
 
 
+def held_below(robot: Robot) -> Iterator[tuple[str, Known]]:
+    """The parts of partially known constraints that `robot` holds towards its children, each with the child's name."""
+    for child in robot.children:
+        for constraint in child.constraints:
+            yield child.name, Known(f"{robot.name}>{child.name}:{constraint.name}", constraint)
+
+
 def domain_key(agent: str) -> str:
     """The key of an agent's domain: that it has no other values than those it has."""
     return f"{agent}="
@@ -54,9 +61,13 @@ def void(old: Team, new: Team) -> Void:
             agents.add(robot.name)
         if now is None or _has_grown(robot, now):
             keys.add(domain_key(robot.name))
-        present = list(held(now)) if now else []
-        keys.update(one.key for one in held(robot) if one not in present)
+        present = _all_held(now) if now else []
+        keys.update(one.key for one in _all_held(robot) if one not in present)
     return Void(frozenset(keys), frozenset(agents))
+
+
+def _all_held(robot: Robot) -> list[Known]:
+    return [*held(robot), *(part for _, part in held_below(robot))]
 
 
 def _has_grown(old: Robot, new: Robot) -> bool:

@@ -26,7 +26,8 @@ class Part(NamedTuple):
     `order`, `interfaces` and the declared `domains` of interface variables are common knowledge. `domain` is None
     when the robot can compile its domain without a solver. `copies` are the totally known constraints over its
     variables that lower robots hold, for protocols in which all robots of a scope have to know them. `links` is
-    for protocols that work on a pseudo-tree.
+    for protocols that work on a pseudo-tree. `secretive` are the parents that hold parts of partially known
+    constraints towards this robot: that there is such a constraint both sides know, the parts they do not.
     """
 
     robot: Robot
@@ -36,6 +37,7 @@ class Part(NamedTuple):
     copies: tuple[Known, ...] = ()
     domains: Mapping[str, Domain] = MappingProxyType({})
     links: Links | None = None
+    secretive: tuple[str, ...] = ()
 
 
 def parts(
@@ -59,7 +61,21 @@ def parts(
                 for owner in {team.owner[name] for name in one.constraint.variables} - {robot.name}:
                     if one.constraint.model is not Model.PKC:
                         copies[owner].append(one)
+    secretive: dict[str, list[str]] = {robot.name: [] for robot in team.robots}
+    for robot in team.robots:
+        for child in robot.children:
+            if child.constraints:
+                secretive[child.name].append(robot.name)
     return {
-        robot.name: Part(robot, team.order, shown, domains.get(robot.name), tuple(copies[robot.name]), known, links)
+        robot.name: Part(
+            robot,
+            team.order,
+            shown,
+            domains.get(robot.name),
+            tuple(copies[robot.name]),
+            known,
+            links,
+            tuple(secretive[robot.name]),
+        )
         for robot in team.robots
     }

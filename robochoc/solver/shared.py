@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Container, Iterable, Mapping, Sequence
 
 from robochoc.message import Value
@@ -40,6 +41,10 @@ class OwnValues:
             self._coded[places] = coded, list(codes)
         return self._coded[places]
 
+    def shown(self, index: int, places: Container[int]) -> Value:
+        """The value at `index`, where only `places` matter."""
+        return tuple([part if place in places else None for place, part in enumerate(self._values[index])])
+
 
 class SharedConstraint:
     """A constraint on the own compiled variable and those of `agents` (in priority order).
@@ -75,9 +80,10 @@ class SharedConstraint:
 
     def compile(self, own: OwnValues) -> None:
         """Get ready for the own compiled domain."""
-        places, names = own.seen(self._scope)
+        self._own = own
+        self._places, names = own.seen(self._scope)
         self._holds = holds_on(self._constraint, [*self._names, *names])
-        self.codes, self._distinct = own.codes(places)
+        self.codes, self._distinct = own.codes(self._places)
 
     def others(self, view: Mapping[str, Value]) -> Others | None:
         """What the constraint sees in `view`; None as long as a part of it is unknown."""
@@ -99,6 +105,23 @@ class SharedConstraint:
             mask = sum(1 << index for index, code in enumerate(self.codes) if holds[code])
             self._masks[others] = mask
         return mask
+
+    def own_part(self, index: int) -> Value:
+        """What the constraint looks at of the own value at `index`; None elsewhere."""
+        return self._own.shown(index, self._places)
+
+    def row(self, index: int, columns: Sequence[Sequence[int]]) -> tuple[int, list[bool]]:
+        """Which values of the one other robot go with the own value at `index`; and how many pairs were evaluated.
+
+        `columns` are the values of that robot's variables; the answers follow their product, as `itertools` makes it.
+        Every pair that the constraint can tell apart is evaluated once, whatever the answers are.
+        """
+        own = self._distinct[self.codes[index]]
+        places = [place for _, place in self._seen]
+        pairs = itertools.product(*(columns[place] for place in places))
+        holds = {others: self._holds((*others, *own)) for others in pairs}
+        values = itertools.product(*columns)
+        return len(holds), [holds[tuple([value[place] for place in places])] for value in values]
 
     def conflict(self, others: Others) -> Conflict:
         """`others` as a nogood's left side: one object for one combination, not to be changed."""

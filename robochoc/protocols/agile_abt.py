@@ -1,0 +1,310 @@
+"""Agile Asynchronous Backtracking.
+
+Bessiere, Bouyakhf, Mechqrane, Wahbi: "Agile asynchronous backtracking for distributed constraint satisfaction
+problems", ICTAI 2011. ABT whose order changes at dead ends, without limits to who may move. Built on the paper's
+ideas (explanations, termination vectors, orders that only become stronger), with the names of ABT (`abt.py`); what
+differs in detail stands below. UpdateExplanations and ComputeOrder are in `agile_order.py`.
+
+Complete, asynchronous, for satisfaction. An Ok brings the sender's explanation with the value: on whose values its
+nogoods rest, and how many values are left to it. A robot without values left may blame any robot of the conflict.
+For each it computes an order that is compatible with all explanations it holds, extended by the new nogood, with
+few values left first. If the least of their termination vectors is smaller than that of the present order, the
+robot adopts that order and sends it to all; otherwise it keeps its order and blames the lowest robot. Whoever gets
+an order adopts it if it is stronger: its vector is smaller, or equal and its names come first.
+
+Why it ends: each order that a robot makes or adopts is stronger than the one before, and there are finitely many,
+since values left are between 0 and the domain's size, or unknown. So changes of order cease, however rough the
+numbers in the vectors are, and all robots hold the strongest order ever made, since each went to all. From then on
+it is ABT. Why it is right: nogoods follow from the constraints in any order, so the empty one proves that there is
+no solution. When nobody speaks any more, all orders are equal; each robot's value agrees with what it knows of those
+above it; and it knows all that it has to, as `told` has seen to: each robot remembers what it last told to whom,
+and speaks to those below it that have heard something else, or that have forgotten it to send a nogood.
+
+What the paper leaves open, or what is done otherwise here: constraints may be n-ary (the robot of the scope that stands
+lowest at present checks them); an order travels in messages of its own only, not with each Ok and Nogood, so a
+nogood that comes before its order is dropped as obsolete, and its sender told the value again if it is below; a
+value is dated by its place in its channel, not by a counter; robots whose domain's size nobody has told count as
+having `UNKNOWN` values left, more than any other; values are checked one by one until one fits, so "left" counts
+those without a nogood so far; messages are read by packets. As in `abt.py`, of several nogoods for a value the one
+with the highest possible lowest variable is kept, and a nogood names only the variables that matter.
+
+>>> from robochoc.communication.schedule import Concurrent
+>>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> Simulation(queens3d(4), AgileABT, Concurrent(seed=0)).run().verdict.value
+'no-solution'
+"""
+
+from __future__ import annotations
+
+from typing import assert_never, cast
+
+from robochoc.message import Message, Value
+from robochoc.outcome import Verdict
+from robochoc.protocols.agile_order import (
+    UNKNOWN,
+    Explanation,
+    Explanations,
+    Proposal,
+    TerminationVector,
+    compatible,
+    proposed,
+    updated,
+)
+from robochoc.protocols.nogood import LeftSide, NogoodStore, contradicts, joined
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import Traits
+from robochoc.solver.compiled import LocalProblem
+
+
+class Ok(Message, frozen=True):
+    """The sender's value, told to those below it (`ok?`); while `lhs` stands, `left` of its `size` values are left."""
+
+    value: Value
+    lhs: dict[str, Value]
+    left: int
+    size: int
+
+
+class Nogood(Message, frozen=True):
+    """While all of `lhs` stands, the receiver cannot take `value` (`ngd`)."""
+
+    lhs: dict[str, Value]
+    value: Value
+
+
+class Order(Message, frozen=True):
+    """A new order (`order`): the robots by their places in the first one, and its termination vector."""
+
+    places: tuple[int, ...]
+    termination: TerminationVector
+
+
+class AddLink(Message, frozen=True):
+    """The sender asks to be told the receiver's value from now on, whenever it is below the receiver (`adl`)."""
+
+
+class AgileABT(Protocol):
+    """One agent of Agile-ABT.
+
+    State: `present` (o_i) and `termination` (TV_i), `view` (AgentView), `store` (NogoodStore), `explanations` (E_i),
+    and the `sizes` of the domains it has been told. `tellers` tell this robot their values while they are above it,
+    and it tells its own to `listeners` while they are below; `told` is what it told them last.
+    """
+
+    messages = Ok | Nogood | Order | AddLink
+    traits = Traits(paper="Bessiere et al. 2011", everywhere=True)
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.name = problem.agent
+        self.present = order
+        self.termination: TerminationVector = (UNKNOWN,) * len(order.names)
+        self.view: dict[str, Value] = {}
+        self.store = NogoodStore(order, len(problem.values))
+        self.explanations: dict[str, Explanation] = {}
+        self.sizes = {self.name: len(problem.values)}
+        self.tellers = set(problem.neighbours)
+        self.listeners = list(problem.neighbours)
+        self.told: dict[str, Value] = {}
+
+    def start(self) -> None:
+        """Choose a first value and tell it."""
+        self._check_agent_view()
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        if self.verdict is not None:
+            return
+        match cast("Ok | Nogood | Order | AddLink", message):
+            case Ok() as ok:
+                self._process_info(sender, ok)
+            case Nogood() as nogood:
+                self._resolve_conflict(sender, nogood)
+            case Order() as order:
+                self._process_order(order)
+            case AddLink():
+                self._set_link(sender)
+            case never:
+                assert_never(never)
+
+    def settle(self) -> None:
+        """The inbox is empty: check the view."""
+        if self.verdict is None:
+            self._check_agent_view()
+
+    # What the messages do
+
+    def _process_info(self, sender: str, ok: Ok) -> None:
+        """Take in a value, and the explanation that comes with it."""
+        self._update(sender, ok.value)
+        self.sizes[sender] = ok.size
+        self.explanations[sender] = Explanation(ok.lhs, ok.left)
+
+    def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
+        """Accept a nogood about the present value that agrees with the order and the view; others are obsolete."""
+        told = self.told.get(sender)
+        if told is not None and not contradicts(nogood.value, told):
+            del self.told[sender]  # it has forgotten my value; if I have told it another one, that is on its way
+        current = self._current()
+        if current is None or contradicts(nogood.value, current) or not self._coherent(nogood):
+            return
+        self._check_add_link(nogood)
+        for index in self.problem.alike(nogood.value):
+            self.store.add(index, nogood.lhs)
+        self.value = None
+
+    def _process_order(self, order: Order) -> None:
+        self._check_order(tuple([self.order.names[place] for place in order.places]), order.termination)
+
+    def _set_link(self, sender: str) -> None:
+        """Tell the sender the value whenever it is below this robot, and now if it is."""
+        if sender not in self.listeners:
+            self.listeners.append(sender)
+        self.told.pop(sender, None)
+
+    # The search
+
+    def _check_agent_view(self) -> None:
+        """Keep the value if the view allows it, else choose another, else backtrack until one is found; tell it."""
+        while self.verdict is None:
+            higher = self._higher()
+            if self.value is None or not self._consistent(self.value, higher):
+                self.value = self._choose_value(higher)
+            if self.value is not None:
+                self._tell(self.problem.values[self.value])
+                return
+            self._backtrack()
+
+    def _choose_value(self, higher: LeftSide) -> int | None:
+        """The first value of the domain that no nogood rules out."""
+        return next((index for index in range(len(self.problem.values)) if self._consistent(index, higher)), None)
+
+    def _tell(self, value: Value) -> None:
+        """Tell the value to all below that have last heard another one, or none, of this robot."""
+        rank = self.present.rank
+        below = [name for name in self.listeners if rank[name] > rank[self.name] and self.told.get(name) != value]
+        if below:
+            lhs, left = self._own_explanation()
+            ok = Ok(value, dict(lhs), left, len(self.problem.values))
+            for name in below:
+                self.send(name, ok)
+                self.told[name] = value
+
+    def _backtrack(self) -> None:
+        """Resolve the stored nogoods, one for each value, and tell a robot among their causes."""
+        conflict = self.store.resolve()
+        if not conflict:
+            self.conclude(Verdict.NO_SOLUTION)
+            return
+        culprit = self._choose_order(conflict)
+        self.send(culprit, Nogood(_without(culprit, conflict), conflict[culprit]))
+        self._update(culprit, None)
+
+    def _consistent(self, index: int, higher: LeftSide) -> bool:
+        """Whether those above allow the value at `index`; if a constraint does not, its nogood is stored."""
+        if self.store[index] is not None:
+            return False
+        conflict = self.problem.conflict(index, higher)
+        if conflict is None:
+            return True
+        self.store.add(index, conflict)
+        return False
+
+    # The order
+
+    def _choose_order(self, conflict: LeftSide) -> str:
+        """Whom to blame for `conflict`: in a smaller order if there is one, which all are told; else the lowest."""
+        held = self._held_explanations()
+        best = min(
+            (self._proposed(culprit, conflict, held) for culprit in conflict),
+            key=lambda proposal: (proposal.termination, proposal.names),
+        )
+        smaller = best.termination < self.termination
+        culprit = best.culprit if smaller else self.present.lowest(conflict)
+        self.explanations = updated(held, culprit, _without(culprit, conflict), self.sizes)
+        if smaller:
+            self._check_order(best.names, best.termination)
+            order = Order(tuple([self.order.rank[name] for name in best.names]), best.termination)
+            for name in self.order.names:
+                if name != self.name:
+                    self.send(name, order)
+        return culprit
+
+    def _proposed(self, culprit: str, conflict: LeftSide, held: Explanations) -> Proposal:
+        """The order in which `culprit` is to blame; what rests on its value here will be forgotten."""
+        explanations = {**held, self.name: self._own_explanation(culprit)}
+        return proposed(self.present.names, culprit, _without(culprit, conflict), explanations, self.sizes)
+
+    def _check_order(self, names: tuple[str, ...], termination: TerminationVector) -> None:
+        """Adopt an order if it is stronger; nogoods that are not compatible with it go."""
+        if (termination, names) >= (self.termination, self.present.names):
+            return
+        before, self.store = self.store, NogoodStore(PriorityOrder(names), len(self.problem.values))
+        self.present = PriorityOrder(names)
+        self.termination = termination
+        for index in range(len(self.problem.values)):
+            lhs = before[index]
+            if lhs is not None and compatible(self.present, self.name, lhs):
+                self.store.add(index, lhs)
+
+    def _own_explanation(self, forgotten: str = "") -> Explanation:
+        """What is left to this robot once it has forgotten the value of the robot `forgotten`, and why."""
+        kept = [lhs for lhs in self.store if forgotten not in lhs]
+        union: dict[str, Value] = {}
+        for lhs in kept:
+            for agent, value in lhs.items():
+                union[agent] = joined(union.get(agent), value)
+        return Explanation(union, len(self.problem.values) - len(kept))
+
+    def _held_explanations(self) -> dict[str, Explanation]:
+        """Those that are compatible with the order and with the view; this robot, at a dead end, has no value."""
+        return {
+            name: one
+            for name, one in self.explanations.items()
+            if compatible(self.present, name, one.lhs)
+            and self.name not in one.lhs
+            and not any(agent in self.view and contradicts(value, self.view[agent]) for agent, value in one.lhs.items())
+        }
+
+    # The view
+
+    def _higher(self) -> dict[str, Value]:
+        """What is known of those above: what constraints and nogoods of this robot may rest on."""
+        rank = self.present.rank
+        return {name: value for name, value in self.view.items() if rank[name] < rank[self.name]}
+
+    def _update(self, agent: str, value: Value | None) -> None:
+        """Take in a new value of `agent` (None: unknown); nogoods that rest on another value go."""
+        if value is None:
+            self.view.pop(agent, None)
+        else:
+            self.view[agent] = value
+        self.store.forget(agent, value)
+
+    def _coherent(self, nogood: Nogood) -> bool:
+        """Whether all of the left side is above this robot, and known to be so by those that tell it their values."""
+        return compatible(self.present, self.name, nogood.lhs) and all(
+            agent in self.view and not contradicts(value, self.view[agent])
+            for agent, value in nogood.lhs.items()
+            if agent in self.tellers
+        )
+
+    def _check_add_link(self, nogood: Nogood) -> None:
+        """Ask robots of the left side that do not tell me their values yet to do so; meanwhile believe it."""
+        for agent, value in nogood.lhs.items():
+            if agent not in self.tellers:
+                self.tellers.add(agent)
+                self.send(agent, AddLink())
+            known = self.view.get(agent)
+            told = joined(known, value)
+            if told != known:
+                self._update(agent, told)
+
+    def _current(self) -> Value | None:
+        return None if self.value is None else self.problem.values[self.value]
+
+
+def _without(culprit: str, conflict: LeftSide) -> dict[str, Value]:
+    return {name: value for name, value in conflict.items() if name != culprit}

@@ -1,0 +1,77 @@
+"""Filters: which values of another robot go with an own value, said without naming a value.
+
+A filter is a bitmap over the values that the other robot could have as far as everybody knows: the product of its
+interface variables' declared domains, in ascending order. Bit 0 of byte 0 is the first (Brito, Meisels, Meseguer
+and Zivan, Constraints 14, 2009: the "filtered domain" that DisFC sends instead of the own value).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from robochoc.message import Value
+from robochoc.solver.encoding import Unsupported
+from robochoc.solver.part import Part
+from robochoc.solver.shared import SharedConstraint
+
+LARGEST = 65_536
+"""Bits in a filter: combinations of a robot's interface values, as its domains are declared."""
+
+
+class Filters:
+    """Makes the filters that one robot sends, and says where its own values stand in those that it gets.
+
+    `constraints` are those to be looked at for each receiver; whoever is not in it has a full filter. Raises
+    `Unsupported` when the robot's own values are too many for a filter.
+    """
+
+    def __init__(
+        self, part: Part, values: Sequence[Value], constraints: Mapping[str, Sequence[SharedConstraint]]
+    ) -> None:
+        self._part = part
+        self._constraints = constraints
+        self._made: dict[tuple[int, str], tuple[int, bytes]] = {}
+        columns = self._columns(part.robot.name)
+        size = math.prod(len(column) for column in columns)
+        if size > LARGEST:
+            raise Unsupported(
+                f"{part.robot.name} shows its neighbours {size:,} combinations of values, and a filter has a bit for"
+                f" each, {LARGEST:,} at most; make its domains smaller, or take another protocol"
+            )
+        ranks: list[dict[int | None, int]] = [{value: rank for rank, value in enumerate(column)} for column in columns]
+        self.places = [_place(value, ranks) for value in values]
+        """For each own value its bit in a filter."""
+
+    def of(self, index: int, receiver: str) -> tuple[int, bytes]:
+        """How many pairs were evaluated, and the filter of `receiver` under the own value at `index`."""
+        made = self._made.get((index, receiver))
+        if made is None:
+            made = self._made[index, receiver] = self._filter(index, receiver)
+        return made
+
+    def _filter(self, index: int, receiver: str) -> tuple[int, bytes]:
+        columns = self._columns(receiver)
+        size = math.prod(len(column) for column in columns)
+        allowed = (1 << size) - 1
+        evaluated = 0
+        for constraint in self._constraints.get(receiver, ()):
+            pairs, row = constraint.row(index, columns)
+            evaluated += pairs
+            allowed &= int("".join("01"[holds] for holds in reversed(row)) or "0", 2)
+        return evaluated, allowed.to_bytes((size + 7) // 8, "little")
+
+    def _columns(self, robot: str) -> list[list[int]]:
+        return [sorted(self._part.domains[name]) for name in self._part.interfaces[robot]]
+
+
+def _place(value: Value, ranks: Sequence[Mapping[int | None, int]]) -> int:
+    place = 0
+    for part, rank in zip(value, ranks, strict=True):
+        place = place * len(rank) + rank[part]
+    return place
+
+
+def allows(allowed: bytes, place: int) -> bool:
+    """Whether the filter `allowed` has the bit at `place`; one that is too short has no more bits."""
+    return place >> 3 < len(allowed) and bool(allowed[place >> 3] >> (place & 7) & 1)
