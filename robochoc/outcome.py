@@ -57,6 +57,7 @@ class Epoch:
     verdict: Verdict
     robots: tuple[str, ...]
     assignment: dict[str, int] = field(default_factory=dict)
+    cost: float | None = None
     metrics: Metrics = field(default_factory=Metrics)
     verified: bool = False
     witness: str | None = None

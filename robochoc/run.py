@@ -174,19 +174,18 @@ class _Run:
         if result.verdict is Verdict.SOLUTION:
             assignment = _joined(result.assignments)
             _check(team, assignment, ())
-            return replace(epoch, assignment=assignment, verified=True)
+            return replace(epoch, assignment=assignment, cost=cost(team, assignment), verified=True)
         if result.verdict is Verdict.NO_SOLUTION and self._options.verify:
             return replace(epoch, verified=self._confirmed(team, None))
         return epoch
 
     def _told(self, epoch: Epoch) -> Outcome:
         """The outcome of a run that ended with `epoch`."""
-        solved = epoch.verdict is Verdict.SOLUTION
         return replace(
             self._outcome,
             verdict=epoch.verdict,
             assignment=epoch.assignment,
-            cost=0 if solved else None,
+            cost=epoch.cost,
             witness=epoch.witness,
             verified=epoch.verified,
             metrics=replace(epoch.metrics, compile_s=self._compile_s),
@@ -215,11 +214,12 @@ class _Run:
             judgement = self._judge().judge(team, count=self._options.count)
             spent = Metrics(wall_s=time.monotonic() - began)
             count = judgement.count
-            checked = judgement.verdict is Verdict.SOLUTION and count is None
-            if checked:
+            epoch = Epoch(judgement.verdict, team.order, judgement.assignment, metrics=spent)
+            if judgement.verdict is Verdict.SOLUTION and count is None:
                 _check(team, judgement.assignment, ())
-            self._epochs.append(Epoch(judgement.verdict, team.order, judgement.assignment, spent, verified=checked))
-        return replace(self._summary(), count=count, cost=None if count is not None else self._summary().cost)
+                epoch = replace(epoch, cost=cost(team, judgement.assignment), verified=True)
+            self._epochs.append(epoch)
+        return replace(self._summary(), count=count)
 
     def _confirmed(self, team: Team, alone: str | None) -> bool:
         """Let the central judge decide what the robots have found to have no solution.

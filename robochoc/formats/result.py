@@ -26,6 +26,7 @@ class _EpochForm(msgspec.Struct, omit_defaults=True):
     verdict: Verdict
     robots: list[str]
     assignment: dict[str, int]
+    cost: float | int | None
     messages: int
     bytes: int
     ncccs: int
@@ -88,6 +89,7 @@ def _epoch(epoch: Epoch) -> _EpochForm:
         verdict=epoch.verdict,
         robots=list(epoch.robots),
         assignment=epoch.assignment,
+        cost=epoch.cost,
         messages=sum(spent.messages.values()),
         bytes=spent.bytes,
         ncccs=spent.ncccs,
@@ -101,7 +103,13 @@ def _epoch(epoch: Epoch) -> _EpochForm:
 def _epoch_of(form: _EpochForm) -> Epoch:
     metrics = Metrics({"messages": form.messages}, form.bytes, form.ncccs, form.checks, form.wall_s)
     return Epoch(
-        form.verdict, tuple(form.robots), form.assignment, metrics, verified=form.verified, lost=tuple(form.lost)
+        verdict=form.verdict,
+        robots=tuple(form.robots),
+        assignment=form.assignment,
+        cost=form.cost,
+        metrics=metrics,
+        verified=form.verified,
+        lost=tuple(form.lost),
     )
 
 
