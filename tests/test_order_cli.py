@@ -110,3 +110,10 @@ def test_links_that_cannot_be_turned_are_said_in_one_sentence(tmp_path: Path) ->
     done = robochoc("solve", tmp_path / "private", "--order", listed)
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
     assert "choose an order with RA before it" in done.stderr
+
+
+def test_dom_deg_may_be_written_as_elsewhere(four: Path) -> None:
+    words = ["solve", four, "--json", "--runtime", "simulator"]
+    assert [
+        json.loads(robochoc(*words, "--order", name).stdout)["metrics"]["messages"] for name in ("dom/deg", "dom-deg")
+    ] == [json.loads(robochoc(*words, "--order", "dom-deg").stdout)["metrics"]["messages"]] * 2

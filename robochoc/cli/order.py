@@ -25,6 +25,8 @@ class OrderName(click.Path):
     def convert(self, value: PathLike, param: click.Parameter | None, ctx: click.Context | None) -> str | Path:
         """The name, or the path. Fails, as wrong usage, where it is neither."""
         word = os.fsdecode(value)
+        if word == "dom/deg":  # as it is written elsewhere
+            return "dom-deg"
         if word in NAMES:
             return word
         if not word or not os.path.lexists(word):

@@ -48,7 +48,12 @@ class DynABT(ABT, DynamicProtocol):
         super().__init__(problem, order)
         self.proof: Explanation = NOTHING
         self.untold = list(self.lower)
-        """Lower robots that do not know the own value."""
+        """Lower robots that have never been told the own value."""
+
+    def start(self) -> None:
+        """Choose a first value and tell it."""
+        self.untold = []
+        super().start()
 
     def change(self, problem: LocalProblem, order: PriorityOrder, void: Void) -> None:
         """The propagation phase: keep what still stands."""
@@ -58,7 +63,8 @@ class DynABT(ABT, DynamicProtocol):
         if not void.keys.isdisjoint(self.proof):
             self.verdict, self.proof = None, NOTHING
         self._adjust_nogoods(problem, order, void)
-        self.untold = [child for child in problem.children if child not in self.lower or child in void.agents]
+        known = {*self.lower} - void.agents - {*self.untold}  # a change may follow another before the search goes on
+        self.untold = [child for child in problem.children if child not in known]
         self.higher = {*problem.parents, *(self.higher - void.agents)}
         self.lower = list(dict.fromkeys((*problem.children, *(c for c in self.lower if c not in void.agents))))
         self.problem, self.order = problem, order
@@ -74,6 +80,7 @@ class DynABT(ABT, DynamicProtocol):
         if current is not None and self.value == before:
             for child in self.untold if quiet else self.lower:
                 self.send(child, Ok(current))
+        self.untold = []
 
     def _adjust_nogoods(self, problem: LocalProblem, order: PriorityOrder, void: Void) -> None:
         """The store and the value, in the places that values have in the changed domain."""
