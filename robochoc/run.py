@@ -9,7 +9,7 @@ from typing import TypedDict, assert_never
 
 from msgspec import UNSET
 
-from robochoc.change import changed, changed_by
+from robochoc.change import changed_by
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress
 from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
@@ -206,20 +206,24 @@ class _Run:
         if self._options.count:
             _refuse_scenario(self._team, "--count")
         self._outcome = replace(self._outcome, runtime=CENTRAL)
-        team = changed_by(self._team, events=0)
         count = None
-        for event in (None, *self._team.scenario):
-            team = changed(team, event.changes) if event else team
-            began = time.monotonic()
-            judgement = self._judge().judge(team, count=self._options.count)
-            spent = Metrics(wall_s=time.monotonic() - began)
-            count = judgement.count
-            epoch = Epoch(judgement.verdict, team.order, judgement.assignment, metrics=spent)
-            if judgement.verdict is Verdict.SOLUTION and count is None:
-                _check(team, judgement.assignment, ())
-                epoch = replace(epoch, cost=cost(team, judgement.assignment), verified=True)
-            self._epochs.append(epoch)
+        with AceProcess() as warm:
+            self._solver = self._solver or warm
+            for events in range(len(self._team.scenario) + 1):
+                count = self._judged(changed_by(self._team, events))
         return replace(self._summary(), count=count)
+
+    def _judged(self, team: Team) -> int | None:
+        """One epoch, decided by ACE; the number of solutions if that was asked for."""
+        began = time.monotonic()
+        judgement = self._judge().judge(team, count=self._options.count)
+        spent = Metrics(wall_s=time.monotonic() - began)
+        epoch = Epoch(judgement.verdict, team.order, judgement.assignment, metrics=spent)
+        if judgement.verdict is Verdict.SOLUTION and judgement.count is None:
+            _check(team, judgement.assignment, ())
+            epoch = replace(epoch, cost=cost(team, judgement.assignment), verified=True)
+        self._epochs.append(epoch)
+        return judgement.count
 
     def _confirmed(self, team: Team, alone: str | None) -> bool:
         """Let the central judge decide what the robots have found to have no solution.

@@ -45,14 +45,16 @@ def _epochs(team: Team, outcome: Outcome) -> list[str]:
     """A line for each epoch: what opened it, and how it ended."""
     if not outcome.epochs:
         return []
-    rows = [("epoch", "opened by", "robots", "verdict", "messages", "NCCCs")]
+    central = outcome.runtime == "central"
+    rows = [("epoch", "opened by", "robots", "verdict", *(("seconds",) if central else ("messages", "NCCCs")))]
     events = iter(team.scenario)
     opened = "the start"
     for number, epoch in enumerate(outcome.epochs):
         verdict = f"{epoch.verdict}{', confirmed' * (epoch.verified and epoch.verdict is Verdict.NO_SOLUTION)}"
-        sent = sum(epoch.metrics.messages.values())
-        robots = len(epoch.robots)
-        rows.append((f"{number}", opened, f"{robots}", verdict, f"{sent:,}", f"{epoch.metrics.ncccs:,}"))
+        spent = epoch.metrics
+        counts = (f"{sum(spent.messages.values()):,}", f"{spent.ncccs:,}")
+        cost = (f"{spent.wall_s:.2f}",) if central else counts
+        rows.append((f"{number}", opened, f"{len(epoch.robots)}", verdict, *cost))
         after_loss = f"the loss of {shortened(', '.join(epoch.lost))}"
         opened = after_loss if epoch.lost else _said(next(events, None))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
