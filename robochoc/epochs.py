@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import NamedTuple
@@ -19,7 +20,7 @@ from robochoc.communication.session import Epoch, Session
 from robochoc.formats import InvalidInput, read_robot
 from robochoc.orders import reordered
 from robochoc.outcome import Verdict
-from robochoc.problem import AddAgent, Event, RemoveAgent, Team
+from robochoc.problem import AddAgent, Event, RemoveAgent, Robot, Team
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.explanation import Void, void
 
@@ -38,8 +39,8 @@ class Journey:
 
     `order` is the priority order asked for (None: the files'). `compile_` gives a team's compiled domains. `left_s`
     says how many seconds there are left, `messages` how many may be sent in all (None: no limit). Of the robots that
-    are lost, `spares` come back: their files are read again, and they join at the end of the order. `withdrawn` names
-    those that are out, and `regrets` says why somebody could not come back.
+    are lost, `spares` come back: their files are read again, what has happened meanwhile happens to them too, and they
+    join at the end of the order. `withdrawn` names those that are out, `regrets` says why somebody could not come back.
     """
 
     def __init__(
@@ -53,6 +54,8 @@ class Journey:
         spares: int = 0,
     ) -> None:
         self.team = changed_by(team, events=0)
+        self._files = team
+        self._happened = 0
         self.withdrawn: list[str] = []
         self.regrets: list[str] = []
         self._events = deque(team.scenario)
@@ -61,6 +64,7 @@ class Journey:
         self._left_s = left_s
         self._messages = messages
         self._spares = spares
+        self._lossy = False
 
     def arranged(self) -> Team:
         """The team as the robots see it: in the order of the run. Raises `CannotTurn`."""
@@ -104,38 +108,64 @@ class Journey:
         keys, agents = void(before, now)
         session.change(Epoch(now, self._compile(now), Void(keys, agents | set(fresh)), frozenset(fresh)))
 
+    def leave(self, lost: Collection[str]) -> None:
+        """The robots `lost` are out for good."""
+        self.withdrawn += lost
+        self.team = without(self.team, lost)
+
     def _after_event(self, event: Event) -> tuple[Team, Collection[str]]:
         """The team after `event`; what it says of robots that were lost is passed over."""
+        self._happened += 1
         team = self.team
         fresh = set()
         for change in event.changes:
+            match change:
+                case RemoveAgent(name) if name in self.withdrawn:  # it was lost, and now it has left
+                    self.withdrawn.remove(name)
+                    continue
+                case AddAgent(robot):
+                    fresh.add(robot.name)
+                    self.withdrawn = [name for name in self.withdrawn if name != robot.name]
+                case _:
+                    pass
             try:
                 team = changed(team, [change])
             except BadChange:
-                if not self.withdrawn:
+                if not self._lossy:
                     raise
-                if isinstance(change, RemoveAgent):  # it was lost, and now it has left
-                    self.withdrawn = [name for name in self.withdrawn if name != change.name]
-                continue
-            if isinstance(change, AddAgent):
-                fresh.add(change.robot.name)
-                self.withdrawn = [name for name in self.withdrawn if name != change.robot.name]
-        return team, fresh
+        return team, fresh & {*team.order}
 
     def _after_loss(self, lost: Mapping[str, str]) -> tuple[Team, Collection[str]]:
         """The team that remains, with those that come back, in the order in which they do."""
-        team = self.team
+        self._lossy = True
         back: list[str] = []
         for name in lost:
             if self._spares:
                 self._spares -= 1
                 try:
-                    team = rejoined(team, read_robot(Path(team[name].file)))
+                    self._read_again(name)
                     back.append(name)
                 except (InvalidInput, BadChange, OSError) as why:
                     self.regrets.append(f"{name} could not come back: {why}")
         out = [name for name in lost if name not in back]
         self.withdrawn += out
-        if back and self._order is None:
-            self._order = team.order
-        return without(team, out), back
+        if not back:
+            return without(self.team, out), ()
+        if self._order is None:
+            self._order = self.team.order
+        team = changed_by(self._files, self._happened)
+        return without(team, [name for name in self.withdrawn if name in team]), back
+
+    def _read_again(self, name: str) -> None:
+        """Take what the file of `name` says now for what it said from the beginning."""
+        robot = read_robot(Path(self.team[name].file))
+        if name in self._files:
+            self._files = rejoined(self._files, robot)
+        else:
+            self._files = replace(self._files, scenario=tuple(_with_newcomer(e, robot) for e in self._files.scenario))
+
+
+def _with_newcomer(event: Event, robot: Robot) -> Event:
+    """`event`, in which whoever comes under the name of `robot` is that robot."""
+    changes = (AddAgent(robot) if isinstance(c, AddAgent) and c.robot.name == robot.name else c for c in event.changes)
+    return replace(event, changes=tuple(changes))

@@ -143,12 +143,16 @@ class _Run:
 
     def _placed(self, outcome: Outcome, journey: Journey) -> Outcome:
         """Who finds a place among those that are left, in priority order; the others step aside."""
-        team = journey.arranged()
-        self._announce(FirstFit, 0)
-        with self._session(FirstFit, team, self._domains(team)) as session:
-            result = session.search(self._left_s())
-        if result.lost:
-            raise RobotsLost(result.lost)
+        while True:
+            team = journey.arranged()
+            self._announce(FirstFit, 0)
+            with self._session(FirstFit, team, self._domains(team)) as session:
+                result = session.search(self._left_s())
+            if not result.lost:
+                break
+            journey.leave(result.lost.keys())
+            if not journey.team.robots:
+                raise RobotsLost(result.lost)
         placed = replace(outcome, verdict=result.verdict, metrics=outcome.metrics + result.metrics, verified=False)
         if result.verdict is not Verdict.SOLUTION:
             return placed

@@ -66,7 +66,8 @@ class DynABT(ABT, DynamicProtocol):
         known = {*self.lower} - void.agents - {*self.untold}  # a change may follow another before the search goes on
         self.untold = [child for child in problem.children if child not in known]
         self.higher = {*problem.parents, *(self.higher - void.agents)}
-        self.lower = list(dict.fromkeys((*problem.children, *(c for c in self.lower if c not in void.agents))))
+        # Who has asked for the own value and is still there keeps being told, even if others see it differently now.
+        self.lower = list(dict.fromkeys((*problem.children, *(robot for robot in self.lower if robot in order.rank))))
         self.problem, self.order = problem, order
 
     def resume(self, *, quiet: bool) -> None:
