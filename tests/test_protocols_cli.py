@@ -77,7 +77,7 @@ def test_the_table_has_a_line_for_each_protocol_and_the_judge() -> None:
     heading, *lines = done.stdout.splitlines()
     assert heading.split() == ["name", "for", "complete", "synchronous", "constraints", "dynamic", "paper", "privacy"]
     assert {*protocol_names(), "central"} <= {line.split()[0] for line in lines}
-    assert row(done.stdout, "abt").split()[1:6] == ["satisfaction", "yes", "no", "n-ary", "no"]
+    assert row(done.stdout, "abt").split()[1:7] == ["satisfaction", "yes", "no", "n-ary,", "PKC", "no"]
     assert abt.ABT.traits.paper in row(done.stdout, "abt")
     assert abt.ABT.traits.privacy in row(done.stdout, "abt")
     assert "no protocol" in row(done.stdout, "central")
