@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 
@@ -31,12 +32,13 @@ class Offer:
 
 def protocol_names() -> tuple[str, ...]:
     """The names of all protocols that are installed, ours and others', sorted."""
-    return tuple(sorted(entry.name for entry in entry_points(group=GROUP)))
+    return tuple(sorted({entry.name for entry in entry_points(group=GROUP)}))
 
 
 def offers() -> tuple[Offer, ...]:
     """All that installed packages offer, by name; what cannot be used too, with the reason."""
-    return tuple(_offer(entry) for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name))
+    found = sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
+    return tuple(_offer(entry, [other for other in found if other.name == entry.name]) for entry in found)
 
 
 def offer_named(name: str) -> Offer:
@@ -47,7 +49,7 @@ def offer_named(name: str) -> Offer:
         near = difflib.get_close_matches(name, names, 1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise UnknownProtocol(f"no protocol {name!r} is installed, only: {', '.join(names)}{hint}")
-    return _offer(found[0])
+    return _offer(found[0], found)
 
 
 def protocol_named(name: str) -> type[Protocol]:
@@ -58,17 +60,29 @@ def protocol_named(name: str) -> type[Protocol]:
     return offer.protocol
 
 
-def _offer(entry: EntryPoint) -> Offer:
+def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> Offer:
     """What stands behind `entry`: code of whoever wrote the package, which may fail in any way."""
     package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "unknown"
+    if len(namesakes) > 1:
+        places = " and ".join(sorted(f"{one.value} ({one.dist.name if one.dist else 'unknown'})" for one in namesakes))
+        reason = f"is offered by several packages, and only one may: {places}"
+        return Offer(entry.name, entry.value, package, None, reason)
     try:
         loaded = entry.load()
     except (Exception, SystemExit) as error:  # noqa: BLE001 - one broken package must not hide the others
         reason = f"cannot be imported: {type(error).__name__}: {error}"
         return Offer(entry.name, entry.value, package, None, reason)
+    fault = _fault(loaded)
+    return Offer(entry.name, entry.value, package, None if fault else loaded, fault)
+
+
+def _fault(loaded: object) -> str:
+    """Why `loaded` cannot be used as a protocol; empty when it can."""
     if not (isinstance(loaded, type) and issubclass(loaded, Protocol)):
-        return Offer(entry.name, entry.value, package, None, "is no subclass of Protocol")
+        return "is no subclass of Protocol"
+    if loaded.__abstractmethods__:
+        return f"does not define {' and '.join(sorted(loaded.__abstractmethods__))}"
+    if not hasattr(loaded, "messages"):
+        return "does not declare its messages"
     traits: object = loaded.traits
-    if not isinstance(traits, Traits):
-        return Offer(entry.name, entry.value, package, None, "declares traits that are no Traits")
-    return Offer(entry.name, entry.value, package, loaded)
+    return "" if isinstance(traits, Traits) else "declares traits that are no Traits"

@@ -120,14 +120,14 @@ def test_what_is_broken_is_shown_with_its_reason(name: str, reason: str) -> None
         protocol_named(name)
 
 
-def test_of_two_with_one_name_the_table_says_which_one_runs(package: Path) -> None:
+def test_of_two_with_one_name_none_is_taken(package: Path) -> None:
     (package / "entry_points.txt").write_text("[robochoc.protocols]\nabt = others:Other\n")
     first, second = (offer for offer in offers() if offer.name == "abt")
-    assert offer_named("abt") == first
     assert {first.package, second.package} == {"others-protocols 1.2", f"robochoc {__version__}"}
-    assert f"abt: {second.place} (package {second.package}) is hidden by that of the package {first.package}" in (
-        run().stdout
-    )
+    assert first.protocol is second.protocol is offer_named("abt").protocol is None
+    assert "several packages, and only one may" in run().stdout
+    with pytest.raises(UnknownProtocol, match=r"others:Other \(others-protocols\)"):
+        protocol_named("abt")
 
 
 def test_json_is_an_object_a_line() -> None:

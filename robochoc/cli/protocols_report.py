@@ -40,17 +40,8 @@ class Row:
 
 
 def rows() -> list[Row]:
-    """All that `robochoc solve --protocol` takes; the first of two with one name is the one that runs."""
-    found: dict[str, Row] = {}
-    hidden = []
-    for offer in offers():
-        row = _row(offer)
-        if row.name in found:
-            reason = f"is hidden by that of the package {found[row.name].package}"
-            hidden.append(Row(row.name, row.place, row.package, None, reason))
-        else:
-            found[row.name] = row
-    return [*found.values(), _judge(), *hidden]
+    """All that `robochoc solve --protocol` takes, and what it cannot take, with the reason."""
+    return [*map(_row, offers()), _judge()]
 
 
 def json_report(found: Sequence[Row], *, explain: bool = False) -> bytes:

@@ -95,6 +95,11 @@ class LocalProblem:
         broken = self._broken(index, view, since)
         return None if broken is None else (broken[0].conflict(broken[1]), broken[0].key)
 
+    def conflicts(self, index: int, view: Mapping[str, Value]) -> list[tuple[Conflict, str]]:
+        """Like `explained`, of every constraint that `values[index]` breaks: all that are known are checked."""
+        known = self._known(view)
+        return [(c.conflict(others), c.key) for c, others in known if not c.mask(others) >> index & 1]
+
     def refuses(self, index: int, child: str, value: Value) -> Conflict | None:
         """What cannot both be, by the own parts towards `child`: of `values[index]` and `value`, what the part sees.
 
@@ -127,9 +132,7 @@ class LocalProblem:
 
     def violated(self, index: int, view: Mapping[str, Value]) -> int:
         """How many constraints `values[index]` breaks, of those whose other variables are all known in `view`."""
-        known = [(c, others) for c in self._constraints if (others := c.others(view)) is not None]
-        self.checks += len(known)
-        return sum(not constraint.mask(others) >> index & 1 for constraint, others in known)
+        return sum(not constraint.mask(others) >> index & 1 for constraint, others in self._known(view))
 
     def alike(self, value: Value) -> Sequence[int]:
         """The places of all own values that agree with `value` wherever that is not None.
@@ -140,6 +143,12 @@ class LocalProblem:
         """
         wanted = [(place, part) for place, part in enumerate(value) if part is not None]
         return [index for index, own in enumerate(self.values) if all(own[place] == part for place, part in wanted)]
+
+    def _known(self, view: Mapping[str, Value]) -> list[tuple[SharedConstraint, Others]]:
+        """The constraints whose other variables are all known, which is a check of each, and what they see."""
+        known = [(c, others) for c in self._constraints if (others := c.others(view)) is not None]
+        self.checks += len(known)
+        return known
 
     def _broken(self, index: int, view: Mapping[str, Value], since: int) -> tuple[SharedConstraint, Others] | None:
         """The first constraint that `values[index]` breaks, and what it sees in `view`."""

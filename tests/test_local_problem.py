@@ -1,0 +1,109 @@
+"""What a robot's local problem says of broken constraints, one way held against another."""
+
+from __future__ import annotations
+
+from collections import Counter
+from random import Random
+
+import pytest
+from complex_problems import random_complex_team
+from problems import random_team, team_of
+
+from robochoc.message import Value
+from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.solver import compiled
+from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.part import Part, parts
+
+EQUAL = Relation("R", 2, Semantics.SUPPORTS, ((1, 1), (2, 2)))
+ONE = Relation("R", 2, Semantics.SUPPORTS, ((1, 1),))
+
+
+def test_all_broken_constraints_are_told_not_only_the_first() -> None:
+    constraints = [Constraint("C", EQUAL, pair, pair) for pair in (("A", "D"), ("B", "D"), ("C", "D"))]
+    problem = LocalProblem(parts(team_of(dict.fromkeys("ABCD", (1, 2)), constraints))["RD"])
+    view: dict[str, Value] = {"RA": (2,), "RB": (1,), "RC": (2,)}
+    assert problem.conflicts(0, view) == [({"RA": (2,)}, "RD<RA:C"), ({"RC": (2,)}, "RD<RC:C")]
+    assert problem.conflicts(1, view) == [({"RB": (1,)}, "RD<RB:C")]
+
+
+def test_two_constraints_with_one_robot_are_both_told() -> None:
+    names = ("A", "B")
+    constraints = [Constraint("C1", EQUAL, names, names), Constraint("C2", ONE, names, names)]
+    problem = LocalProblem(parts(team_of(dict.fromkeys("AB", (1, 2)), constraints))["RB"])
+    assert [key for _, key in problem.conflicts(1, {"RA": (1,)})] == ["RB<RA:C1", "RB<RA:C2"]
+    assert [key for _, key in problem.conflicts(1, {"RA": (2,)})] == ["RB<RA:C2"]
+
+
+def test_each_known_constraint_is_a_check_and_unknown_ones_are_passed_over() -> None:
+    constraints = [Constraint("C", EQUAL, pair, pair) for pair in (("A", "C"), ("B", "C"))]
+    problem = LocalProblem(parts(team_of(dict.fromkeys("ABC", (1, 2)), constraints))["RC"])
+    assert problem.conflicts(0, {}) == []
+    assert problem.checks == 0
+    problem.conflicts(0, {"RA": (1,)})
+    assert problem.checks == 1
+    problem.conflicts(0, {"RA": (1,), "RB": (2,)})
+    assert problem.checks == 3
+
+
+@pytest.mark.parametrize("batch", range(2))
+def test_conflicts_are_those_of_the_files(batch: int) -> None:
+    """Every robot of a scope tells just the constraints that its value and the others' break together."""
+    chance = Random(f"conflicts {batch}")
+    seen = Counter[int]()
+    for _ in range(50):
+        team = random_team(chance)
+        given = {name: chance.choice(sorted(v.domain)) for name, v in team.variables.items()}
+        shared = [c for r in team.robots for parent in r.parents for c in parent.constraints]
+        for name, part in parts(team, everywhere=True).items():
+            problem = LocalProblem(part)
+            if not team[name].interface:
+                continue
+            (own,) = team[name].interface
+            for index, (value,) in enumerate(problem.values):
+                assert value is not None
+                broken = sum(own in c.variables and not c.allows({**given, own: value}) for c in shared)
+                told = problem.conflicts(index, _view(team, given))
+                assert len(told) == broken == problem.violated(index, _view(team, given))
+                seen[min(broken, 2)] += 1
+    assert min(seen[0], seen[1], seen[2]) > 50
+
+
+@pytest.mark.parametrize("batch", range(2))
+def test_the_first_conflict_is_the_one_that_is_explained(batch: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whether conflicts are looked up one by one or for all values at once."""
+    chance = Random(f"explained {batch}")
+    for _ in range(30):
+        team = random_complex_team(chance)
+        for part in parts(team, _any_domains(team, chance), everywhere=True).values():
+            monkeypatch.setattr(compiled, "LARGE", chance.choice((1, 1000)))
+            _compare(part, chance)
+
+
+def _compare(part: Part, chance: Random) -> None:
+    problem = LocalProblem(part)
+    for index in range(len(problem.values)):
+        view = {
+            name: tuple([chance.choice(list(part.domains[variable])) for variable in variables])
+            for name, variables in part.interfaces.items()
+            if chance.random() < 0.8
+        }
+        told = problem.conflicts(index, view)
+        assert problem.explained(index, view) == next(iter(told), None)
+        assert problem.violated(index, view) == len(told)
+
+
+def _view(team: Team, given: dict[str, int]) -> dict[str, Value]:
+    return {robot.name: tuple([given[name] for name in robot.interface]) for robot in team.robots}
+
+
+def _any_domains(team: Team, chance: Random) -> dict[str, CompiledDomain]:
+    """Some values for each robot, whatever its private constraints say."""
+    domains = {}
+    for robot in team.robots:
+        names = tuple(variable.name for variable in robot.variables)
+        rows = sorted({tuple([chance.choice(list(variable.domain)) for variable in robot.variables]) for _ in range(6)})
+        by_value = {tuple([row[names.index(name)] for name in robot.interface]): row for row in rows}
+        domains[robot.name] = CompiledDomain(names, tuple(by_value), tuple(by_value.values()), (1,) * len(by_value))
+    return domains
