@@ -120,7 +120,7 @@ def rejoined(team: Team, robot: Robot) -> Team:
 def _with_robot(team: Team, robot: Robot) -> Team:
     if robot.name in team:
         raise BadChange(f"the robot '{robot.name}' is there already", "a robot can come again once it has left")
-    if robot.kind is not team.kind:
+    if team.robots and robot.kind is not team.kind:
         raise BadChange(f"'{robot.name}' is a {robot.kind} in a team of {team.kind}", "write the same type in both")
     if robot.children:
         hint = "it takes the lowest priority, so its file names parents only"

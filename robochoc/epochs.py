@@ -7,7 +7,6 @@ begins anew, so that the two can be compared.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
@@ -20,7 +19,7 @@ from robochoc.communication.session import Epoch, Session
 from robochoc.formats import InvalidInput, read_robot
 from robochoc.orders import reordered
 from robochoc.outcome import Verdict
-from robochoc.problem import AddAgent, Event, RemoveAgent, Robot, Team
+from robochoc.problem import AddAgent, Event, Robot, Team
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.explanation import Void, void
 
@@ -53,12 +52,11 @@ class Journey:
         messages: int | None = None,
         spares: int = 0,
     ) -> None:
-        self.team = changed_by(team, events=0)
-        self._files = team
-        self._happened = 0
+        self.team = self._full = changed_by(team, events=0)
         self.withdrawn: list[str] = []
         self.regrets: list[str] = []
-        self._events = deque(team.scenario)
+        self._files = team
+        self._happened = 0
         self._order = order
         self._compile = compile_
         self._left_s = left_s
@@ -77,66 +75,53 @@ class Journey:
         """
         for number in count():
             announce(number)
-            limits = [self._messages, self._events[0].after if self._events else None]
-            enough = min((limit for limit in limits if limit is not None), default=None)
-            result = session.search(self._left_s(), enough)
-            if self._messages is not None:
-                self._messages -= sum(result.metrics.messages.values())
+            result = self._search(session)
             yield Played(self.team, result)
             if result.lost:
-                new, fresh = self._after_loss(result.lost)
-            elif self._events and not (result.verdict is Verdict.UNKNOWN and self._is_over):
-                new, fresh = self._after_event(self._events.popleft())
+                fresh = self._back_after(result.lost)
+            elif self._next is None or (result.verdict is Verdict.UNKNOWN and self._is_over):
+                return
             else:
+                fresh = self._added_by(self._next)
+            before = self.arranged()
+            self._take_stock(fresh)
+            if result.lost and not self.team.robots and self._next is None:
                 return
-            if not new.robots:
-                return
-            self._go_over(session, new, fresh)
+            self._go_over(session, before, fresh)
+
+    def _search(self, session: Session) -> RunResult:
+        if not self.team.robots:  # all have left, and others may come: nobody is against it
+            return RunResult.of(Verdict.SOLUTION, None, {}, (), 0)
+        limits = [self._messages, self._next.after if self._next else None]
+        enough = min((limit for limit in limits if limit is not None), default=None)
+        result = session.search(self._left_s(), enough)
+        if self._messages is not None:
+            self._messages -= sum(result.metrics.messages.values())
+        return result
+
+    @property
+    def _next(self) -> Event | None:
+        """The event that comes next."""
+        return self._files.scenario[self._happened] if self._happened < len(self._files.scenario) else None
 
     @property
     def _is_over(self) -> bool:
         """Whether the time is over, or all messages have been sent."""
         return self._left_s() == 0 or (self._messages is not None and self._messages <= 0)
 
-    def _go_over(self, session: Session, new: Team, fresh: Collection[str]) -> None:
-        before = self.arranged()
-        self.team = new
-        if self._order is not None:
-            stay = [name for name in self._order if name in new and name not in fresh]
-            self._order = (*stay, *(name for name in new.order if name not in stay))
-        now = self.arranged()
-        keys, agents = void(before, now)
-        session.change(Epoch(now, self._compile(now), Void(keys, agents | set(fresh)), frozenset(fresh)))
-
     def leave(self, lost: Collection[str]) -> None:
         """The robots `lost` are out for good."""
         self.withdrawn += lost
-        self.team = without(self.team, lost)
+        self._take_stock(())
 
-    def _after_event(self, event: Event) -> tuple[Team, Collection[str]]:
-        """The team after `event`; what it says of robots that were lost is passed over."""
+    def _added_by(self, event: Event) -> Collection[str]:
+        """Let `event` happen; returns who comes. After losses, what cannot be any more is left out."""
         self._happened += 1
-        team = self.team
-        fresh = set()
-        for change in event.changes:
-            match change:
-                case RemoveAgent(name) if name in self.withdrawn:  # it was lost, and now it has left
-                    self.withdrawn.remove(name)
-                    continue
-                case AddAgent(robot):
-                    fresh.add(robot.name)
-                    self.withdrawn = [name for name in self.withdrawn if name != robot.name]
-                case _:
-                    pass
-            try:
-                team = changed(team, [change])
-            except BadChange:
-                if not self._lossy:
-                    raise
-        return team, fresh & {*team.order}
+        self._full = changed_by(self._files, self._happened) if self._lossy else changed(self._full, event.changes)
+        return [change.robot.name for change in event.changes if isinstance(change, AddAgent)]
 
-    def _after_loss(self, lost: Mapping[str, str]) -> tuple[Team, Collection[str]]:
-        """The team that remains, with those that come back, in the order in which they do."""
+    def _back_after(self, lost: Mapping[str, str]) -> Collection[str]:
+        """Those of `lost` that come back; the others are out."""
         self._lossy = True
         back: list[str] = []
         for name in lost:
@@ -147,14 +132,25 @@ class Journey:
                     back.append(name)
                 except (InvalidInput, BadChange, OSError) as why:
                     self.regrets.append(f"{name} could not come back: {why}")
-        out = [name for name in lost if name not in back]
-        self.withdrawn += out
-        if not back:
-            return without(self.team, out), ()
-        if self._order is None:
-            self._order = self.team.order
-        team = changed_by(self._files, self._happened)
-        return without(team, [name for name in self.withdrawn if name in team]), back
+        self.withdrawn += [name for name in lost if name not in back]
+        if back:
+            self._full = changed_by(self._files, self._happened)
+            self._order = self._order or self.team.order
+        return back
+
+    def _take_stock(self, fresh: Collection[str]) -> None:
+        """Who is there now, and in which order: whoever is in `fresh` comes last."""
+        self.withdrawn = [name for name in self.withdrawn if name in self._full and name not in fresh]
+        self.team = without(self._full, self.withdrawn)
+        if self._order is not None:
+            stay = [name for name in self._order if name in self.team and name not in fresh]
+            self._order = (*stay, *(name for name in self.team.order if name not in stay))
+
+    def _go_over(self, session: Session, before: Team, fresh: Collection[str]) -> None:
+        """Have `session`, which has worked on `before`, work on the team as it is now."""
+        now = self.arranged()
+        keys, agents = void(before, now)
+        session.change(Epoch(now, self._compile(now), Void(keys, agents | set(fresh)), frozenset(fresh)))
 
     def _read_again(self, name: str) -> None:
         """Take what the file of `name` says now for what it said from the beginning."""

@@ -65,7 +65,8 @@ class Ending:
 
     def ignore(self) -> None:
         """All is done, and nothing is left to undo."""
-        for signum in _STOPPING:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        for signum in (*_STOPPING, signal.SIGALRM):
             signal.signal(signum, signal.SIG_IGN)
 
     def _hear(self, signum: int, frame: FrameType | None) -> None:

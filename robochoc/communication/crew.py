@@ -137,6 +137,13 @@ class Crew:
         robot.control.close()
         self._dismissed.append(robot)
 
+    def reap(self) -> None:
+        """Let go of what is left of those who have been dismissed, as far as they have ended."""
+        ended = [robot for robot in self._dismissed if robot.process.exitcode is not None]
+        self._dismissed = [robot for robot in self._dismissed if robot not in ended]
+        for robot in ended:
+            robot.process.close()
+
     def end_all(self) -> None:
         """Hang up; robots that have reported get a moment to end by themselves, others are killed at once.
 

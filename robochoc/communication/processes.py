@@ -84,6 +84,7 @@ class ProcessesRun(Session):
         self._began = time.monotonic()
         self._number = 0
         self._quiet = True
+        self._deadline: float | None = None
         self._waiting = Epoch(team, domains).parts(protocol)
         """Robots that are still to be started."""
         self._enter_epoch(team.order)
@@ -104,7 +105,7 @@ class ProcessesRun(Session):
         messages is looked at as often as all robots answer.
         """
         began = time.monotonic()
-        deadline = None if timeout is None else began + timeout
+        deadline = self._deadline = None if timeout is None else began + timeout
         try:
             self._launch(deadline)
             self._wait_until(lambda: not self._absent or self._broken_off, deadline)
@@ -123,6 +124,7 @@ class ProcessesRun(Session):
     def change(self, epoch: Epoch) -> None:
         """See `Session.change`; robots that are no longer in the team, or begin anew, are dismissed."""
         self._number += 1
+        self._crew.reap()
         given = epoch.parts(self._protocol)
         gone = [name for name in self._crew.robots if name not in given or name in epoch.fresh]
         left = sorted({*gone, *epoch.fresh, *self._lost})
@@ -281,7 +283,7 @@ class ProcessesRun(Session):
         """Say that the search is over, and collect everybody's report."""
         wall_s = time.monotonic() - began
         self._tell_all(Pause())
-        self._wait_until(lambda: not self._silent(), time.monotonic() + (LATE_WORDS_S if late else LAST_WORDS_S))
+        self._await_reports(late=late)
         silent = self._silent()
         if silent and not late:
             if not self._survive:
@@ -297,6 +299,14 @@ class ProcessesRun(Session):
             wall_s,
         )
         return replace(result, lost=dict(self._lost))
+
+    def _await_reports(self, *, late: bool) -> None:
+        """Who computes while there is no verdict is only busy: it is waited for, until the time is over."""
+        while True:
+            self._wait_until(lambda: not self._silent(), time.monotonic() + (LATE_WORDS_S if late else LAST_WORDS_S))
+            busy = any(self._crew.robots[name].is_computing for name in self._silent())
+            if late or self._verdict is not None or not busy or _over(self._deadline):
+                return
 
     def _silent(self) -> list[str]:
         return [name for name, robot in self._crew.robots.items() if robot.report is None]

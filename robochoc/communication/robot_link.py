@@ -95,6 +95,15 @@ class RobotLink:
         awaits = _AWAITS.search(status)
         return "VmSize:" not in status or (awaits is not None and bool(int(awaits[1], 16) & _SIGKILL_BIT))
 
+    @property
+    def is_computing(self) -> bool:
+        """Whether the process has a turn of the processor, or would take one (Linux)."""
+        try:
+            status = Path(f"/proc/{self.process.pid}/stat").read_text()
+        except OSError:
+            return False
+        return status.rpartition(")")[2].split()[0] == "R"
+
     def fate(self) -> str:
         """How the process ended, in words. Its sentinel has told; the exit code comes a moment later."""
         deadline = time.monotonic() + _EXIT_CODE_S
