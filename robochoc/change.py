@@ -79,20 +79,25 @@ def without(team: Team, names: Iterable[str]) -> Team:
     def kept(constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
         return tuple(constraint for constraint in constraints if lost.isdisjoint(constraint.variables))
 
-    return replace(
-        team,
-        robots=tuple(
-            replace(
-                robot,
-                parents=tuple(replace(p, constraints=kept(p.constraints)) for p in robot.parents if p.name not in gone),
-                children=tuple(
-                    replace(c, constraints=kept(c.constraints)) for c in robot.children if c.name not in gone
-                ),
-            )
-            for robot in team.robots
-            if robot.name not in gone
-        ),
-    )
+    robots = []
+    for robot in team.robots:
+        if robot.name not in gone:
+            parents = [replace(one, constraints=kept(one.constraints)) for one in robot.parents if one.name not in gone]
+            below = [replace(one, constraints=kept(one.constraints)) for one in robot.children if one.name not in gone]
+            robots.append(replace(robot, parents=tuple(parents), children=tuple(below)))
+    return _shown(replace(team, robots=tuple(robots)))
+
+
+def _shown(team: Team) -> Team:
+    """`team`, in which robots still show what their parents' parts of partially known constraints look at."""
+    for robot in team.robots:
+        for child in robot.children:
+            needed = {name for part in child.constraints for name in part.variables if team.owner[name] == child.name}
+            hidden = needed.difference(team[child.name].interface) if needed else ()
+            if hidden:
+                below = team[child.name]
+                team = _with(team, replace(below, shown=(*below.shown, *sorted(hidden))))
+    return team
 
 
 def rejoined(team: Team, robot: Robot) -> Team:
@@ -193,7 +198,8 @@ def _without_constraint(team: Team, agent: str, parent: str, name: str) -> Team:
         replace(one, constraints=tuple(c for c in one.constraints if c.name != name)) if one.name == agent else one
         for one in above.children
     )
-    return _with(_with(team, replace(holder, parents=tuple(parents))), replace(above, children=tuple(children)))
+    team = _with(_with(team, replace(holder, parents=tuple(parents))), replace(above, children=tuple(children)))
+    return _shown(team)
 
 
 def _less(team: Team, variable: str, value: int) -> Domain:

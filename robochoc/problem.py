@@ -204,6 +204,8 @@ class Robot:
     children: tuple[Child, ...] = ()
     topics: tuple[Topic, ...] = ()
     file: str = field(default="", compare=False)
+    shown: tuple[str, ...] = ()
+    """Own variables that neighbours see though nothing here says so: a parent's part of a PKC looks at them."""
 
     @cached_property
     def shared(self) -> tuple[Constraint, ...]:
@@ -216,6 +218,7 @@ class Robot:
         parts = (constraint for child in self.children for constraint in child.constraints)
         seen = {name for constraint in (*self.shared, *parts) for name in constraint.variables}
         seen.update(name for child in self.children for name in child.variables)
+        seen.update(self.shown)
         return tuple(variable.name for variable in self.variables if variable.name in seen)
 
 
