@@ -92,6 +92,8 @@ class Journey:
     def _search(self, session: Session) -> RunResult:
         if not self.team.robots:  # all have left, and others may come: nobody is against it
             return RunResult.of(Verdict.SOLUTION, None, {}, (), 0)
+        if self._is_over:
+            return RunResult.of(Verdict.UNKNOWN, None, {}, (), 0)
         limits = [self._messages, self._next.after if self._next else None]
         enough = min((limit for limit in limits if limit is not None), default=None)
         result = session.search(self._left_s(), enough)

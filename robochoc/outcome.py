@@ -94,3 +94,14 @@ class Outcome:
     def events(self) -> int:
         """How many events of the scenario have happened: they, and losses, open epochs."""
         return sum(not epoch.lost for epoch in self.epochs[:-1])
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """Those of the withdrawn whose processes died; the others stepped aside."""
+        died = {name for epoch in self.epochs for name in epoch.lost}
+        return tuple(name for name in self.withdrawn if name in died)
+
+    @property
+    def aside(self) -> tuple[str, ...]:
+        """Those of the withdrawn that stepped aside, as they found no place."""
+        return tuple(name for name in self.withdrawn if name not in self.lost)

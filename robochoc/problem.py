@@ -314,8 +314,8 @@ class Team:
 
     @property
     def kind(self) -> Kind:
-        """A team with costs is a DisWCSP as a whole."""
-        return self.robots[0].kind
+        """A team with costs is a DisWCSP as a whole; one that all have left is a DisCSP."""
+        return self.robots[0].kind if self.robots else Kind.DISCSP
 
     @cached_property
     def order(self) -> tuple[str, ...]:

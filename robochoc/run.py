@@ -108,7 +108,9 @@ class _Run:
         try:
             return self._travel(journey, protocol)
         except (TooManySolutions, CompileTimeout, _TimeOver) as limit:
-            return replace(self._summary(), verdict=Verdict.UNKNOWN, assignment={}, verified=False, reason=str(limit))
+            out = tuple(journey.withdrawn)
+            outcome = replace(self._summary(), verdict=Verdict.UNKNOWN, assignment={}, verified=False, withdrawn=out)
+            return replace(outcome, reason="; ".join([str(limit), *journey.regrets]))
 
     def _travel(self, journey: Journey, protocol: type[Protocol]) -> Outcome:
         """All epochs; then those step aside who find no place, if they are to."""

@@ -33,10 +33,12 @@ def report(team: Team, outcome: Outcome) -> str:
     team = changed_by(team, outcome.events)
     if outcome.assignment:
         lines += _board(team, outcome.assignment) or _list(team, outcome.assignment)
-    if outcome.withdrawn:
-        flying, aside = len(team.robots) - len(outcome.withdrawn), len(outcome.withdrawn)
+    if outcome.aside:
+        flying, aside = len(team.robots) - len(outcome.withdrawn), len(outcome.aside)
         lines.append(f"  {flying} {'flies' if flying == 1 else 'fly'}, {aside} step{'s' * (aside == 1)} aside:")
-        lines += _wrapped(outcome.withdrawn)
+        lines += _wrapped(outcome.aside)
+    if outcome.lost:
+        lines += [f"  {len(outcome.lost)} {'was' if len(outcome.lost) == 1 else 'were'} lost:", *_wrapped(outcome.lost)]
     lines.append(f"  {outcome.protocol}, {_place(team, outcome)}: {_metrics(outcome)}")
     return "\n".join(lines)
 
@@ -103,8 +105,7 @@ def _verdict(outcome: Outcome) -> str:
     why = outcome.witness and f"{outcome.witness} has derived the empty nogood"
     if outcome.reason and not outcome.epochs:
         why = outcome.reason
-    lost = {name for epoch in outcome.epochs for name in epoch.lost}.intersection(outcome.withdrawn)
-    left = f" for the robots that are left, without {shortened(', '.join(sorted(lost, key=natural)))}" if lost else ""
+    left = " for the robots that are left" if outcome.lost else ""
     match outcome.verdict:
         case Verdict.NO_SOLUTION:
             proof = f"no solution{left} ({why})" if why else f"no solution{left}"
@@ -113,11 +114,12 @@ def _verdict(outcome: Outcome) -> str:
             return f"unknown: {outcome.reason or 'a limit was reached before a verdict'}"
         case _ if outcome.count is not None:
             return f"{outcome.count:,} solution{'s' * (outcome.count != 1)}"
-        case Verdict.SOLUTION | Verdict.OPTIMAL if lost.issuperset(outcome.withdrawn):
+        case Verdict.SOLUTION | Verdict.OPTIMAL if not outcome.aside:
             return f"{outcome.verdict}{left}, checked against every constraint"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             who = "some step" if outcome.assignment else "all step"
-            return f"no solution for the whole team ({why}); {who} aside, checked against every constraint"
+            whole = left or " for the whole team"
+            return f"no solution{whole} ({why}); {who} aside, checked against every constraint"
 
 
 def _metrics(outcome: Outcome) -> str:

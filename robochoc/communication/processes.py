@@ -163,16 +163,16 @@ class ProcessesRun(Session):
             for part in waiting.values():
                 if _over(deadline):
                     break
-                self._start(part, len(waiting))
+                self._start(part)
                 self._see_ends()
 
-    def _start(self, part: Part, wanted: int) -> None:
+    def _start(self, part: Part) -> None:
         observed = self._observer is not None
         try:
             self._crew.start(Beginning(part, self._protocol, self._number, observed))
         except OSError as error:
             raise Unsupported(
-                f"the system lets only {len(self._crew.robots)} of {wanted} robots have a process:"
+                f"the system lets only {len(self._crew.robots)} of {len(part.order)} robots have a process:"
                 f" {error.strerror} (raise its limits, see 'ulimit -n' and 'ulimit -u', or use the simulator)"
             ) from error
 
@@ -285,7 +285,7 @@ class ProcessesRun(Session):
         self._tell_all(Pause())
         self._await_reports(late=late)
         silent = self._silent()
-        if silent and not late:
+        if silent and not late and not (self._verdict is None and _over(self._deadline)):
             if not self._survive:
                 raise RobotsLost(dict.fromkeys(silent, "it did not report at the end"))
             for name in silent:
@@ -303,7 +303,11 @@ class ProcessesRun(Session):
     def _await_reports(self, *, late: bool) -> None:
         """Who computes while there is no verdict is only busy: it is waited for, until the time is over."""
         while True:
-            self._wait_until(lambda: not self._silent(), time.monotonic() + (LATE_WORDS_S if late else LAST_WORDS_S))
+            now = time.monotonic()
+            patience = now + (LATE_WORDS_S if late else LAST_WORDS_S)
+            if self._deadline is not None:
+                patience = min(patience, max(self._deadline, now + LATE_WORDS_S))
+            self._wait_until(lambda: not self._silent(), patience)
             busy = any(self._crew.robots[name].is_computing for name in self._silent())
             if late or self._verdict is not None or not busy or _over(self._deadline):
                 return

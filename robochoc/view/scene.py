@@ -42,16 +42,17 @@ def scene_of(outcome: Outcome, team: Team | None = None) -> Scene:
 
 
 def _ending(outcome: Outcome, flying: int, aside: int) -> str:
-    if outcome.withdrawn and flying:
+    if outcome.aside and flying:
         others = "no larger team could" if outcome.verdict is Verdict.OPTIMAL else f"{aside} withdrew"
         return f"{flying} fly, {others}"
+    left = " for those that are left" if outcome.lost else ""
     match outcome.verdict:
         case Verdict.SOLUTION:
-            return "a solution"
+            return f"a solution{left}"
         case Verdict.OPTIMAL:
             return "an optimal solution"
         case Verdict.NO_SOLUTION:
-            return "no solution, everybody stays on the ground"
+            return f"no solution{left}, everybody stays on the ground"
         case Verdict.UNKNOWN:
             return "a limit was reached without a verdict"
 
@@ -59,9 +60,11 @@ def _ending(outcome: Outcome, flying: int, aside: int) -> str:
 def _facts(outcome: Outcome, flying: int, aside: int) -> tuple[tuple[str, str], ...]:
     checked = ", checked" if outcome.verified else ""
     verdict = f"{outcome.verdict}{checked}"
-    if outcome.withdrawn:
+    if outcome.aside:
         verdict = f"no solution for all {flying + aside}; {flying} placed{checked}"
     facts = [("verdict", verdict), ("protocol", outcome.protocol)]
+    if outcome.lost:
+        facts.append(("lost", ", ".join(outcome.lost)))
     if outcome.cost:
         facts.append(("cost", f"{outcome.cost:,g}"))
     facts.append(("messages", f"{sum(outcome.metrics.messages.values()):,}"))
