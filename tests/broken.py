@@ -9,6 +9,7 @@ from __future__ import annotations
 from broken_case import Broken
 from broken_files import FILES, SCHEMA, WELL_FORMED
 from broken_robots import CONSTRAINTS, DEFINITIONS, DOMAINS
+from broken_scenarios import CHANGES
 from broken_teams import MANY, NEIGHBOURS, SCENARIOS
 
 CASES: list[Broken] = [
@@ -20,5 +21,6 @@ CASES: list[Broken] = [
     *CONSTRAINTS,
     *NEIGHBOURS,
     *SCENARIOS,
+    *CHANGES,
     *MANY,
 ]

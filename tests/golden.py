@@ -6,6 +6,7 @@ from pathlib import Path
 
 from problems import team_of
 
+from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.observers.journal import Header, Recorder
 from robochoc.problem import Constraint, Relation, Semantics, Team
@@ -13,6 +14,7 @@ from robochoc.registry import protocol_named, protocol_names
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 
 FOLDER = Path(__file__).parent / "golden"
+RESCUE = Path(__file__).parents[1] / "docs" / "examples" / "rescue"
 
 
 def odd_team(*, n_ary: bool = True) -> Team:
@@ -29,14 +31,19 @@ def odd_team(*, n_ary: bool = True) -> Team:
 
 
 def fixed_teams(protocol: str) -> dict[str, Team]:
-    """Three small teams, by name; without the ternary constraint for a protocol that cannot take it."""
-    odd = odd_team(n_ary=protocol_named(protocol).traits.n_ary)
-    return {"queens3d-2": queens3d(2), "queens3d-3-full": queens3d(3, "full"), "odd": odd}
+    """Three small teams, by name; without the ternary constraint for a protocol that cannot take it.
+
+    A protocol that goes on when the problem changes also has one that does.
+    """
+    traits = protocol_named(protocol).traits
+    teams = {"queens3d-2": queens3d(2), "queens3d-3-full": queens3d(3, "full"), "odd": odd_team(n_ary=traits.n_ary)}
+    return {**teams, "rescue": read_team(RESCUE)} if traits.dynamic else teams
 
 
 def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
     """The journal of the fixed run; the wall-clock time, which is not fixed, is left out."""
-    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, schedule=schedule, withdraw=Withdrawal.MAXIMAL)
+    withdraw = None if team.dynamic else Withdrawal.MAXIMAL
+    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, schedule=schedule, withdraw=withdraw)
     recorder = Recorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=0))
     solve(team, options, observer=recorder)
     return recorder.content()

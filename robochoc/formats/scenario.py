@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from lxml import etree
 
 from robochoc.change import BadChange, changed
 from robochoc.formats.constraints import Context, read_shared
-from robochoc.formats.diagnostics import MistakeError, Report, shortened
+from robochoc.formats.diagnostics import Diagnostic, InvalidInput, MistakeError, Report, shortened
 from robochoc.formats.robot import RobotFile, read_robot_file
 from robochoc.formats.xml import attribute, line, read_xml
 from robochoc.problem import (
@@ -46,7 +47,11 @@ def read_scenario(folder: Path, team: Team | None, files: Mapping[str, RobotFile
 
 
 class _Reader:
-    """Walks through the events, and changes the team on the way."""
+    """Walks through the events, and changes the team on the way.
+
+    What cannot be done is told and left out. Of names that would be there had it been done nothing is said after
+    that: one mistake is told once.
+    """
 
     def __init__(self, folder: Path, team: Team | None, files: Mapping[str, RobotFile]) -> None:
         self._folder = folder
@@ -55,39 +60,51 @@ class _Reader:
         self._team = team
         self._contexts: dict[str, Context] = {name: file.context for name, file in files.items()}
         self._report = Report(str(self._path))
+        self._elsewhere: list[Diagnostic] = []
+        """Mistakes in the files of added robots."""
+        self._unread = False
+        """Whether such a file could not be read, so that nobody knows what is in it."""
+        self._missed: set[str] = set()
+        """Robots, variables and constraints that could not be added."""
 
     def events(self) -> tuple[Event, ...]:
-        events = []
-        for element in read_xml(self._path, "scenario").iterchildren("event"):
-            changes: list[Change] = []
-            for child in element:
-                with self._report.at(line(child)):
-                    for change in self._changes(child):
-                        self._apply(change)
+        """All events. Raises `InvalidInput`."""
+        try:
+            events = tuple([self._event(one) for one in read_xml(self._path, "scenario").iterchildren("event")])
+            self._report.finish()
+        except InvalidInput as invalid:
+            self._elsewhere += invalid.diagnostics
+        if self._elsewhere:
+            raise InvalidInput(dict.fromkeys(self._elsewhere))
+        return events
+
+    def _event(self, element: etree._Element) -> Event:
+        changes: list[Change] = []
+        for child in element:
+            with self._report.at(line(child)):
+                for place, change in self._changes(child):
+                    with self._report.at(place):
+                        self._apply(change, place)
                         changes.append(change)
-            after = attribute(element, "after")
-            events.append(Event(tuple(changes), None if after == "solved" else int(after.split()[0])))
-        self._report.finish()
-        return tuple(events)
+        if self._team and not self._team.robots:
+            self._report.add(line(element), "all robots have left after this event", "keep one, or add another")
+            self._team = None
+        after = attribute(element, "after")
+        return Event(tuple(changes), None if after == "solved" else int(after.split()[0]))
 
-    def _changes(self, element: etree._Element) -> Iterator[Change]:
-        match element.tag:
-            case "remove_agent":
-                yield RemoveAgent(attribute(element, "name"))
-            case "add_agent":
-                yield AddAgent(self._added(attribute(element, "file")))
-            case "remove_value":
-                yield RemoveValue(attribute(element, "variable"), int(attribute(element, "value")))
-            case "add_value":
-                yield AddValue(attribute(element, "variable"), int(attribute(element, "value")))
-            case "remove_constraint":
-                names = (attribute(element, name) for name in ("agent", "parent", "name"))
-                yield RemoveConstraint(*names)
-            case _:
-                yield from self._added_constraints(element)
+    def _changes(self, element: etree._Element) -> Iterator[tuple[int, Change]]:
+        """The changes that `element` stands for, each with its line."""
+        if element.tag == "add_constraint":
+            yield from self._added_constraints(element)
+        elif element.tag == "add_agent":
+            robot = self._added(attribute(element, "file"))
+            if robot:
+                yield line(element), AddAgent(robot)
+        else:
+            yield line(element), _change(element)
 
-    def _added(self, name: str) -> Robot:
-        """The robot in the file `name`; mistakes in there are told with that file's lines."""
+    def _added(self, name: str) -> Robot | None:
+        """The robot in the file `name`; None where it has mistakes, which are told with that file's lines."""
         try:
             path = (self._inside / name).resolve()
             there = path.is_file()
@@ -96,32 +113,110 @@ class _Reader:
         if not path.is_relative_to(self._inside):
             raise MistakeError(f"the file '{shortened(name)}' lies outside the team's folder", "move it inside")
         if not there:
+            self._missed.add(Path(name).stem)
+            self._unread = True
             message = f"there is no file '{shortened(name)}' in the team's folder"
             raise MistakeError(message, "write late/NAME.xml, below the folder's own robots")
-        file = read_robot_file(self._folder / name)
-        self._contexts[file.robot.name] = file.context
+        own = Path(name).stem
+        there_already = self._team is not None and own in self._team
+        try:
+            file = read_robot_file(self._folder / name)
+            if not there_already:
+                _refuse_parts(file.robot)
+        except InvalidInput as invalid:
+            self._elsewhere += invalid.diagnostics
+            self._unread = True
+            if not there_already:
+                self._contexts.pop(own, None)
+            return None
+        if not there_already:
+            self._contexts[own] = file.context
         return file.robot
 
-    def _added_constraints(self, element: etree._Element) -> Iterator[Change]:
+    def _added_constraints(self, element: etree._Element) -> Iterator[tuple[int, Change]]:
         agent, parent = attribute(element, "agent"), attribute(element, "parent")
         context = self._contexts.get(agent)
         if context is None:
-            if self._team is None:
+            if self._team is None or self._unread:
                 return
             raise MistakeError(f"there is no robot '{shortened(agent)}'", "name a robot that is there at that time")
         for child in element.iterchildren("constraint"):
             with self._report.at(line(child)):
+                self._missed.add(attribute(child, "name"))
                 constraint = read_shared(child, context)
                 if constraint and constraint.model is Model.PKC:
                     message = "a partially known constraint (PKC) in a scenario"
                     raise MistakeError(message, 'each side would need its part: write model="TKC"')
                 if constraint:
-                    yield AddConstraint(agent, parent, constraint)
+                    self._missed.discard(constraint.name)
+                    yield line(child), AddConstraint(agent, parent, constraint)
 
-    def _apply(self, change: Change) -> None:
-        if self._team is None:
+    def _apply(self, change: Change, place: int) -> None:
+        """Change the team. Raises `MistakeError` where it cannot take that."""
+        while self._team is not None:
+            try:
+                self._team = changed(self._team, [change])
+            except BadChange as bad:
+                if isinstance(change, AddAgent) and bad.line:
+                    self._blame(change.robot, bad, place)
+                    change = AddAgent(_without_line(change.robot, bad.line))
+                    continue
+                self._missed |= _names_brought(change)
+                if not self._excused(bad):
+                    raise MistakeError(bad.message, bad.hint) from None
             return
-        try:
-            self._team = changed(self._team, [change])
-        except BadChange as bad:
-            raise MistakeError(bad.message, bad.hint) from None
+
+    def _blame(self, robot: Robot, bad: BadChange, place: int) -> None:
+        """Tell a mistake of an added robot's file; the robot joins without what is wrong with it."""
+        if not self._excused(bad):
+            message = f"{bad.message}, when {SCENARIO}:{place} adds this robot"
+            self._elsewhere.append(Diagnostic(robot.file, bad.line, message, bad.hint))
+
+    def _excused(self, bad: BadChange) -> bool:
+        """Whether `bad` may only follow from a mistake that was told already."""
+        return bool(bad.missing) and (self._unread or bad.missing in self._missed)
+
+
+def _change(element: etree._Element) -> Change:
+    """What an element says that needs no other file."""
+    match element.tag:
+        case "remove_agent":
+            return RemoveAgent(attribute(element, "name"))
+        case "remove_value":
+            return RemoveValue(attribute(element, "variable"), int(attribute(element, "value")))
+        case "add_value":
+            return AddValue(attribute(element, "variable"), int(attribute(element, "value")))
+        case _:
+            return RemoveConstraint(*(attribute(element, name) for name in ("agent", "parent", "name")))
+
+
+def _refuse_parts(robot: Robot) -> None:
+    """Raise `InvalidInput` where an added robot brings its part of partially known constraints."""
+    hint = 'the parent could not bring its part: write model="TKC"'
+    message = "a partially known constraint (PKC) of a robot that a scenario adds"
+    parts = [one for one in robot.shared if one.model is Model.PKC]
+    if parts:
+        raise InvalidInput([Diagnostic(robot.file, one.line, message, hint) for one in parts])
+
+
+def _without_line(robot: Robot, number: int) -> Robot:
+    """`robot` without the neighbours and constraints in line `number` of its file."""
+    parents = (
+        replace(parent, constraints=tuple(one for one in parent.constraints if one.line != number))
+        for parent in robot.parents
+        if parent.line != number
+    )
+    return replace(
+        robot, parents=tuple(parents), children=tuple(child for child in robot.children if child.line != number)
+    )
+
+
+def _names_brought(change: Change) -> set[str]:
+    """What would be there, had `change` been made."""
+    match change:
+        case AddAgent(robot):
+            return {robot.name, *(variable.name for variable in robot.variables)}
+        case AddConstraint(constraint=constraint):
+            return {constraint.name}
+        case _:
+            return set()
