@@ -34,10 +34,10 @@ def _connected(graph: list[Edge], agents: int) -> bool:
     return len(reached) == agents
 
 
-def colouring(seed: int = SEED) -> Team:
+def colouring(seed: int = SEED, agents: int = AGENTS, count: int = EDGES) -> Team:
     """The problem as a team: a robot an agent, the lower number the higher priority."""
-    graph = edges(seed)
-    return Team(f"colouring-{AGENTS}-{seed}", tuple(_robot(agent, graph) for agent in range(AGENTS)))
+    graph = edges(seed, agents, count)
+    return Team(f"colouring-{agents}-{seed}", tuple(_robot(agent, graph) for agent in range(agents)))
 
 
 def _robot(agent: int, graph: list[Edge]) -> Robot:
