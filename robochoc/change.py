@@ -81,6 +81,40 @@ def changed_by(team: Team, events: int) -> Team:
     return now
 
 
+def described(change: Change) -> str:
+    """`change` in a few words."""
+    match change:
+        case RemoveAgent(name):
+            return f"-{name}"
+        case AddAgent(robot):
+            return f"+{robot.name}"
+        case RemoveValue(variable, value):
+            return f"{variable} without {value}"
+        case AddValue(variable, value):
+            return f"{variable} with {value}"
+        case AddConstraint(agent, parent, constraint):
+            return f"+{constraint.name} ({parent}, {agent})"
+        case RemoveConstraint(agent, parent, name):
+            return f"-{name} ({parent}, {agent})"
+        case never:
+            assert_never(never)
+
+
+def concerns(team: Team, change: Change) -> set[str]:
+    """The robots of `team` that `change` is about."""
+    match change:
+        case RemoveAgent(name):
+            return {name}
+        case AddAgent():
+            return set()
+        case RemoveValue(variable, _) | AddValue(variable, _):
+            return {team.owner[variable]} if variable in team.owner else set()
+        case AddConstraint(agent, parent, _) | RemoveConstraint(agent, parent, _):
+            return {agent, parent}
+        case never:
+            assert_never(never)
+
+
 def without(team: Team, names: Iterable[str]) -> Team:
     """`team` without the robots `names`, their variables, and every constraint that they share."""
     gone = set(names)

@@ -7,13 +7,13 @@ begins anew, so that the two can be compared.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import NamedTuple
 
-from robochoc.change import BadChange, changed, changed_by, rejoined, without
+from robochoc.change import BadChange, changed, changed_by, concerns, described, rejoined, without
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.formats import InvalidInput, read_robot
@@ -27,10 +27,11 @@ Compile = Callable[[Team], Mapping[str, CompiledDomain]]
 
 
 class Played(NamedTuple):
-    """An epoch that is over: its team, as the files have it, and how it ended."""
+    """An epoch that is over: its team, as the files have it, how it ended, and what had opened it."""
 
     team: Team
     result: RunResult
+    opened_by: str
 
 
 class Journey:
@@ -68,20 +69,23 @@ class Journey:
         """The team as the robots see it: in the order of the run. Raises `CannotTurn`."""
         return self.team if self._order is None else reordered(self.team, self._order)
 
-    def go(self, session: Session, announce: Callable[[int], None]) -> Iterator[Played]:
+    def go(self, session: Session, announce: Callable[[int, str], None]) -> Iterator[Played]:
         """One epoch after the other; the last is the one whose verdict counts. A time limit may end it earlier.
 
-        Before each, `announce` is told its number.
+        Before each, `announce` is told its number and what has opened it.
         """
+        opened = "the start"
         for number in count():
-            announce(number)
+            announce(number, opened)
             result = self._search(session)
-            yield Played(self.team, result)
+            yield Played(self.team, result, opened)
             if result.lost:
                 fresh = self._back_after(result.lost)
+                opened = _loss(result.lost, fresh)
             elif self._next is None or (result.verdict is Verdict.UNKNOWN and self._is_over):
                 return
             else:
+                opened = self._described(self._next)
                 fresh = self._added_by(self._next)
             before = self.arranged()
             self._take_stock(fresh)
@@ -115,6 +119,12 @@ class Journey:
         """The robots `lost` are out for good."""
         self.withdrawn += lost
         self._take_stock(())
+
+    def _described(self, event: Event) -> str:
+        """What of `event` can still happen, in a few words."""
+        out = set(self.withdrawn)
+        words = [described(change) for change in event.changes if out.isdisjoint(concerns(self._full, change))]
+        return ", ".join(words) or "nothing"
 
     def _added_by(self, event: Event) -> Collection[str]:
         """Let `event` happen; returns who comes. After losses, what cannot be any more is left out."""
@@ -161,6 +171,14 @@ class Journey:
             self._files = rejoined(self._files, robot)
         else:
             self._files = replace(self._files, scenario=tuple(_with_newcomer(e, robot) for e in self._files.scenario))
+
+
+def _loss(lost: Iterable[str], back: Collection[str]) -> str:
+    out = [name for name in lost if name not in back]
+    words = [f"the loss of {', '.join(out)}"] if out else []
+    if back:
+        words.append(f"{', '.join(back)} {'was' if len(back) == 1 else 'were'} lost, and came back")
+    return "; ".join(words)
 
 
 def _with_newcomer(event: Event, robot: Robot) -> Event:

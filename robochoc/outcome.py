@@ -51,11 +51,13 @@ class Metrics:
 class Epoch:
     """One epoch of a problem that changes over time, or whose robots were lost.
 
-    `robots` are those of the team then, in the files' order; `lost` names those whose loss ended the epoch.
+    `robots` are those of the team then, in the files' order; `opened_by` says in a few words what opened the epoch;
+    `lost` names those whose loss ended it.
     """
 
     verdict: Verdict
     robots: tuple[str, ...]
+    opened_by: str = "the start"
     assignment: dict[str, int] = field(default_factory=dict)
     cost: float | None = None
     metrics: Metrics = field(default_factory=Metrics)
@@ -87,6 +89,10 @@ class Outcome:
     """Why, where that is not plain: a robot whose local problem has no solution, or the limit that was reached."""
     count: int | None = None
     """The number of solutions, where it was asked for."""
+    lost: tuple[str, ...] = ()
+    """Those of the withdrawn whose processes died, and that did not come back; the others stepped aside."""
+    order: str | None = None
+    """The priority order that was asked for, by name; `listed` for one of the user's own."""
     epochs: tuple[Epoch, ...] = ()
     """What happened in each epoch; empty where there was but one, as nothing changed."""
 
@@ -94,12 +100,6 @@ class Outcome:
     def events(self) -> int:
         """How many events of the scenario have happened: they, and losses, open epochs."""
         return sum(not epoch.lost for epoch in self.epochs[:-1])
-
-    @property
-    def lost(self) -> tuple[str, ...]:
-        """Those of the withdrawn whose processes died; the others stepped aside."""
-        died = {name for epoch in self.epochs for name in epoch.lost}
-        return tuple(name for name in self.withdrawn if name in died)
 
     @property
     def aside(self) -> tuple[str, ...]:

@@ -46,7 +46,7 @@ def offer_named(name: str) -> Offer:
     found = list(entry_points(group=GROUP, name=name))
     if not found:
         names = protocol_names()
-        near = difflib.get_close_matches(name, names, 1)
+        near = difflib.get_close_matches(name.lower(), names, 1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise UnknownProtocol(f"no protocol {name!r} is installed, only: {', '.join(names)}{hint}")
     return _offer(found[0], found)

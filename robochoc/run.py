@@ -7,9 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TypedDict, assert_never
 
-from msgspec import UNSET
-
-from robochoc.change import changed_by
+from robochoc.change import changed_by, described
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress
 from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
@@ -25,7 +23,7 @@ from robochoc.problem import Kind, Model, Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
-from robochoc.registry import protocol_named
+from robochoc.registry import offers, protocol_named
 from robochoc.solver.ace import AceProcess, SolverTimeout
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.central import Judge
@@ -94,6 +92,7 @@ class _Run:
             runtime=options.runtime,
             seed=options.seed,
             verdict=Verdict.UNKNOWN,
+            order="listed" if isinstance(options.order, tuple) else options.order,
         )
 
     def distributed(self) -> Outcome:
@@ -109,7 +108,8 @@ class _Run:
             return self._travel(journey, protocol)
         except (TooManySolutions, CompileTimeout, _TimeOver) as limit:
             out = tuple(journey.withdrawn)
-            outcome = replace(self._summary(), verdict=Verdict.UNKNOWN, assignment={}, verified=False, withdrawn=out)
+            outcome = replace(self._summary(), verdict=Verdict.UNKNOWN, assignment={}, verified=False)
+            outcome = replace(outcome, withdrawn=out, lost=out)
             return replace(outcome, reason="; ".join([str(limit), *journey.regrets]))
 
     def _travel(self, journey: Journey, protocol: type[Protocol]) -> Outcome:
@@ -120,17 +120,28 @@ class _Run:
             lost = self._play(journey, protocol, domains)
             if lost:
                 raise RobotsLost(lost)
-            outcome = replace(self._summary(), withdrawn=tuple(journey.withdrawn))
+            out = tuple(journey.withdrawn)
+            outcome = replace(self._summary(), withdrawn=out, lost=out)
         else:
             reason = f"{alone} alone has none: its private constraints leave it no local solution"
             verified = self._options.verify and self._confirmed(journey.team, alone)
             epoch = Epoch(Verdict.NO_SOLUTION, journey.team.order, verified=verified, witness=alone)
             outcome = replace(self._told(epoch), reason=reason)
+        if outcome.verdict is Verdict.UNKNOWN and outcome.reason is None:
+            outcome = replace(outcome, reason=self._limit(outcome.witness))
         if journey.regrets:
-            outcome = replace(outcome, reason="; ".join(journey.regrets))
+            outcome = replace(outcome, reason="; ".join([*filter(None, [outcome.reason]), *journey.regrets]))
         if outcome.verdict is Verdict.NO_SOLUTION and self._options.withdraw is Withdrawal.MAXIMAL:
             outcome = self._placed(outcome, journey)
         return outcome
+
+    def _limit(self, witness: str | None) -> str:
+        """Why there is no verdict."""
+        if witness is not None:
+            return f"{witness} gave up, as its protocol has it"
+        if self._left_s() == 0:
+            return f"the time was over (--timeout {self._options.timeout:g})"
+        return f"so many messages have been sent (--messages {self._options.messages})"
 
     def _play(
         self, journey: Journey, protocol: type[Protocol], domains: Mapping[str, CompiledDomain]
@@ -138,7 +149,7 @@ class _Run:
         """Play all epochs; returns the robots that are lost, if nobody is left."""
         lost: Mapping[str, str] = {}
         with self._session(protocol, journey.arranged(), domains) as session:
-            for played in journey.go(session, lambda number: self._announce(protocol, number)):
+            for played in journey.go(session, lambda number, opened: self._announce(protocol, number, opened)):
                 self._epochs.append(self._epoch(played))
                 lost = played.result.lost
         return lost
@@ -147,7 +158,7 @@ class _Run:
         """Who finds a place among those that are left, in priority order; the others step aside."""
         while True:
             team = journey.arranged()
-            self._announce(FirstFit, 0)
+            self._announce(FirstFit)
             with self._session(FirstFit, team, self._domains(team)) as session:
                 result = session.search(self._left_s())
             if not result.lost:
@@ -155,6 +166,8 @@ class _Run:
             journey.leave(result.lost.keys())
             if not journey.team.robots:
                 raise RobotsLost(result.lost)
+        out = tuple(journey.withdrawn)
+        outcome = replace(outcome, withdrawn=out, lost=out)
         placed = replace(outcome, verdict=result.verdict, metrics=outcome.metrics + result.metrics, verified=False)
         if result.verdict is not Verdict.SOLUTION:
             return placed
@@ -169,10 +182,11 @@ class _Run:
 
     def _epoch(self, played: Played) -> Epoch:
         """What an epoch has come to, held against every constraint, or against the judge if that is asked for."""
-        team, result = played
+        team, result, opened = played
         epoch = Epoch(
             verdict=result.verdict,
             robots=team.order,
+            opened_by=opened,
             metrics=result.metrics,
             witness=result.witness,
             lost=tuple(result.lost),
@@ -216,15 +230,17 @@ class _Run:
         with AceProcess() as warm:
             self._solver = self._solver or warm
             for events in range(len(self._team.scenario) + 1):
-                count = self._judged(changed_by(self._team, events))
+                changes = self._team.scenario[events - 1].changes if events else ()
+                opened = ", ".join(map(described, changes)) or "nothing" if events else "the start"
+                count = self._judged(changed_by(self._team, events), opened)
         return replace(self._summary(), count=count)
 
-    def _judged(self, team: Team) -> int | None:
+    def _judged(self, team: Team, opened: str) -> int | None:
         """One epoch, decided by ACE; the number of solutions if that was asked for."""
         began = time.monotonic()
         judgement = self._judge().judge(team, count=self._options.count)
         spent = Metrics(wall_s=time.monotonic() - began)
-        epoch = Epoch(judgement.verdict, team.order, judgement.assignment, metrics=spent)
+        epoch = Epoch(judgement.verdict, team.order, opened, judgement.assignment, metrics=spent)
         if judgement.verdict is Verdict.SOLUTION and judgement.count is None:
             _check(team, judgement.assignment, ())
             epoch = replace(epoch, cost=cost(team, judgement.assignment), verified=True)
@@ -278,9 +294,10 @@ class _Run:
             return ProcessesRun(team, protocol, domains=domains, survive=survive, **watchers)
         return Simulation(team, protocol, _schedule(self._options), domains=domains, **watchers)
 
-    def _announce(self, protocol: type[Protocol], number: int) -> None:
+    def _announce(self, protocol: type[Protocol], number: int = 0, opened: str = "") -> None:
         if self._observer:
-            self._observer(Began(t=0, protocol=protocol.__name__, epoch=number or UNSET))
+            detail = {"epoch": number, "opened_by": opened} if number else {}
+            self._observer(Began(t=0, protocol=protocol.__name__, **detail))  # type: ignore[arg-type]
 
     def _left_s(self) -> float | None:
         return None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
@@ -335,13 +352,18 @@ def _refuse(team: Team, name: str, traits: Traits) -> None:
             if constraint.model is Model.PKC and not traits.partially_known:
                 raise Unsupported(
                     f"{robot.name} shares a partially known constraint (PKC, {constraint.name}), which {name}"
-                    " does not support; where privacy allows it, state it as TKC in the child's file"
+                    f" does not support; {_who_takes(lambda other: other.partially_known)}"
                 )
             if not traits.n_ary and len({team.owner[variable] for variable in constraint.variables}) > PAIR:
                 raise Unsupported(
                     f"{robot.name} holds a constraint over more than two robots ({constraint.name}), which {name}"
-                    " does not support; see 'robochoc protocols'"
+                    f" does not support; {_who_takes(lambda other: other.n_ary)}"
                 )
+
+
+def _who_takes(fits: Callable[[Traits], bool]) -> str:
+    names = [offer.name for offer in offers() if offer.protocol and fits(offer.protocol.traits)]
+    return f"these do: {', '.join(names)} (--protocol)"
 
 
 def _check(team: Team, assignment: dict[str, int], withdrawn: tuple[str, ...]) -> None:

@@ -76,7 +76,7 @@ def journey_of(team: Team, *, spares: int = 0, messages: int | None = None) -> J
 
 
 def travel(journey: Journey, session: Scripted) -> list[Played]:
-    return list(journey.go(session, lambda _: None))
+    return list(journey.go(session, lambda _number, _opened: None))
 
 
 def teams(played: Sequence[Played]) -> list[tuple[str, ...]]:

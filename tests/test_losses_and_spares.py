@@ -69,7 +69,7 @@ def team(tmp_path: Path) -> Team:
 def travel(team: Team, losses: Sequence[str], spares: int = 0) -> tuple[Journey, Losing, list[Team]]:
     journey = Journey(team, None, lambda _: {}, lambda: None, spares=spares)
     session = Losing(losses)
-    return journey, session, [played.team for played in journey.go(session, lambda _: None)]
+    return journey, session, [played.team for played in journey.go(session, lambda _number, _opened: None)]
 
 
 def test_who_is_lost_leaves(team: Team) -> None:

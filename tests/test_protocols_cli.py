@@ -148,7 +148,9 @@ def test_json_is_an_object_a_line() -> None:
 def test_a_protocol_is_explained_by_its_docstring() -> None:
     done = run("abt")
     head, _, doc = done.stdout.partition("\n\n")
-    assert head == f"abt: robochoc.protocols.abt:ABT, from the package robochoc {__version__}"
+    what, place = head.splitlines()
+    assert what.startswith("abt: satisfaction; complete; asynchronous; ")
+    assert place == f"robochoc.protocols.abt:ABT, from the package robochoc {__version__}"
     assert abt.__doc__ is not None
     assert doc.splitlines() == abt.__doc__.strip().splitlines()
     assert "judge" in run("central").stdout

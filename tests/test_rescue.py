@@ -16,6 +16,7 @@ RESCUE = ROOT / "docs" / "examples" / "rescue"
 VERDICTS = ["solution", "solution", "solution", "no-solution", "solution"]
 EPOCH_KEYS = {
     "verdict",
+    "opened_by",
     "robots",
     "assignment",
     "cost",

@@ -33,7 +33,7 @@ def protocols(name: str | None, *, as_json: bool) -> None:
     row: Row | None = next((row for row in found if row.name == name), None)
     if row is None:
         known = [row.name for row in found]
-        near = difflib.get_close_matches(name, known, 1)
+        near = difflib.get_close_matches(name.lower(), known, 1)
         hint = f"; did you mean '{near[0]}'?" if near else ""
         raise Failure(USAGE, on_one_line(f"no protocol '{name}' is installed, only: {', '.join(known)}{hint}"))
     if as_json:

@@ -62,9 +62,23 @@ def print_table(found: Sequence[Row]) -> None:
 
 
 def explained(row: Row) -> str:
-    """Where the protocol comes from, and what its author says of it."""
-    head = f"{row.name}: {row.place}, from the package {row.package}"
-    return f"{head}\n\n{_docstring(row) or 'Its module has no docstring.'}"
+    """What the protocol is in a line, where it comes from, and what its author says of it."""
+    head = f"{row.name}: {_in_a_line(row.traits)}" if row.traits else row.name
+    place = f"{row.place}, from the package {row.package}"
+    return f"{head}\n{place}\n\n{_docstring(row) or 'Its module has no docstring.'}"
+
+
+def _in_a_line(traits: Traits) -> str:
+    words = [
+        "minimises costs" if traits.costs else "satisfaction",
+        "complete" if traits.complete else "incomplete",
+        "synchronous" if traits.synchronous else "asynchronous",
+        "constraints between any number of robots" if traits.n_ary else "constraints between two robots",
+        *(["partially known ones too"] if traits.partially_known else []),
+        *(["goes on when the problem changes"] if traits.dynamic else []),
+        *([f"keeps private: {traits.privacy}"] if traits.privacy else []),
+    ]
+    return "; ".join(words)
 
 
 def _row(offer: Offer) -> Row:

@@ -4,24 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import assert_never
 
 from robochoc.change import changed_by
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
 from robochoc.outcome import Metrics, Outcome, Verdict
-from robochoc.problem import (
-    AddAgent,
-    AddConstraint,
-    AddValue,
-    Change,
-    Event,
-    RemoveAgent,
-    RemoveConstraint,
-    RemoveValue,
-    Team,
-    natural,
-)
+from robochoc.problem import Team, natural
 
 WIDTH = 100
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
@@ -29,7 +17,7 @@ _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 
 def report(team: Team, outcome: Outcome) -> str:
     """The verdict, why, where everybody flies, and what it cost, in a few lines."""
-    lines = [f"{on_one_line(outcome.team)}: {_verdict(outcome)}", *_epochs(team, outcome)]
+    lines = [f"{on_one_line(outcome.team)}: {_verdict(outcome)}", *_epochs(outcome)]
     team = changed_by(team, outcome.events)
     if outcome.assignment:
         lines += _board(team, outcome.assignment) or _list(team, outcome.assignment)
@@ -38,27 +26,26 @@ def report(team: Team, outcome: Outcome) -> str:
         lines.append(f"  {flying} {'flies' if flying == 1 else 'fly'}, {aside} step{'s' * (aside == 1)} aside:")
         lines += _wrapped(outcome.aside)
     if outcome.lost:
-        lines += [f"  {len(outcome.lost)} {'was' if len(outcome.lost) == 1 else 'were'} lost:", *_wrapped(outcome.lost)]
-    lines.append(f"  {outcome.protocol}, {_place(team, outcome)}: {_metrics(outcome)}")
+        lost = sorted(outcome.lost, key=natural)
+        lines += [f"  {len(lost)} {'was' if len(lost) == 1 else 'were'} lost:", *_wrapped(lost)]
+    order = f", order {outcome.order}" if outcome.order else ""
+    lines.append(f"  {outcome.protocol}{order}, {_place(team, outcome)}: {_metrics(outcome)}")
     return "\n".join(lines)
 
 
-def _epochs(team: Team, outcome: Outcome) -> list[str]:
+def _epochs(outcome: Outcome) -> list[str]:
     """A line for each epoch: what opened it, and how it ended."""
     if not outcome.epochs:
         return []
     central = outcome.runtime == "central"
     rows = [("epoch", "opened by", "robots", "verdict", *(("seconds",) if central else ("messages", "NCCCs")))]
-    events = iter(team.scenario)
-    opened = "the start"
     for number, epoch in enumerate(outcome.epochs):
         verdict = f"{epoch.verdict}{', confirmed' * (epoch.verified and epoch.verdict is Verdict.NO_SOLUTION)}"
         spent = epoch.metrics
         counts = (f"{sum(spent.messages.values()):,}", f"{spent.ncccs:,}")
         cost = (f"{spent.wall_s:.2f}",) if central else counts
+        opened = shortened(on_one_line(epoch.opened_by))
         rows.append((f"{number}", opened, f"{len(epoch.robots)}", verdict, *cost))
-        after_loss = f"the loss of {shortened(', '.join(epoch.lost))}"
-        opened = after_loss if epoch.lost else _said(next(events, None))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     numbers = {0, 2, 4, 5}
     return [
@@ -67,34 +54,11 @@ def _epochs(team: Team, outcome: Outcome) -> list[str]:
     ]
 
 
-def _said(event: Event | None) -> str:
-    """An event in a few words."""
-    words = [_change_said(change) for change in event.changes] if event else []
-    return shortened(on_one_line(", ".join(words))) or "nothing"
-
-
-def _change_said(change: Change) -> str:
-    match change:
-        case RemoveAgent(name):
-            return f"-{name}"
-        case AddAgent(robot):
-            return f"+{robot.name}"
-        case RemoveValue(variable, value):
-            return f"{variable} without {value}"
-        case AddValue(variable, value):
-            return f"{variable} with {value}"
-        case AddConstraint(agent, parent, constraint):
-            return f"+{constraint.name} ({parent}, {agent})"
-        case RemoveConstraint(agent, parent, name):
-            return f"-{name} ({parent}, {agent})"
-        case never:
-            assert_never(never)
-
-
 def _place(team: Team, outcome: Outcome) -> str:
     match outcome.runtime:
         case "processes":
-            return f"{len(team.robots)} process{'es' * (len(team.robots) != 1)}"
+            seed = f", seed {outcome.seed}" if outcome.order == "random" else ""
+            return f"{len(team.robots)} process{'es' * (len(team.robots) != 1)}{seed}"
         case "central":
             return "ACE on all files merged"
         case _:

@@ -216,7 +216,9 @@ def _check_settings(settings: dict[str, Any]) -> None:
     elif settings["count"]:
         raise click.UsageError("--count is for --protocol central")
     if (settings["on_loss"] or settings["spares"]) and settings["runtime"] != "processes":
-        raise click.UsageError("--on-loss and --spare are for processes, which can die")
+        raise click.UsageError(
+            "--on-loss and --spare are for processes, which can die; drop --runtime simulator, or write a scenario.xml"
+        )
     if settings["spares"] and settings["on_loss"] == "fail":
         raise click.UsageError("--spare brings robots back that died; --on-loss fail ends the run instead")
 

@@ -46,10 +46,15 @@ def _report(place: Path) -> dict[str, Any]:
     from robochoc.formats import InvalidInput, encodable, read_robot, read_team
 
     try:
-        robots = (read_robot(place),) if place.is_file() else read_team(place).robots
+        if place.is_file():
+            robots: tuple[Robot, ...] = (read_robot(place),)
+            events = 0
+        else:
+            team = read_team(place)
+            robots, events = team.robots, len(team.scenario)
     except InvalidInput as invalid:
         return _invalid(place, invalid)
-    return {"path": encodable(str(place)), "valid": True, **_sizes(robots), "errors": []}
+    return {"path": encodable(str(place)), "valid": True, **_sizes(robots), "events": events, "errors": []}
 
 
 def _sizes(robots: tuple[Robot, ...]) -> dict[str, int]:
@@ -91,7 +96,8 @@ def _print(report: dict[str, Any]) -> None:
     if report["valid"]:
         counts = ", ".join(
             f"{report[what]} {what if report[what] != 1 else what[:-1]}"
-            for what in ("robots", "variables", "constraints")
+            for what in ("robots", "variables", "constraints", "events")
+            if what != "events" or report[what]
         )
         alone = "" if Path(report["path"]).is_dir() else " by itself"
         click.echo(f"{path}: {counts}: ok{alone}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import itertools
 import multiprocessing.connection
 import re
 import signal
@@ -17,6 +18,7 @@ import msgspec
 from robochoc.communication.control import FromParent, FromRobot, Report
 from robochoc.communication.queues import QueueReader
 
+_TOLD = 5
 _DEAF_S = 10.0
 _EXIT_CODE_S = 1.0
 _EXIT_CODE_POLL_S = 0.001
@@ -28,7 +30,10 @@ class RobotsLost(Exception):  # noqa: N818 - named for what happened
     """Robots whose processes ended, or failed, before the run did: `robots` says why, by name."""
 
     def __init__(self, robots: Mapping[str, str]) -> None:
-        super().__init__("; ".join(f"{name} was lost: {why}" for name, why in robots.items()))
+        words = [f"{name} was lost: {why}" for name, why in itertools.islice(robots.items(), _TOLD)]
+        if len(robots) > _TOLD:
+            words.append(f"and {len(robots) - _TOLD} others were lost")
+        super().__init__("; ".join(words))
         self.robots = dict(robots)
 
 

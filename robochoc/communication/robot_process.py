@@ -60,6 +60,7 @@ EVENTS_AT_ONCE = 500
 _STAMP = struct.Struct("!IQ")
 _ROOM_FOR_FDS = socket.CMSG_SPACE(QUEUES_AT_ONCE * array.array("i").itemsize)
 _PR_SET_PDEATHSIG = 1
+_PR_SET_NAME = 15
 _libc = ctypes.CDLL(None)
 """Loaded before the fork: once for all robots."""
 
@@ -85,6 +86,7 @@ def robot_process(begin: Beginning, control: socket.socket, inherited: Sequence[
     _end_with_the_parent()
     for copy in inherited:
         copy.close()
+    _be_called(begin.part.robot.name)
     _take_place(begin.part.robot.name, begin.part.order)
     link = _ControlPipe(control)
     try:
@@ -106,6 +108,12 @@ def _end_with_the_parent() -> None:
     """
     if sys.platform == "linux":
         _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def _be_called(name: str) -> None:
+    """Bear the robot's name (its first 15 letters) in lists of processes (Linux)."""
+    if sys.platform == "linux":
+        _libc.prctl(_PR_SET_NAME, name.encode())
 
 
 def _take_place(name: str, order: Sequence[str]) -> None:

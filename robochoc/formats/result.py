@@ -24,6 +24,7 @@ class _MetricsForm(msgspec.Struct):
 
 class _EpochForm(msgspec.Struct, omit_defaults=True):
     verdict: Verdict
+    opened_by: str
     robots: list[str]
     assignment: dict[str, int]
     cost: float | int | None
@@ -50,6 +51,8 @@ class _Form(msgspec.Struct, omit_defaults=True):
     verified: bool
     count: int | None = None
     reason: str | None = None
+    lost: list[str] = []
+    order: str | None = None
 
 
 def result_json(outcome: Outcome) -> bytes:
@@ -79,6 +82,8 @@ def result_json(outcome: Outcome) -> bytes:
         verified=outcome.verified,
         count=outcome.count,
         reason=outcome.reason,
+        lost=list(outcome.lost),
+        order=outcome.order,
     )
     return msgspec.json.encode(form)
 
@@ -87,6 +92,7 @@ def _epoch(epoch: Epoch) -> _EpochForm:
     spent = epoch.metrics
     return _EpochForm(
         verdict=epoch.verdict,
+        opened_by=epoch.opened_by,
         robots=list(epoch.robots),
         assignment=epoch.assignment,
         cost=epoch.cost,
@@ -105,6 +111,7 @@ def _epoch_of(form: _EpochForm) -> Epoch:
     return Epoch(
         verdict=form.verdict,
         robots=tuple(form.robots),
+        opened_by=form.opened_by,
         assignment=form.assignment,
         cost=form.cost,
         metrics=metrics,
@@ -134,5 +141,7 @@ def read_result(content: bytes) -> Outcome:
         verified=form.verified,
         count=form.count,
         reason=form.reason,
+        lost=tuple(form.lost),
+        order=form.order,
         epochs=tuple(map(_epoch_of, form.epochs)),
     )

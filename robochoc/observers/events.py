@@ -16,13 +16,15 @@ class Event(msgspec.Struct, frozen=True, tag=True, tag_field="event", kw_only=Tr
 
 
 class Began(Event, frozen=True):
-    """A run of `protocol` begins, or its epoch `epoch`. Withdrawing is a run of its own after the search.
+    """A run of `protocol` begins, or its epoch `epoch`, which `opened_by` has opened.
 
+    Withdrawing is a run of its own after the search.
     Counts start again from 0; times are compared within a run, or an epoch, only.
     """
 
     protocol: str
     epoch: int | UnsetType = UNSET
+    opened_by: str | UnsetType = UNSET
 
 
 class Registered(Event, frozen=True):
