@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import sys
 from pathlib import Path
 from textwrap import dedent
 
@@ -12,6 +14,7 @@ from program import robochoc
 
 from robochoc import __version__
 from robochoc.cli.commands import cli
+from robochoc.cli.protocols_report import print_table, rows
 from robochoc.protocols import abt
 from robochoc.registry import UnknownProtocol, offer_named, offers, protocol_named, protocol_names
 
@@ -174,3 +177,15 @@ def test_an_unknown_protocol_is_wrong_usage(name: str, near: str | None) -> None
 
 def test_solve_points_to_the_list() -> None:
     assert "robochoc protocols" in " ".join(robochoc("solve", "--help").stdout.split())
+
+
+def test_a_narrow_terminal_is_spared_the_long_columns(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    for columns, wide in ((80, False), (200, True)):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        print_table(rows())
+        table = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out)
+        assert (abt.ABT.traits.paper in table) is wide
+        assert all(len(line) <= columns for line in table.splitlines())

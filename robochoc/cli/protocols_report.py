@@ -20,8 +20,8 @@ from robochoc.registry import Offer, offers
 from robochoc.run import CENTRAL
 from robochoc.solver import central
 
-NARROWEST = 100
-"""A table is not squeezed into less: the terminal may break its lines, but no word is cut."""
+WIDE = 150
+"""A terminal of fewer columns is not told of papers and privacy: their words would be broken into pieces."""
 UNBROKEN = 1000
 """Where no terminal reads it, a protocol has a line of its own."""
 
@@ -52,12 +52,14 @@ def json_report(found: Sequence[Row], *, explain: bool = False) -> bytes:
 
 def print_table(found: Sequence[Row]) -> None:
     """The table, on standard output, and below it what is wrong with what is broken."""
-    columns = max(shutil.get_terminal_size().columns, NARROWEST) if sys.stdout.isatty() else UNBROKEN
+    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else UNBROKEN
     console = Console(width=columns, highlight=False, soft_wrap=True)
-    console.print(_table(found))
+    console.print(_table(found, wide=columns >= WIDE))
     for row in found:
         if row.broken:
             console.print(on_one_line(f"{row.name}: {row.place} (package {row.package}) {row.broken}"), markup=False)
+    if columns < WIDE:
+        console.print("the paper and what stays private: robochoc protocols NAME, or a wider terminal", markup=False)
     console.print("next: robochoc protocols NAME explains one; robochoc solve TEAM --protocol NAME", markup=False)
 
 
@@ -77,6 +79,7 @@ def _in_a_line(traits: Traits) -> str:
         *(["partially known ones too"] if traits.partially_known else []),
         *(["goes on when the problem changes"] if traits.dynamic else []),
         *([f"keeps private: {traits.privacy}"] if traits.privacy else []),
+        *([traits.paper] if traits.paper else []),
     ]
     return "; ".join(words)
 
@@ -109,21 +112,24 @@ def _docstring(row: Row) -> str:
     return inspect.cleandoc(module.__doc__ or "") if module else ""
 
 
-def _table(found: Sequence[Row]) -> Table:
+def _table(found: Sequence[Row], *, wide: bool) -> Table:
     table = Table(box=None, header_style="bold")
-    for heading in ("name", "for", "complete", "synchronous", "constraints", "dynamic"):
+    headings = ("name", "for", "complete", "synchronous", "constraints", "dynamic")
+    for heading in headings:
         table.add_column(heading, no_wrap=True)
-    table.add_column("paper")
-    table.add_column("privacy")
+    if wide:
+        table.add_column("paper")
+        table.add_column("privacy")
     for row in found:
-        table.add_row(escape(on_one_line(row.name)), *map(escape, _cells(row)))
+        cells = [on_one_line(row.name), *_cells(row)]
+        table.add_row(*map(escape, cells if wide else cells[: len(headings)]))
     return table
 
 
 def _cells(row: Row) -> list[str]:
     traits = row.traits
     if traits is None:
-        return [*["-"] * 5, "broken: see below", ""]
+        return ["broken: see below", *["-"] * 4, "", ""]
     constraints = ("n-ary" if traits.n_ary else "binary") + (", PKC" if traits.partially_known else "")
     return [
         "optimisation" if traits.costs else "satisfaction",

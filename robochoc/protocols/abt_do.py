@@ -106,7 +106,7 @@ class ABTDORetro(Protocol):
     """
 
     messages = Ok | Nogood | Order | AddLink
-    traits = Traits(paper="Zivan & Meisels 2006; Zivan et al. 2009", everywhere=True)
+    traits = Traits(paper="Zivan & Meisels 2006; Zivan et al. 2009", everywhere=True, privacy="none")
     order: CurrentOrder
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -94,7 +94,7 @@ class AgileABT(Protocol):
     """
 
     messages = Ok | Nogood | Order | AddLink
-    traits = Traits(paper="Bessiere et al. 2011", everywhere=True)
+    traits = Traits(paper="Bessiere et al. 2011", everywhere=True, privacy="none")
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

@@ -106,7 +106,7 @@ class AWC(Protocol):
     """One agent of AWC. State: `view` (agent_view) and `priorities` of others, `nogoods`, own `priority`."""
 
     messages = Ok | Nogood | AddLink
-    traits = Traits(paper="Yokoo 1995; Yokoo et al. 1998", everywhere=True)
+    traits = Traits(paper="Yokoo 1995; Yokoo et al. 1998", everywhere=True, privacy="none")
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
