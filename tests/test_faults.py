@@ -258,7 +258,9 @@ def test_many_robots_killed_at_once(team: Path, tmp_path: Path) -> None:
         assert named
         assert set(named) <= set(NAMES[10:40:3])
     journal = read_journal((tmp_path / "run" / "run.jsonl").read_bytes())
-    assert [event.robot for event in journal.events if isinstance(event, Lost)] == named
+    lost = [event.robot for event in journal.events if isinstance(event, Lost)]
+    assert lost[: len(named)] == named
+    assert len(lost) == len(named) or f"and {len(lost) - len(named)} others were lost" in run.errors()
 
 
 def test_all_robots_killed_at_once(team: Path, tmp_path: Path) -> None:
