@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 import os
 import statistics
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,7 +28,7 @@ from robochoc.protocols.afc_ng import AFCng
 from robochoc.protocols.afc_tree import AFCTree
 from robochoc.protocols.agile_abt import AgileABT
 from robochoc.protocols.awc import AWC
-from robochoc.protocols.nogood import LeftSide
+from robochoc.protocols.backtracking import Backtracking
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled import LocalProblem
@@ -70,11 +70,17 @@ class AFCTreeToAll(AFCTree):
             yield from self._below(child)
 
 
+def _first_of_all(robot: Backtracking, view: Mapping[str, Value]) -> int | None:
+    """The first value that is left, once all have been looked at."""
+    values = range(len(robot.problem.values))
+    return min((index for index in values if robot._consistent(index, view)), default=None)  # noqa: SLF001
+
+
 class ABTAll(ABT):
     """Looks at all values before it takes the first that is left."""
 
-    def _choose_value(self) -> int | None:
-        return min((index for index in range(len(self.problem.values)) if self._consistent(index)), default=None)
+    def _choose_value(self, view: Mapping[str, Value]) -> int | None:
+        return _first_of_all(self, view)
 
 
 class ABTWholeView(ABT):
@@ -94,19 +100,15 @@ class ABTWholeView(ABT):
 class RetroAll(ABTDORetro):
     """Looks at all values before it takes the first that is left, so what it says is left is left."""
 
-    def _choose_value(self, higher: dict[str, Value]) -> int | None:
-        return min(
-            (index for index in range(len(self.problem.values)) if self._consistent(index, higher)), default=None
-        )
+    def _choose_value(self, view: Mapping[str, Value]) -> int | None:
+        return _first_of_all(self, view)
 
 
 class AgileAll(AgileABT):
     """Looks at all values before it takes the first that is left, so what it says is left is left."""
 
-    def _choose_value(self, higher: LeftSide) -> int | None:
-        return min(
-            (index for index in range(len(self.problem.values)) if self._consistent(index, higher)), default=None
-        )
+    def _choose_value(self, view: Mapping[str, Value]) -> int | None:
+        return _first_of_all(self, view)
 
 
 SLOW = (AWC, ABTWholeView)

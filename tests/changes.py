@@ -32,6 +32,8 @@ VALUES = range(-3, 6)
 class Author:
     """Writes scenarios; what robots have left may come again under their old names."""
 
+    values = VALUES
+
     def __init__(self, chance: Random) -> None:
         self._chance = chance
         self._left: list[str] = []
@@ -47,7 +49,15 @@ class Author:
             yield Event(tuple(changes), self._chance.choice((None, None, None, self._chance.randint(0, 30))))
 
     def _change(self, team: Team) -> Change:
-        kinds: list[Callable[[Team], Change | None]] = [
+        while True:
+            self._number += 1
+            change = self._chance.choice(self._kinds())(team)
+            if change is not None:
+                return change
+
+    def _kinds(self) -> list[Callable[[Team], Change | None]]:
+        """The kinds of changes, as often as they are wanted."""
+        return [
             self._remove_constraint,
             self._add_constraint,
             self._remove_value,
@@ -55,11 +65,6 @@ class Author:
             self._remove_agent,
             self._add_agent,
         ]
-        while True:
-            change = self._chance.choice(kinds)(team)
-            if change is not None:
-                self._number += 1
-                return change
 
     def _remove_constraint(self, team: Team) -> Change | None:
         held = [(robot.name, p.name, c.name) for robot in team.robots for p in robot.parents for c in p.constraints]
@@ -80,7 +85,7 @@ class Author:
 
     def _add_value(self, team: Team) -> Change | None:
         variable, values = self._chance.choice(list(domains(team).items()))
-        new = [value for value in VALUES if value not in values]
+        new = [value for value in self.values if value not in values]
         return AddValue(variable, self._chance.choice(new)) if len(values) < MOST_VALUES else None
 
     def _remove_agent(self, team: Team) -> Change | None:

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from random import Random
 
-from changes import domains
+from changes import Author, domains
 from complex_problems import complex_team, random_complex_team, random_constraint
 
-from robochoc.change import changed
 from robochoc.problem import (
     AddAgent,
     AddConstraint,
-    AddValue,
     Change,
     Constraint,
-    Event,
     RemoveAgent,
-    RemoveConstraint,
-    RemoveValue,
     Team,
 )
 
@@ -27,41 +22,13 @@ MOST_VARIABLES, MOST_VALUES = 8, 4
 VALUES = range(-4, 7)
 
 
-class ComplexAuthor:
+class ComplexAuthor(Author):
     """Writes scenarios for complex robots. Constraints come and go with what neighbours see of each other."""
 
-    def __init__(self, chance: Random) -> None:
-        self._chance = chance
-        self._number = 0
+    values = VALUES
 
-    def scenario(self, team: Team, events: int) -> Iterator[Event]:
-        """So many events for `team`, of one to three changes each; one in four in mid-run."""
-        for _ in range(events):
-            changes = []
-            for _ in range(self._chance.choice((1, 1, 2, 3))):
-                changes.append(self._change(team))
-                team = changed(team, changes[-1:])
-            yield Event(tuple(changes), self._chance.choice((None, None, None, self._chance.randint(0, 20))))
-
-    def _change(self, team: Team) -> Change:
-        kinds: list[Callable[[Team], Change | None]] = [
-            self._remove_constraint,
-            self._add_constraint,
-            self._add_constraint,
-            self._remove_value,
-            self._add_value,
-            self._remove_agent,
-            self._add_agent,
-        ]
-        while True:
-            self._number += 1
-            change = self._chance.choice(kinds)(team)
-            if change is not None:
-                return change
-
-    def _remove_constraint(self, team: Team) -> Change | None:
-        held = [(robot.name, p.name, c.name) for robot in team.robots for p in robot.parents for c in p.constraints]
-        return RemoveConstraint(*self._chance.choice(held)) if held else None
+    def _kinds(self) -> list[Callable[[Team], Change | None]]:
+        return [*super()._kinds(), self._add_constraint]
 
     def _add_constraint(self, team: Team) -> Change | None:
         """Over two or three variables of two or three robots."""
@@ -75,15 +42,6 @@ class ComplexAuthor:
 
     def _constraint(self, team: Team, names: list[str]) -> Constraint:
         return replace(random_constraint(self._chance, domains(team), names), name=f"N{self._number}")
-
-    def _remove_value(self, team: Team) -> Change | None:
-        variable, values = self._chance.choice(list(domains(team).items()))
-        return RemoveValue(variable, self._chance.choice(values)) if values else None
-
-    def _add_value(self, team: Team) -> Change | None:
-        variable, values = self._chance.choice(list(domains(team).items()))
-        new = [value for value in VALUES if value not in values]
-        return AddValue(variable, self._chance.choice(new)) if len(values) < MOST_VALUES else None
 
     def _remove_agent(self, team: Team) -> Change | None:
         return RemoveAgent(self._chance.choice(team.order)) if len(team.robots) > 2 else None

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import doctest
 
+from agents import told, value
 from problems import team_of
 
 import robochoc.protocols.abt
-from robochoc.message import Message, Value
 from robochoc.outcome import Verdict
 from robochoc.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.abt import ABT, AddLink, Nogood, Ok
@@ -36,20 +36,6 @@ def agent(team: Team, name: str) -> ABT:
     abt.start()
     abt.outbox.clear()
     return abt
-
-
-def told(abt: ABT, *packet: tuple[str, Message]) -> list[tuple[str, Message]]:
-    """What `abt` says after a packet."""
-    for sender, message in packet:
-        abt.receive(sender, message)
-    abt.settle()
-    said = list(abt.outbox)
-    abt.outbox.clear()
-    return said
-
-
-def value(abt: ABT) -> Value | None:
-    return None if abt.value is None else abt.problem.values[abt.value]
 
 
 def test_start_takes_the_first_value_and_tells_it_to_lower_neighbours_only() -> None:

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from random import Random
 
 import pytest
+from agents import told, value
 from problems import random_team, team_of
 
 from robochoc.communication.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator import Simulation
-from robochoc.message import Message, Value
+from robochoc.message import Message
 from robochoc.observers.events import Event, Sent
 from robochoc.outcome import Verdict
 from robochoc.problem import Constraint, Relation, Semantics, Team
@@ -38,20 +39,6 @@ def agent(team: Team, name: str) -> ABTDORetro:
     abt.start()
     abt.outbox.clear()
     return abt
-
-
-def told(abt: ABTDORetro, *packet: tuple[str, Message]) -> list[tuple[str, Message]]:
-    """What `abt` says after a packet."""
-    for sender, message in packet:
-        abt.receive(sender, message)
-    abt.settle()
-    said = list(abt.outbox)
-    abt.outbox.clear()
-    return said
-
-
-def value(abt: ABTDORetro) -> Value | None:
-    return None if abt.value is None else abt.problem.values[abt.value]
 
 
 def names(text: str) -> tuple[str, ...]:

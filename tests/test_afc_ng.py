@@ -6,6 +6,7 @@ import doctest
 from random import Random
 
 import pytest
+from agents import told, value
 from complex_problems import complex_team
 from problems import random_team, team_of
 
@@ -45,20 +46,6 @@ def agent(team: Team, name: str) -> AFCng:
 def cpa(*assignments: tuple[int, int]) -> CPA:
     """A CPA of robots with one variable each: their values and counters."""
     return CPA([((value,), counter) for value, counter in assignments])
-
-
-def told(afc: AFCng, *packet: tuple[str, Message]) -> list[tuple[str, Message]]:
-    """What `afc` says after a packet."""
-    for sender, message in packet:
-        afc.receive(sender, message)
-    afc.settle()
-    said = list(afc.outbox)
-    afc.outbox.clear()
-    return said
-
-
-def value(afc: AFCng) -> Value | None:
-    return None if afc.value is None else afc.problem.values[afc.value]
 
 
 def test_the_first_robot_begins() -> None:

@@ -6,12 +6,13 @@ import doctest
 from random import Random
 
 import pytest
+from agents import told, value
 from problems import random_team, team_of
 
 import robochoc.protocols.afc_tree
 from robochoc.communication.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator import Simulation
-from robochoc.message import Message, Value
+from robochoc.message import Value
 from robochoc.observers.checker import objections
 from robochoc.outcome import Verdict
 from robochoc.problem import Constraint, Relation, Semantics, Team
@@ -51,20 +52,6 @@ def agent(team: Team, name: str) -> AFCTree:
 def cpa(*assignments: tuple[int, int]) -> CPA:
     """A CPA of robots with one variable each: their values and counters."""
     return CPA([((value,), counter) for value, counter in assignments])
-
-
-def told(afc: AFCTree, *packet: tuple[str, Message]) -> list[tuple[str, Message]]:
-    """What `afc` says after a packet."""
-    for sender, message in packet:
-        afc.receive(sender, message)
-    afc.settle()
-    said = list(afc.outbox)
-    afc.outbox.clear()
-    return said
-
-
-def value(afc: AFCTree) -> Value | None:
-    return None if afc.value is None else afc.problem.values[afc.value]
 
 
 def test_every_root_begins() -> None:

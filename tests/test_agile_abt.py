@@ -6,6 +6,7 @@ import doctest
 from random import Random
 
 import pytest
+from agents import told, value
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from problems import random_team, team_of
@@ -53,16 +54,6 @@ def agent(team: Team, name: str, *packet: tuple[str, Message]) -> AgileABT:
     return agile
 
 
-def told(agile: AgileABT, *packet: tuple[str, Message]) -> list[tuple[str, Message]]:
-    """What `agile` says after a packet."""
-    for sender, message in packet:
-        agile.receive(sender, message)
-    agile.settle()
-    said = list(agile.outbox)
-    agile.outbox.clear()
-    return said
-
-
 def ok(value: int, left: int = 2, size: int = 2, **lhs: int) -> Ok:
     return Ok((value,), {name: (other,) for name, other in lhs.items()}, left, size)
 
@@ -70,10 +61,6 @@ def ok(value: int, left: int = 2, size: int = 2, **lhs: int) -> Ok:
 def order(places: str, *termination: int) -> Order:
     """The robots `RA`, `RB`, `RC`, `RD` in the order of `places`."""
     return Order(tuple(["ABCD".index(letter) for letter in places]), termination)
-
-
-def value(agile: AgileABT) -> Value | None:
-    return None if agile.value is None else agile.problem.values[agile.value]
 
 
 # Orders

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import pytest
+from agents import told, value
 from complex_problems import complex_team
 from problems import team_of
 
-from robochoc.message import Message, Value
+from robochoc.message import Value
 from robochoc.outcome import Verdict
 from robochoc.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.awc import AWC, AddLink, Kept, Nogood, NogoodList, Ok
@@ -36,20 +37,6 @@ def agent(team: Team, name: str) -> AWC:
     awc.start()
     awc.outbox.clear()
     return awc
-
-
-def told(awc: AWC, *packet: tuple[str, Message]) -> list[tuple[str, Message]]:
-    """What `awc` says after a packet."""
-    for sender, message in packet:
-        awc.receive(sender, message)
-    awc.settle()
-    said = list(awc.outbox)
-    awc.outbox.clear()
-    return said
-
-
-def value(awc: AWC) -> Value | None:
-    return None if awc.value is None else awc.problem.values[awc.value]
 
 
 def nogood(assignments: Mapping[str, Value]) -> Nogood:

@@ -9,6 +9,7 @@ from random import Random
 
 import msgspec
 import pytest
+from agents import told
 from complex_problems import complex_team, random_complex_team
 from pkc_bytes import changed_where_nobody_was, nothing_hidden, renamed, restated, run
 from pkc_problems import random_pkc_team, with_private_parts
@@ -61,16 +62,6 @@ def agent(team: Team, name: str) -> DisFC:
     robot.start()
     robot.outbox.clear()
     return robot
-
-
-def told(robot: DisFC, *packet: tuple[str, Message]) -> list[tuple[str, Message]]:
-    """What `robot` says after a packet."""
-    for sender, message in packet:
-        robot.receive(sender, message)
-    robot.settle()
-    said = list(robot.outbox)
-    robot.outbox.clear()
-    return said
 
 
 # The rules

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from agents import told, value
 from problems import team_of
-from test_abt import DIFFERENT, differ, told, triangle, value
+from test_abt import DIFFERENT, differ, triangle
 
 from robochoc.change import changed
 from robochoc.formats import PREDEFINED

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from test_abt import told, value
+from agents import told, value
 from test_dynabt import after, agent, named
 
 from robochoc.change import changed

@@ -6,7 +6,6 @@ each kind of strike 5 times, `make test-slow` 50 times.
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import random
 import re
@@ -18,31 +17,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from faults import GONE_WITHIN_S, PROGRAM, Run, open_descriptors, running, wait_until
+from faults import GONE_WITHIN_S, PROGRAM, Run, running, wait_until
 from faulty_protocols import (
-    FLOOD,
     TEAM,
-    AsksForStranger,
-    Floods,
-    HangsUp,
-    Leaves,
-    Raises,
-    RaisesAtOnce,
-    SaysMuch,
-    Speaks,
-    Spins,
-    TalksNonsense,
 )
 
 from robochoc.communication import crew, processes
-from robochoc.communication.processes import ProcessesRun
-from robochoc.communication.robot_link import RobotsLost
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import AnyEvent, Lost
+from robochoc.observers.events import Lost
 from robochoc.observers.journal import read_journal
-from robochoc.outcome import Verdict
-from robochoc.protocols.protocol import Protocol
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 
@@ -373,65 +357,3 @@ def test_a_run_opens_no_port(team: Path, tmp_path: Path) -> None:
     with running(solving(team), tmp_path / "run") as run:
         in_the_middle(run, random.Random(0))
         assert run.ports() == set()
-
-
-# Within one program
-
-
-def speaking(protocol: type[Protocol], *, timeout: float | None = None) -> tuple[Verdict, dict[str, int]]:
-    """Let a team of four speak `protocol`; whatever comes of it, nothing may be left in this process."""
-    before = open_descriptors()
-    try:
-        result = ProcessesRun(TEAM, protocol).run(timeout)
-    finally:
-        assert multiprocessing.active_children() == []
-        assert open_descriptors() == before
-    return result.verdict, dict(result.metrics.messages)
-
-
-FIRST, SECOND, *_ = (robot.name for robot in TEAM.robots)
-
-
-@pytest.mark.parametrize(
-    ("protocol", "lost", "why"),
-    [
-        (Raises, FIRST, r"ValueError: out of ideas \(.*faulty_protocols.py:\d+\)"),
-        (RaisesAtOnce, FIRST, r"ValueError: no ideas at all"),
-        (Leaves, FIRST, r"its process ended with status 7"),
-        (HangsUp, FIRST, r"its process cannot be reached any more"),
-        (AsksForStranger, FIRST, r"it wanted to talk to 'Robot9.9', which is no robot of the team"),
-        (TalksNonsense, SECOND, rf"BadMessage: {FIRST} sent {SECOND} what is no message"),
-    ],
-)
-def test_a_robot_that_fails_is_named(protocol: type[Protocol], lost: str, why: str) -> None:
-    with pytest.raises(RobotsLost) as caught:
-        speaking(protocol)
-    assert lost in caught.value.robots
-    assert re.search(why, caught.value.robots[lost])
-
-
-def test_observers_hear_who_was_lost() -> None:
-    events: list[AnyEvent] = []
-    with pytest.raises(RobotsLost) as caught:
-        ProcessesRun(TEAM, Leaves, observer=events.append).run()
-    assert {event.robot: event.why for event in events if isinstance(event, Lost)} == caught.value.robots
-
-
-def test_more_than_pipes_hold() -> None:
-    assert speaking(Floods) == (Verdict.SOLUTION, {"Word": 2 * FLOOD})
-
-
-def test_a_message_of_a_megabyte() -> None:
-    assert speaking(SaysMuch) == (Verdict.SOLUTION, {"Word": len(TEAM.robots)})
-
-
-def test_deaf_robots_do_not_outlive_the_time_limit() -> None:
-    verdict, _ = speaking(Spins, timeout=0.5)
-    assert verdict is Verdict.UNKNOWN
-
-
-def test_a_hundred_runs_leave_nothing_open() -> None:
-    before = open_descriptors()
-    for _ in range(100):
-        speaking(Speaks)
-    assert open_descriptors() == before

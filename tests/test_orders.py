@@ -12,15 +12,10 @@ from random import Random
 import pytest
 from complex_problems import complex_team, random_complex_team
 from problems import random_team, solutions, team_of
-from test_complex_teams import by_hand
 
-from robochoc.communication.schedule import RandomChannels
-from robochoc.communication.simulator import Simulation
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.checker import objections
 from robochoc.orders import CannotTurn, Order, in_order, neighbours, order_of, reordered
-from robochoc.outcome import Verdict
 from robochoc.problem import (
     Child,
     Constraint,
@@ -35,10 +30,7 @@ from robochoc.problem import (
     natural,
 )
 from robochoc.protocols.order import PseudoTree
-from robochoc.registry import protocol_named
 from robochoc.run import Options, Runtime, solve
-from robochoc.solver.central import Judge, Judgement
-from robochoc.solver.domain import compiled_domain
 from robochoc.solver.encoding import Unsupported
 
 DIFFER = Relation("differ", 2, Semantics.CONFLICTS, ((1, 1), (2, 2)))
@@ -361,55 +353,3 @@ def test_dfs_induces_its_own_pseudo_tree() -> None:
         for name in team.order:
             assert graph[name] <= {*tree.ancestors(name), *tree.descendants(name)}
             assert tree.parents[name] is None or tree.parents[name] in neighbours(team)[name]
-
-
-# Solving in an order
-
-
-def test_robots_solve_in_the_order_they_are_given() -> None:
-    chance = Random("solve")
-    seen = set()
-    for seed in range(80):
-        team = random_team(chance)
-        order = chance.choice([*Order, tuple(shuffled(chance, team))])
-        outcome = solve(team, replace(SIMULATED, order=order, seed=seed, timeout=30))
-        truth = next(solutions(team), None)
-        assert outcome.verdict is (Verdict.NO_SOLUTION if truth is None else Verdict.SOLUTION), (team, order)
-        seen.add(outcome.verdict)
-    assert len(seen) == 2
-
-
-def test_complex_robots_solve_in_any_order() -> None:
-    chance = Random("solve complex")
-    for seed in range(25):
-        team = random_complex_team(chance)
-        turned = reordered(team, shuffled(chance, team))
-        domains = {robot.name: compiled_domain(robot, by_hand) for robot in turned.robots}
-        result = Simulation(turned, protocol_named("abt"), RandomChannels(seed), domains=domains).run(30)
-        assert (result.verdict is Verdict.SOLUTION) is any(solutions(team))
-        if result.verdict is Verdict.SOLUTION:
-            found = {name: value for own in result.assignments.values() for name, value in own.items()}
-            assert not list(objections(team, found))
-
-
-def test_the_priority_is_the_orders() -> None:
-    """ABT's highest robot is the one that can derive the empty nogood."""
-    team = graph_team(["AB", "BC", "AC"])
-    for names in (("RC", "RA", "RB"), ("RB", "RC", "RA")):
-        outcome = solve(team, replace(SIMULATED, order=names))
-        assert (outcome.verdict, outcome.witness) == (Verdict.NO_SOLUTION, names[0])
-
-
-def test_judge_and_checker_see_the_files(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Were they shown the turned team, a fault in turning it would go unnoticed."""
-    team = graph_team(["AB", "BC", "AC"])
-    seen = []
-
-    def judged(_judge: Judge, merged: Team, **_: object) -> Judgement:
-        seen.append(merged)
-        return Judgement(Verdict.NO_SOLUTION)
-
-    monkeypatch.setattr(Judge, "judge", judged)
-    assert solve(team, replace(SIMULATED, order=Order.DFS, verify=True)).verified
-    solve(team, replace(SIMULATED, order=Order.RANDOM, seed=1, protocol="central"))
-    assert [one is team for one in seen] == [True, True]

@@ -8,6 +8,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from agents import told
 from complex_problems import complex_team, random_complex_team
 from pkc_bytes import changed_elsewhere, nothing_hidden, restated, run, watched
 from pkc_problems import pkc_parts, random_pkc_team, with_part, with_private_parts
@@ -20,7 +21,6 @@ from robochoc.communication.simulator import Simulation
 from robochoc.formats.folder import write_team
 from robochoc.formats.team import read_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.message import Message
 from robochoc.observers.checker import objections
 from robochoc.outcome import Verdict
 from robochoc.problem import Constraint, Model, Relation, Semantics, Team
@@ -55,16 +55,6 @@ def agent(team: Team, name: str) -> ABT:
     abt.start()
     abt.outbox.clear()
     return abt
-
-
-def told(abt: ABT, *packet: tuple[str, Message]) -> list[tuple[str, Message]]:
-    """What `abt` says after a packet."""
-    for sender, message in packet:
-        abt.receive(sender, message)
-    abt.settle()
-    said = list(abt.outbox)
-    abt.outbox.clear()
-    return said
 
 
 # The rules

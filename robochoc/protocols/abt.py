@@ -36,9 +36,9 @@ from typing import assert_never, cast
 
 from robochoc.message import Message, Value
 from robochoc.outcome import Verdict
-from robochoc.protocols.nogood import NogoodStore, contradicts, joined
+from robochoc.protocols.backtracking import Backtracking
+from robochoc.protocols.nogood import contradicts
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
 
@@ -60,7 +60,7 @@ class AddLink(Message, frozen=True):
     """The sender, lower in the order, asks to be told the receiver's value from now on (`adl`)."""
 
 
-class ABT(Protocol):
+class ABT(Backtracking):
     """One agent of ABT. State: `view` (myAgentView), `store` (myNogoodStore), Gamma- and Gamma+.
 
     Of lower robots that share a PKC, `below` holds the values they told, and `allowed` the own value under which each
@@ -76,9 +76,6 @@ class ABT(Protocol):
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
-        self.view: dict[str, Value] = {}
-        self.store = NogoodStore(order, len(problem.values))
-        self.higher = set(problem.parents)
         self.lower = list(problem.children)
         self.below: dict[str, Value] = {}
         self.allowed: dict[str, int] = {}
@@ -141,19 +138,15 @@ class ABT(Protocol):
     def _check_agent_view(self) -> None:
         """Keep the value if the view allows it, else choose another, else backtrack until one is found."""
         while self.verdict is None:
-            if self.value is not None and self._consistent(self.value):
+            if self.value is not None and self._consistent(self.value, self.view):
                 return
-            self.value = self._choose_value()
+            self.value = self._choose_value(self.view)
             if self.value is None:
                 self._backtrack()
                 continue
             for neighbour in (*self.lower, *self.problem.partners):
                 self.send(neighbour, Ok(self.problem.values[self.value]))
             return
-
-    def _choose_value(self) -> int | None:
-        """The first value of the domain that no nogood rules out."""
-        return next((index for index in range(len(self.problem.values)) if self._consistent(index)), None)
 
     def _backtrack(self) -> None:
         """Resolve the stored nogoods, one for each value, and tell the lowest robot among their causes."""
@@ -190,25 +183,7 @@ class ABT(Protocol):
                 self.send(child, Nogood(lhs, value))
                 del self.below[child]
 
-    def _consistent(self, index: int) -> bool:
-        """Whether the view allows the value at `index`; if a constraint does not, its nogood is stored."""
-        if self.store[index] is not None:
-            return False
-        conflict = self.problem.conflict(index, self.view)
-        if conflict is None:
-            return True
-        self.store.add(index, conflict)
-        return False
-
     # The view
-
-    def _update(self, agent: str, value: Value | None) -> None:
-        """Take in a new value of `agent` (None: unknown); nogoods that rest on another value go."""
-        if value is None:
-            self.view.pop(agent, None)
-        else:
-            self.view[agent] = value
-        self.store.forget(agent, value)
 
     def _coherent(self, nogood: Nogood) -> bool:
         return all(
@@ -219,14 +194,5 @@ class ABT(Protocol):
 
     def _check_add_link(self, nogood: Nogood) -> None:
         """Ask robots of the left side that do not tell me their values yet to do so; meanwhile believe it."""
-        for agent, value in nogood.lhs.items():
-            if agent not in self.higher:
-                self.higher.add(agent)
-                self.send(agent, AddLink())
-            known = self.view.get(agent)
-            told = joined(known, value)
-            if told != known:
-                self._update(agent, told)
-
-    def _current(self) -> Value | None:
-        return None if self.value is None else self.problem.values[self.value]
+        for agent in self._believe(nogood.lhs):
+            self.send(agent, AddLink())

@@ -40,9 +40,9 @@ from typing import assert_never, cast
 
 from robochoc.message import Message, Value
 from robochoc.outcome import Verdict
-from robochoc.protocols.nogood import NogoodStore, contradicts, joined
+from robochoc.protocols.backtracking import Backtracking
+from robochoc.protocols.nogood import contradicts
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
 
@@ -98,10 +98,10 @@ class CurrentOrder(PriorityOrder):
         return Order(tuple(names), (*kept, (count + 1, by)))
 
 
-class ABTDORetro(Protocol):
+class ABTDORetro(Backtracking):
     """One agent of ABT_DO-Retro. State: `view` (Agent_view), `store`, `order`; `left`: values others have left.
 
-    `hears` are those that tell this robot their values when they are higher, `tells` those it tells when lower;
+    `higher` are those that tell this robot their values when they are higher, `tells` those it tells when lower;
     `owed` are those that have to be told the value once the packet has been read, new or not.
     """
 
@@ -111,10 +111,8 @@ class ABTDORetro(Protocol):
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, CurrentOrder(order.names))
-        self.view: dict[str, Value] = {}
         self.left: dict[str, int] = {}
-        self.store = NogoodStore(self.order, len(problem.values))
-        self.hears = set(problem.neighbours)
+        self.higher = set(problem.neighbours)
         self.tells = list(problem.neighbours)
         self.owed: set[str] = set()
         self._checked: dict[str, Value] | None = None
@@ -208,10 +206,6 @@ class ABTDORetro(Protocol):
             self.owed.update(self._lower())
             return
 
-    def _choose_value(self, higher: dict[str, Value]) -> int | None:
-        """The first value of the domain that no nogood rules out."""
-        return next((index for index in range(len(self.problem.values)) if self._consistent(index, higher)), None)
-
     def _backtrack(self) -> None:
         """Resolve the stored nogoods, one for each value, and tell the lowest robot among their causes."""
         lhs = self.store.resolve()
@@ -222,16 +216,6 @@ class ABTDORetro(Protocol):
         value = lhs.pop(culprit)
         self._update(culprit, None)
         self.send(culprit, Nogood(lhs, value, self._left()))
-
-    def _consistent(self, index: int, higher: dict[str, Value]) -> bool:
-        """Whether higher robots allow the value at `index`; if a constraint does not, its nogood is stored."""
-        if self.store[index] is not None:
-            return False
-        conflict = self.problem.conflict(index, higher)
-        if conflict is None:
-            return True
-        self.store.add(index, conflict)
-        return False
 
     def _tell(self) -> None:
         """Tell the value to all that have to know it."""
@@ -246,32 +230,18 @@ class ABTDORetro(Protocol):
 
     # The view
 
-    def _update(self, agent: str, value: Value | None) -> None:
-        """Take in a new value of `agent` (None: unknown); nogoods that rest on another value go."""
-        if value is None:
-            self.view.pop(agent, None)
-        else:
-            self.view[agent] = value
-        self.store.forget(agent, value)
-
     def _coherent(self, nogood: Nogood) -> bool:
         """Whether all of the left side is higher at present, and nothing else is known of it."""
         return all(
             self._is_higher(agent)
-            and (agent not in self.hears or (agent in self.view and not contradicts(value, self.view[agent])))
+            and (agent not in self.higher or (agent in self.view and not contradicts(value, self.view[agent])))
             for agent, value in nogood.lhs.items()
         )
 
     def _check_add_link(self, nogood: Nogood) -> None:
         """Ask robots of the left side that do not tell me their values yet to do so; meanwhile believe it."""
-        for agent, value in nogood.lhs.items():
-            if agent not in self.hears:
-                self.hears.add(agent)
-                self.send(agent, AddLink())
-            known = self.view.get(agent)
-            told = joined(known, value)
-            if told != known:
-                self._update(agent, told)
+        for agent in self._believe(nogood.lhs):
+            self.send(agent, AddLink())
 
     def _is_higher(self, agent: str) -> bool:
         return self.order.rank[agent] < self.order.rank[self.problem.agent]
@@ -283,6 +253,3 @@ class ABTDORetro(Protocol):
     def _left(self) -> int:
         """How many values no stored nogood rules out."""
         return sum(self.store[index] is None for index in range(len(self.problem.values)))
-
-    def _current(self) -> Value | None:
-        return None if self.value is None else self.problem.values[self.value]

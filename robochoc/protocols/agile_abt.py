@@ -51,9 +51,9 @@ from robochoc.protocols.agile_order import (
     proposed,
     updated,
 )
+from robochoc.protocols.backtracking import Backtracking
 from robochoc.protocols.nogood import LeftSide, NogoodStore, contradicts, joined
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
 
@@ -85,11 +85,11 @@ class AddLink(Message, frozen=True):
     """The sender asks to be told the receiver's value from now on, whenever it is below the receiver (`adl`)."""
 
 
-class AgileABT(Protocol):
+class AgileABT(Backtracking):
     """One agent of Agile-ABT.
 
     State: `present` (o_i) and `termination` (TV_i), `view` (AgentView), `store` (NogoodStore), `explanations` (E_i),
-    and the `sizes` of the domains it has been told. `tellers` tell this robot their values while they are above it,
+    and the `sizes` of the domains it has been told. `higher` tell this robot their values while they are above it,
     and it tells its own to `listeners` while they are below; `told` is what it told them last.
     """
 
@@ -101,11 +101,9 @@ class AgileABT(Protocol):
         self.name = problem.agent
         self.present = order
         self.termination: TerminationVector = (UNKNOWN,) * len(order.names)
-        self.view: dict[str, Value] = {}
-        self.store = NogoodStore(order, len(problem.values))
         self.explanations: dict[str, Explanation] = {}
         self.sizes = {self.name: len(problem.values)}
-        self.tellers = set(problem.neighbours)
+        self.higher = set(problem.neighbours)
         self.listeners = list(problem.neighbours)
         self.told: dict[str, Value] = {}
 
@@ -169,17 +167,13 @@ class AgileABT(Protocol):
     def _check_agent_view(self) -> None:
         """Keep the value if the view allows it, else choose another, else backtrack until one is found; tell it."""
         while self.verdict is None:
-            higher = self._higher()
-            if self.value is None or not self._consistent(self.value, higher):
-                self.value = self._choose_value(higher)
+            above = self._above()
+            if self.value is None or not self._consistent(self.value, above):
+                self.value = self._choose_value(above)
             if self.value is not None:
                 self._tell(self.problem.values[self.value])
                 return
             self._backtrack()
-
-    def _choose_value(self, higher: LeftSide) -> int | None:
-        """The first value of the domain that no nogood rules out."""
-        return next((index for index in range(len(self.problem.values)) if self._consistent(index, higher)), None)
 
     def _tell(self, value: Value) -> None:
         """Tell the value to all below that have last heard another one, or none, of this robot."""
@@ -201,16 +195,6 @@ class AgileABT(Protocol):
         culprit = self._choose_order(conflict)
         self.send(culprit, Nogood(_without(culprit, conflict), conflict[culprit]))
         self._update(culprit, None)
-
-    def _consistent(self, index: int, higher: LeftSide) -> bool:
-        """Whether those above allow the value at `index`; if a constraint does not, its nogood is stored."""
-        if self.store[index] is not None:
-            return False
-        conflict = self.problem.conflict(index, higher)
-        if conflict is None:
-            return True
-        self.store.add(index, conflict)
-        return False
 
     # The order
 
@@ -270,40 +254,23 @@ class AgileABT(Protocol):
 
     # The view
 
-    def _higher(self) -> dict[str, Value]:
+    def _above(self) -> dict[str, Value]:
         """What is known of those above: what constraints and nogoods of this robot may rest on."""
         rank = self.present.rank
         return {name: value for name, value in self.view.items() if rank[name] < rank[self.name]}
-
-    def _update(self, agent: str, value: Value | None) -> None:
-        """Take in a new value of `agent` (None: unknown); nogoods that rest on another value go."""
-        if value is None:
-            self.view.pop(agent, None)
-        else:
-            self.view[agent] = value
-        self.store.forget(agent, value)
 
     def _coherent(self, nogood: Nogood) -> bool:
         """Whether all of the left side is above this robot, and known to be so by those that tell it their values."""
         return compatible(self.present, self.name, nogood.lhs) and all(
             agent in self.view and not contradicts(value, self.view[agent])
             for agent, value in nogood.lhs.items()
-            if agent in self.tellers
+            if agent in self.higher
         )
 
     def _check_add_link(self, nogood: Nogood) -> None:
         """Ask robots of the left side that do not tell me their values yet to do so; meanwhile believe it."""
-        for agent, value in nogood.lhs.items():
-            if agent not in self.tellers:
-                self.tellers.add(agent)
-                self.send(agent, AddLink())
-            known = self.view.get(agent)
-            told = joined(known, value)
-            if told != known:
-                self._update(agent, told)
-
-    def _current(self) -> Value | None:
-        return None if self.value is None else self.problem.values[self.value]
+        for agent in self._believe(nogood.lhs):
+            self.send(agent, AddLink())
 
 
 def _without(culprit: str, conflict: LeftSide) -> dict[str, Value]:

@@ -20,6 +20,8 @@ new is told.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from robochoc.message import Value
 from robochoc.outcome import Verdict
 from robochoc.protocols import abt
@@ -110,10 +112,10 @@ class DynABT(ABT, DynamicProtocol):
         for index in self.problem.alike(nogood.value):
             self.store.add(index, nogood.lhs, because)
 
-    def _consistent(self, index: int) -> bool:
+    def _consistent(self, index: int, view: Mapping[str, Value]) -> bool:
         if self.store[index] is not None:
             return False
-        conflict = self.problem.explained(index, self.view)
+        conflict = self.problem.explained(index, view)
         if conflict is None:
             return True
         lhs, key = conflict

@@ -1,0 +1,65 @@
+"""What ABT has in common with its relatives that change the order: the view, and the nogoods that rest on it.
+
+Of the kernel (Bessiere, Maestre, Brito, Meseguer, AIJ 161, 2005, Figure 1) `Update` and `ChooseValue`
+are here; what a protocol says, to whom, and when, is in its own file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from robochoc.message import Value
+from robochoc.protocols.nogood import NogoodStore, joined
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled import LocalProblem
+
+
+class Backtracking(Protocol):
+    """One agent with a `view` of others' values (myAgentView) and a `store` of nogoods (myNogoodStore).
+
+    `higher` are the robots that tell this one their values (Gamma-), if they are higher at present.
+    """
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.view: dict[str, Value] = {}
+        self.store = NogoodStore(order, len(problem.values))
+        self.higher = set(problem.parents)
+
+    def _choose_value(self, view: Mapping[str, Value]) -> int | None:
+        """The first value of the domain that no nogood rules out in `view`."""
+        return next((index for index in range(len(self.problem.values)) if self._consistent(index, view)), None)
+
+    def _consistent(self, index: int, view: Mapping[str, Value]) -> bool:
+        """Whether `view` allows the value at `index`; if a constraint does not, its nogood is stored."""
+        if self.store[index] is not None:
+            return False
+        conflict = self.problem.conflict(index, view)
+        if conflict is None:
+            return True
+        self.store.add(index, conflict)
+        return False
+
+    def _update(self, agent: str, value: Value | None) -> None:
+        """Take in a new value of `agent` (None: unknown); nogoods that rest on another value go."""
+        if value is None:
+            self.view.pop(agent, None)
+        else:
+            self.view[agent] = value
+        self.store.forget(agent, value)
+
+    def _believe(self, lhs: Mapping[str, Value]) -> list[str]:
+        """Believe what `lhs` says of others; returns those that do not tell this robot their values yet."""
+        strangers = [agent for agent in lhs if agent not in self.higher]
+        self.higher.update(strangers)
+        for agent, value in lhs.items():
+            known = self.view.get(agent)
+            told = joined(known, value)
+            if told != known:
+                self._update(agent, told)
+        return strangers
+
+    def _current(self) -> Value | None:
+        """The own value as others see it."""
+        return None if self.value is None else self.problem.values[self.value]

@@ -1,0 +1,21 @@
+"""One protocol object, alone: what it says to a packet, and the value it holds."""
+
+from __future__ import annotations
+
+from robochoc.message import Message, Value
+from robochoc.protocols.protocol import Protocol
+
+
+def told(robot: Protocol, *packet: tuple[str, Message]) -> list[tuple[str, Message]]:
+    """What `robot` says after a packet."""
+    for sender, message in packet:
+        robot.receive(sender, message)
+    robot.settle()
+    said = list(robot.outbox)
+    robot.outbox.clear()
+    return said
+
+
+def value(robot: Protocol) -> Value | None:
+    """The own value, as others see it."""
+    return None if robot.value is None else robot.problem.values[robot.value]
