@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 
-from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.protocols.traits import Traits
 
 GROUP = "robochoc.protocols"
@@ -85,4 +85,8 @@ def _fault(loaded: object) -> str:
     if not hasattr(loaded, "messages"):
         return "does not declare its messages"
     traits: object = loaded.traits
-    return "" if isinstance(traits, Traits) else "declares traits that are no Traits"
+    if not isinstance(traits, Traits):
+        return "declares traits that are no Traits"
+    if traits.dynamic is not issubclass(loaded, DynamicProtocol):
+        return "is to be dynamic if it is a DynamicProtocol, and only then"
+    return ""

@@ -107,10 +107,8 @@ class _Run:
         try:
             return self._travel(journey, protocol)
         except (TooManySolutions, CompileTimeout, _TimeOver) as limit:
-            out = tuple(journey.withdrawn)
             outcome = replace(self._summary(), verdict=Verdict.UNKNOWN, assignment={}, verified=False)
-            outcome = replace(outcome, withdrawn=out, lost=out)
-            return replace(outcome, reason="; ".join([str(limit), *journey.regrets]))
+            return replace(_without(outcome, journey), reason="; ".join([str(limit), *journey.regrets]))
 
     def _travel(self, journey: Journey, protocol: type[Protocol]) -> Outcome:
         """All epochs; then those step aside who find no place, if they are to."""
@@ -120,8 +118,7 @@ class _Run:
             lost = self._play(journey, protocol, domains)
             if lost:
                 raise RobotsLost(lost)
-            out = tuple(journey.withdrawn)
-            outcome = replace(self._summary(), withdrawn=out, lost=out)
+            outcome = _without(self._summary(), journey)
         else:
             reason = f"{alone} alone has none: its private constraints leave it no local solution"
             verified = self._options.verify and self._confirmed(journey.team, alone)
@@ -166,8 +163,7 @@ class _Run:
             journey.leave(result.lost.keys())
             if not journey.team.robots:
                 raise RobotsLost(result.lost)
-        out = tuple(journey.withdrawn)
-        outcome = replace(outcome, withdrawn=out, lost=out)
+        outcome = _without(outcome, journey)
         placed = replace(outcome, verdict=result.verdict, metrics=outcome.metrics + result.metrics, verified=False)
         if result.verdict is not Verdict.SOLUTION:
             return placed
@@ -310,6 +306,12 @@ class _Run:
 class _Watchers(TypedDict):
     observer: Observer | None
     progress: Callable[[Progress], None] | None
+
+
+def _without(outcome: Outcome, journey: Journey) -> Outcome:
+    """`outcome`, without the robots that were lost on the way."""
+    lost = tuple(journey.withdrawn)
+    return replace(outcome, withdrawn=lost, lost=lost)
 
 
 def _joined(assignments: Mapping[str, Mapping[str, int]]) -> dict[str, int]:

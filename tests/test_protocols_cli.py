@@ -20,14 +20,22 @@ from robochoc.registry import UnknownProtocol, offer_named, offers, protocol_nam
 
 WITHOUT_DOCSTRING = """
     from robochoc.protocols.first_fit import FirstFit, Placed
+    from robochoc.protocols.protocol import DynamicProtocol
     from robochoc.protocols.traits import Traits
 
-    class Other(FirstFit):
+    class Other(FirstFit, DynamicProtocol):
         messages = Placed
         traits = Traits(
             paper="[bold]Nobody[/bold] 1999\\n", complete=False, synchronous=True, costs=True, n_ary=False,
             partially_known=True, dynamic=True, privacy="decisions",
         )
+
+        def change(self, problem, order, void): ...
+
+        def resume(self, *, quiet): ...
+
+    class Static(FirstFit):
+        traits = Traits(dynamic=True)
 
     class Odd(FirstFit):
         traits = "none"
@@ -48,6 +56,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     places = {
         "zz-other": "others:Other",
         "zz-odd": "others:Odd",
+        "zz-static": "others:Static",
         "zz-number": "others:NUMBER",
         "zz-gone": "no_such_module:Gone",
         "zz-without": "others:Without",
@@ -106,6 +115,7 @@ def test_other_packages_protocols_are_listed_beside_ours() -> None:
         ("zz-garbled", "cannot be imported: SyntaxError"),
         ("zz-number", "is no subclass of Protocol"),
         ("zz-odd", "traits that are no Traits"),
+        ("zz-static", "is to be dynamic if it is a DynamicProtocol, and only then"),
     ],
 )
 def test_what_is_broken_is_shown_with_its_reason(name: str, reason: str) -> None:

@@ -10,6 +10,8 @@ names the methods bear:
     Backtrack        `_backtrack`            SetLink          `_set_link`
     CheckAddLink     `_check_add_link`       Update           `_update`
 
+`_choose_value` and `_update` are in `backtracking.py`, as ABT's relatives with other orders have them too.
+
 Complete, asynchronous, for satisfaction. Four things the paper leaves open: constraints may be n-ary (the lowest
 robot of the scope checks them, once it knows all the others); of several nogoods for a value the one with the
 highest possible lowest variable is kept (Hirayama and Yokoo 2000); messages are read by packets, and the view is
