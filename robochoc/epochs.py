@@ -22,6 +22,7 @@ from robochoc.outcome import Verdict
 from robochoc.problem import AddAgent, Event, Robot, Team
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.explanation import Void, void
+from robochoc.solver.part import NO_BRIEF, Brief
 
 Compile = Callable[[Team], Mapping[str, CompiledDomain]]
 
@@ -37,10 +38,11 @@ class Played(NamedTuple):
 class Journey:
     """A team on its way through its scenario, and through losses.
 
-    `order` is the priority order asked for (None: the files'). `compile_` gives a team's compiled domains. `left_s`
-    says how many seconds there are left, `messages` how many may be sent in all (None: no limit). Of the robots that
-    are lost, `spares` come back: their files are read again, what has happened meanwhile happens to them too, and they
-    join at the end of the order. `withdrawn` names those that are out, `regrets` says why somebody could not come back.
+    `order` is the priority order asked for (None: the files'). `compile_` gives a team's compiled domains.
+    `left_s` says how many seconds there are left, `messages` how many may be sent in all (None: no limit). Of the
+    robots that are lost, `spares` come back: their files are read again, what has happened meanwhile happens to
+    them too, and they join at the end of the order. `brief` is what robots are told beside the problem.
+    `withdrawn` names those that are out, `regrets` says why somebody could not come back.
     """
 
     def __init__(
@@ -52,6 +54,7 @@ class Journey:
         *,
         messages: int | None = None,
         spares: int = 0,
+        brief: Brief = NO_BRIEF,
     ) -> None:
         self.team = self._full = changed_by(team, events=0)
         self.withdrawn: list[str] = []
@@ -63,6 +66,7 @@ class Journey:
         self._left_s = left_s
         self._messages = messages
         self._spares = spares
+        self._brief = brief
         self._lossy = False
 
     def arranged(self) -> Team:
@@ -162,7 +166,8 @@ class Journey:
         """Have `session`, which has worked on `before`, work on the team as it is now."""
         now = self.arranged()
         keys, agents = void(before, now)
-        session.change(Epoch(now, self._compile(now), Void(keys, agents | set(fresh)), frozenset(fresh)))
+        stale = Void(keys, agents | set(fresh))
+        session.change(Epoch(now, self._compile(now), stale, frozenset(fresh), self._brief))
 
     def _read_again(self, name: str) -> None:
         """Take what the file of `name` says now for what it said from the beginning."""

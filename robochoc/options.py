@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -27,8 +28,12 @@ class ScheduleName(StrEnum):
 
 
 class Withdrawal(StrEnum):
-    """Who steps aside when the whole team has no solution: whoever finds no place, in priority order."""
+    """Who steps aside when the whole team has no solution.
 
+    As few as possible, by their weights, and proven; or whoever finds no place, in priority order.
+    """
+
+    FEWEST = "fewest"
     MAXIMAL = "maximal"
 
 
@@ -43,13 +48,13 @@ class OnLoss(StrEnum):
 class Options:
     """How to run.
 
-    `timeout` is in seconds of wall-clock time, `messages` a limit on their number. `seed`, `schedule` and `delay` are
-    the simulator's; `delay` is the longest a message takes, in constraint checks. `order` is the robots' total
-    priority order, by name or as the list of them (None: the files'); `seed` is `Order.RANDOM`'s too. `local` limits
-    the compilation of each robot's domain; `cache` says whether solutions of local problems are kept in the user's
-    cache folder. `count` is for the central judge: the number of all solutions. `verify` asks for a second opinion on
-    a `no-solution`. With `on_loss` set to withdraw, robots whose processes end leave the problem; up to `spares` of
-    them come back.
+    `timeout` is in seconds of wall-clock time, `messages` a limit on their number. `seed`, `schedule` and `delay`
+    are the simulator's; `delay` is the longest a message takes, in constraint checks. `order` is the robots' total
+    priority order, by name or as the list of them (None: the files'); `seed` is `Order.RANDOM`'s too. `local`
+    limits the compilation of each robot's domain; `cache` says whether solutions of local problems are kept in the
+    user's cache folder. `count` is for the central judge: the number of all solutions. `verify` asks for a second
+    opinion on a `no-solution`. `settings` are the protocol's, as text; its chance is drawn from `seed` too. With
+    `on_loss` set to withdraw, robots whose processes end leave the problem; up to `spares` of them come back.
     """
 
     protocol: str = "abt"
@@ -67,3 +72,4 @@ class Options:
     messages: int | None = None
     on_loss: OnLoss = OnLoss.FAIL
     spares: int = 0
+    settings: Mapping[str, str] = field(default_factory=dict)

@@ -48,6 +48,17 @@ class Metrics:
 
 
 @dataclass(frozen=True)
+class Place:
+    """A robot's place in a pseudo-tree: who stands right above it (None: a root), and who else of its neighbours does.
+
+    `pseudo_parents` are neighbours further up, on the way to the root.
+    """
+
+    parent: str | None
+    pseudo_parents: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Epoch:
     """One epoch of a problem that changes over time, or whose robots were lost.
 
@@ -64,6 +75,8 @@ class Epoch:
     verified: bool = False
     witness: str | None = None
     lost: tuple[str, ...] = ()
+    bound: float | None = None
+    tree: dict[str, Place] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -93,6 +106,10 @@ class Outcome:
     """Those of the withdrawn whose processes died, and that did not come back; the others stepped aside."""
     order: str | None = None
     """The priority order that was asked for, by name; `listed` for one of the user's own."""
+    bound: float | None = None
+    """No assignment costs less (with withdrawal: no fewer robots, by weight, step aside); None: nobody can tell."""
+    tree: dict[str, Place] = field(default_factory=dict)
+    """The pseudo-tree that the robots have built, if their protocol builds one."""
     epochs: tuple[Epoch, ...] = ()
     """What happened in each epoch; empty where there was but one, as nothing changed."""
 

@@ -206,6 +206,8 @@ class Robot:
     file: str = field(default="", compare=False)
     shown: tuple[str, ...] = ()
     """Own variables that neighbours see though nothing here says so: a parent's part of a PKC looks at them."""
+    weight: int = 1
+    """What it counts when as few robots as possible are to step aside: one of weight 3 as much as three of 1."""
 
     @cached_property
     def shared(self) -> tuple[Constraint, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TypedDict, assert_never
 
+from robochoc.anytime import aside_cost, best_of, bound_of, joined, tree_of
 from robochoc.change import changed_by, described
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress
@@ -19,21 +20,24 @@ from robochoc.observers.events import Began, Observer
 from robochoc.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.orders import CannotTurn, Order, order_of
 from robochoc.outcome import Epoch, Metrics, Outcome, Verdict
-from robochoc.problem import Kind, Model, Team
+from robochoc.problem import Kind, Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
-from robochoc.registry import offers, protocol_named
+from robochoc.refusals import refuse, refuse_scenario, refuse_unfit
+from robochoc.registry import protocol_named
 from robochoc.solver.ace import AceProcess, SolverTimeout
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.central import Judge
 from robochoc.solver.compile import Compiler, CompileTimeout, Source
 from robochoc.solver.domain import CompiledDomain, TooManySolutions
 from robochoc.solver.encoding import Unsupported
+from robochoc.solver.part import Brief
 
 __all__ = ["CENTRAL", "OnLoss", "Options", "Refuted", "Runtime", "ScheduleName", "Withdrawal", "solve"]
 
-PAIR = 2
+FEWEST = "syncbb"
+"""The complete protocol that says who steps aside, when the one that was asked for cannot."""
 
 
 class Refuted(Exception):  # noqa: N818 - named for what happened to the claim
@@ -85,6 +89,7 @@ class _Run:
         self._deadline = None if options.timeout is None else self._began + options.timeout
         self._cache = SolutionCache() if options.cache else None
         self._compile_s = 0.0
+        self._compiled: dict[str, CompiledDomain] = {}
         self._epochs: list[Epoch] = []
         self._outcome = Outcome(
             team=team.name,
@@ -99,10 +104,16 @@ class _Run:
         """The robots compile their domains, then the protocol runs; robots step aside if they are to."""
         options = self._options
         protocol = protocol_named(options.protocol)
-        _refuse_unfit(self._team, options, protocol.traits)
+        refuse_unfit(self._team, options, protocol)
         names = order_of(self._team, options.order, options.seed) if isinstance(options.order, Order) else options.order
         journey = Journey(
-            self._team, names, self._domains, self._left_s, messages=options.messages, spares=options.spares
+            self._team,
+            names,
+            self._domains,
+            self._left_s,
+            messages=options.messages,
+            spares=options.spares,
+            brief=self._brief,
         )
         try:
             return self._travel(journey, protocol)
@@ -112,6 +123,8 @@ class _Run:
 
     def _travel(self, journey: Journey, protocol: type[Protocol]) -> Outcome:
         """All epochs; then those step aside who find no place, if they are to."""
+        if self._options.withdraw is Withdrawal.FEWEST and protocol.traits.costs:
+            return self._placed(self._outcome, journey, protocol)
         domains = self._domains(journey.team)
         alone = next((name for name, domain in domains.items() if not domain.values), None)
         if alone is None or self._team.dynamic:
@@ -128,8 +141,9 @@ class _Run:
             outcome = replace(outcome, reason=self._limit(outcome.witness))
         if journey.regrets:
             outcome = replace(outcome, reason="; ".join([*filter(None, [outcome.reason]), *journey.regrets]))
-        if outcome.verdict is Verdict.NO_SOLUTION and self._options.withdraw is Withdrawal.MAXIMAL:
-            outcome = self._placed(outcome, journey)
+        if outcome.verdict is Verdict.NO_SOLUTION and self._options.withdraw is not None:
+            fewest = self._options.withdraw is Withdrawal.FEWEST
+            outcome = self._placed(outcome, journey, protocol_named(FEWEST) if fewest else FirstFit)
         return outcome
 
     def _limit(self, witness: str | None) -> str:
@@ -147,36 +161,54 @@ class _Run:
         lost: Mapping[str, str] = {}
         with self._session(protocol, journey.arranged(), domains) as session:
             for played in journey.go(session, lambda number, opened: self._announce(protocol, number, opened)):
-                self._epochs.append(self._epoch(played))
+                self._epochs.append(self._epoch(played, protocol.traits))
                 lost = played.result.lost
         return lost
 
-    def _placed(self, outcome: Outcome, journey: Journey) -> Outcome:
-        """Who finds a place among those that are left, in priority order; the others step aside."""
+    def _placed(self, outcome: Outcome, journey: Journey, protocol: type[Protocol]) -> Outcome:
+        """Who finds a place among those that are left, as `protocol` has it; the others step aside."""
+        brief = self._brief._replace(aside=aside_cost(self._team)) if protocol.traits.costs else self._brief
         while True:
             team = journey.arranged()
-            self._announce(FirstFit)
-            with self._session(FirstFit, team, self._domains(team)) as session:
-                result = session.search(self._left_s())
+            self._announce(protocol)
+            domains = self._domains(team)
+            with self._session(protocol, team, domains, brief) as session:
+                result = session.search(self._left_s(), self._options.messages)
             if not result.lost:
                 break
             journey.leave(result.lost.keys())
             if not journey.team.robots:
                 raise RobotsLost(result.lost)
         outcome = _without(outcome, journey)
-        placed = replace(outcome, verdict=result.verdict, metrics=outcome.metrics + result.metrics, verified=False)
-        if result.verdict is not Verdict.SOLUTION:
+        spent = replace(outcome.metrics + result.metrics, compile_s=self._compile_s)
+        placed = replace(outcome, verdict=Verdict.UNKNOWN, metrics=spent, verified=False, tree=tree_of(result.findings))
+        ended = result.verdict is Verdict.SOLUTION
+        found = None
+        if brief.aside is not None and not ended:
+            found = best_of(team, result, domains, brief.aside)
+            least = bound_of(result.findings)
+            bound = None if least is None else least // brief.aside
+            placed = replace(placed, bound=bound, reason=self._limit(None))
+        if not ended and found is None:
             return placed
-        aside = tuple(name for name in team.order if not result.assignments[name])
-        assignment = _joined(result.assignments)
-        _check(journey.team, assignment, aside)
-        withdrawn = (*journey.withdrawn, *aside)
-        paid = cost(journey.team, assignment)
-        return replace(placed, assignment=assignment, withdrawn=withdrawn, cost=paid, verified=True)
+        assignment = found.assignment if found else joined(result.assignments)
+        aside = tuple(robot.name for robot in team.robots if robot.variables[0].name not in assignment)
+        check(journey.team, assignment, aside, maximal=ended)
+        proven = (
+            Verdict.OPTIMAL if brief.aside is not None and (aside or team.kind is Kind.DISWCSP) else Verdict.SOLUTION
+        )
+        return replace(
+            placed,
+            verdict=proven if ended else Verdict.UNKNOWN,
+            assignment=assignment,
+            withdrawn=(*journey.withdrawn, *aside),
+            cost=cost(journey.team, assignment),
+            verified=True,
+        )
 
     # Epochs
 
-    def _epoch(self, played: Played) -> Epoch:
+    def _epoch(self, played: Played, traits: Traits) -> Epoch:
         """What an epoch has come to, held against every constraint, or against the judge if that is asked for."""
         team, result, opened = played
         epoch = Epoch(
@@ -186,14 +218,24 @@ class _Run:
             metrics=result.metrics,
             witness=result.witness,
             lost=tuple(result.lost),
+            tree=tree_of(result.findings),
         )
-        if result.verdict is Verdict.SOLUTION:
-            assignment = _joined(result.assignments)
-            _check(team, assignment, ())
-            return replace(epoch, assignment=assignment, cost=cost(team, assignment), verified=True)
-        if result.verdict is Verdict.NO_SOLUTION and self._options.verify:
-            return replace(epoch, verified=self._confirmed(team, None))
-        return epoch
+        if result.verdict is Verdict.NO_SOLUTION:
+            return replace(epoch, verified=self._options.verify and self._confirmed(team, None))
+        if result.lost or (result.verdict is Verdict.UNKNOWN and not traits.costs):
+            return epoch
+        if result.verdict is Verdict.SOLUTION and traits.complete:
+            assignment = joined(result.assignments)
+            verdict = Verdict.OPTIMAL if team.kind is Kind.DISWCSP else Verdict.SOLUTION
+        else:
+            found = best_of(team, result, self._compiled)
+            if found is None:
+                return replace(epoch, verdict=Verdict.UNKNOWN, bound=bound_of(result.findings))
+            assignment = found.assignment
+            verdict = Verdict.SOLUTION if team.kind is Kind.DISCSP else result.verdict
+            epoch = replace(epoch, bound=bound_of(result.findings))
+        check(team, assignment, ())
+        return replace(epoch, verdict=verdict, assignment=assignment, cost=cost(team, assignment), verified=True)
 
     def _told(self, epoch: Epoch) -> Outcome:
         """The outcome of a run that ended with `epoch`."""
@@ -204,6 +246,8 @@ class _Run:
             cost=epoch.cost,
             witness=epoch.witness,
             verified=epoch.verified,
+            bound=epoch.bound,
+            tree=epoch.tree,
             metrics=replace(epoch.metrics, compile_s=self._compile_s),
         )
 
@@ -218,9 +262,9 @@ class _Run:
 
     def centrally(self) -> Outcome:
         """One model of all files, decided by ACE; if the problem changes over time, one for each epoch."""
-        _refuse(self._team, CENTRAL, Traits(partially_known=True))
+        refuse(self._team, CENTRAL, Traits(partially_known=True))
         if self._options.count:
-            _refuse_scenario(self._team, "--count")
+            refuse_scenario(self._team, "--count")
         self._outcome = replace(self._outcome, runtime=CENTRAL)
         count = None
         with AceProcess() as warm:
@@ -237,8 +281,8 @@ class _Run:
         judgement = self._judge().judge(team, count=self._options.count)
         spent = Metrics(wall_s=time.monotonic() - began)
         epoch = Epoch(judgement.verdict, team.order, opened, judgement.assignment, metrics=spent)
-        if judgement.verdict is Verdict.SOLUTION and judgement.count is None:
-            _check(team, judgement.assignment, ())
+        if judgement.verdict in {Verdict.SOLUTION, Verdict.OPTIMAL} and judgement.count is None:
+            check(team, judgement.assignment, ())
             epoch = replace(epoch, cost=cost(team, judgement.assignment), verified=True)
         self._epochs.append(epoch)
         return judgement.count
@@ -278,17 +322,25 @@ class _Run:
                     break
         if solved:
             self._compile_s += time.monotonic() - began
+        self._compiled = domains
         return domains
 
-    def _session(self, protocol: type[Protocol], team: Team, domains: Mapping[str, CompiledDomain]) -> Session:
+    @property
+    def _brief(self) -> Brief:
+        return Brief(self._options.seed, self._options.settings)
+
+    def _session(
+        self, protocol: type[Protocol], team: Team, domains: Mapping[str, CompiledDomain], brief: Brief | None = None
+    ) -> Session:
         """`protocol` in the runtime asked for."""
+        brief = brief or self._brief
         watchers: _Watchers = {"observer": self._observer, "progress": self._progress}
         if self._options.runtime is Runtime.PROCESSES:
             from robochoc.communication.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
 
             survive = self._options.on_loss is OnLoss.WITHDRAW
-            return ProcessesRun(team, protocol, domains=domains, survive=survive, **watchers)
-        return Simulation(team, protocol, _schedule(self._options), domains=domains, **watchers)
+            return ProcessesRun(team, protocol, domains=domains, survive=survive, brief=brief, **watchers)
+        return Simulation(team, protocol, _schedule(self._options), domains=domains, brief=brief, **watchers)
 
     def _announce(self, protocol: type[Protocol], number: int = 0, opened: str = "") -> None:
         if self._observer:
@@ -314,10 +366,6 @@ def _without(outcome: Outcome, journey: Journey) -> Outcome:
     return replace(outcome, withdrawn=lost, lost=lost)
 
 
-def _joined(assignments: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
-    return {name: value for own in assignments.values() for name, value in own.items()}
-
-
 def _schedule(options: Options) -> Schedule:
     match options.schedule:
         case ScheduleName.CONCURRENT:
@@ -328,49 +376,10 @@ def _schedule(options: Options) -> Schedule:
             assert_never(never)
 
 
-def _refuse_unfit(team: Team, options: Options, traits: Traits) -> None:
-    """Say in one sentence what the options ask for and the protocol, or this version, cannot do."""
-    for events in range(len(team.scenario) + 1):
-        _refuse(changed_by(team, events), options.protocol, traits)
-    if options.withdraw is not None:
-        _refuse(team, "--withdraw", FirstFit.traits)
-        _refuse_scenario(team, "--withdraw")
-    if options.spares:
-        _refuse(team, "--spare", Traits())
-
-
-def _refuse_scenario(team: Team, option: str) -> None:
-    if team.dynamic:
-        raise Unsupported(f"{team.name} has a scenario.xml; {option} is for problems that do not change")
-
-
-def _refuse(team: Team, name: str, traits: Traits) -> None:
-    """Say in one sentence what whoever is called `name` cannot take of `team`."""
-    if team.kind is Kind.DISWCSP and not traits.costs:
-        raise Unsupported(f"{team.name} is a DisWCSP, and {name} does not minimise costs")
-    for robot in team.robots:
-        parts = (part for child in robot.children for part in child.constraints)
-        for constraint in (*robot.shared, *parts):
-            if constraint.model is Model.PKC and not traits.partially_known:
-                raise Unsupported(
-                    f"{robot.name} shares a partially known constraint (PKC, {constraint.name}), which {name}"
-                    f" does not support; {_who_takes(lambda other: other.partially_known)}"
-                )
-            if not traits.n_ary and len({team.owner[variable] for variable in constraint.variables}) > PAIR:
-                raise Unsupported(
-                    f"{robot.name} holds a constraint over more than two robots ({constraint.name}), which {name}"
-                    f" does not support; {_who_takes(lambda other: other.n_ary)}"
-                )
-
-
-def _who_takes(fits: Callable[[Traits], bool]) -> str:
-    names = [offer.name for offer in offers() if offer.protocol and fits(offer.protocol.traits)]
-    return f"these do: {', '.join(names)} (--protocol)"
-
-
-def _check(team: Team, assignment: dict[str, int], withdrawn: tuple[str, ...]) -> None:
-    """Hold the claim against every constraint of every file."""
+def check(team: Team, assignment: dict[str, int], withdrawn: tuple[str, ...], *, maximal: bool = True) -> None:
+    """Hold the claim against every constraint of every file: also that nobody could be added (`maximal`)."""
     faults = [*objections(team, assignment, withdrawn)]
-    faults += [f"{name} has stepped aside and could be added" for name in could_join(team, assignment, withdrawn)]
+    if maximal:
+        faults += [f"{name} has stepped aside and could be added" for name in could_join(team, assignment, withdrawn)]
     if faults:
         raise Refuted(f"the checker refutes the answer for {team.name}: {faults[0]} ({len(faults)} objections)")

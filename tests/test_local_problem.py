@@ -105,5 +105,6 @@ def _any_domains(team: Team, chance: Random) -> dict[str, CompiledDomain]:
         names = tuple(variable.name for variable in robot.variables)
         rows = sorted({tuple([chance.choice(list(variable.domain)) for variable in robot.variables]) for _ in range(6)})
         by_value = {tuple([row[names.index(name)] for name in robot.interface]): row for row in rows}
-        domains[robot.name] = CompiledDomain(names, tuple(by_value), tuple(by_value.values()), (1,) * len(by_value))
+        ones, noughts = (1,) * len(by_value), (0,) * len(by_value)
+        domains[robot.name] = CompiledDomain(names, tuple(by_value), tuple(by_value.values()), ones, noughts)
     return domains

@@ -13,6 +13,7 @@ import msgspec
 
 from robochoc.observers.events import AnyEvent
 from robochoc.outcome import Metrics
+from robochoc.protocols.findings import Findings
 from robochoc.solver.explanation import Void
 from robochoc.solver.part import Part
 
@@ -64,10 +65,11 @@ class Events(_Control, frozen=True):
 
 
 class Report(OfEpoch, frozen=True):
-    """What this epoch has come to: values of my variables, and what I have counted."""
+    """What this epoch has come to: values of my variables, what I have counted, and what I know of the whole."""
 
     assignment: dict[str, int]
     metrics: Metrics
+    findings: Findings
 
 
 class Failed(_Control, frozen=True):

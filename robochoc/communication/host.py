@@ -7,7 +7,8 @@ runtime uses it, so the same run counts the same everywhere.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import random
+from collections.abc import Callable, Mapping, Sequence
 from typing import Self
 
 import msgspec
@@ -16,10 +17,28 @@ from robochoc.message import Envelope, Message, encode
 from robochoc.observers.events import Concluded, Decided, Observer, Received, Sent, Settled
 from robochoc.outcome import Metrics, Verdict
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import DynamicProtocol, Protocol
+from robochoc.protocols.protocol import DynamicProtocol, Protocol, Settings
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Void
-from robochoc.solver.part import Part
+from robochoc.solver.part import NO_BRIEF, Brief, Part
+
+
+class BadSettings(ValueError):  # noqa: N818 - named for what was given
+    """What was set is nothing that the protocol knows, or will not do; says which and why."""
+
+
+def settings_of(protocol: type[Protocol], given: Mapping[str, str]) -> Settings:
+    """The settings of `protocol`: its defaults, and what was `given` instead. Raises `BadSettings`."""
+    known = type(protocol.settings)
+    names = [field.name for field in msgspec.structs.fields(known)]
+    for name in given:
+        if name not in names:
+            there = f"it has {', '.join(names)}" if names else "it has no settings"
+            raise BadSettings(f"{name!r} is no setting of this protocol: {there}")
+    try:
+        return msgspec.convert(dict(given), known, strict=False)
+    except msgspec.ValidationError as error:
+        raise BadSettings(str(error)) from None
 
 
 class BadMessage(Exception):  # noqa: N818 - named for what arrived
@@ -32,11 +51,12 @@ class Host:
     @classmethod
     def of(cls, protocol: type[Protocol], part: Part) -> Self:
         """A host for the robot whose part of the problem is `part`. Raises `Unsupported` (see `LocalProblem`)."""
-        return cls(protocol(LocalProblem(part), PriorityOrder(part.order, part.links)))
+        return cls(protocol(LocalProblem(part), PriorityOrder(part.order, part.links)), part.brief)
 
-    def __init__(self, protocol: Protocol) -> None:
+    def __init__(self, protocol: Protocol, brief: Brief = NO_BRIEF) -> None:
         self.protocol = protocol
         self.name = protocol.problem.agent
+        self._equip(brief)
         self.clock = 0
         self.sent: dict[str, int] = {}
         self.bytes = 0
@@ -74,6 +94,7 @@ class Host:
             self.protocol.outbox.clear()
         else:
             self.protocol = type(self.protocol)(problem, order)
+            self._equip(part.brief)
             self._begun = False
         self.clock = self.bytes = self._checks = 0
         self.sent = {}
@@ -91,6 +112,13 @@ class Host:
     def metrics(self) -> Metrics:
         """What this robot has sent and checked so far; `ncccs` is its own clock."""
         return Metrics(dict(self.sent), self.bytes, self.clock, self.protocol.problem.checks)
+
+    def _equip(self, brief: Brief) -> None:
+        """Give the protocol what it cannot have of itself: what was set, and chance."""
+        protocol = self.protocol
+        if brief.settings:
+            protocol.settings = settings_of(type(protocol), brief.settings)
+        protocol.chance = random.Random(f"{brief.seed} {self.name}").random  # noqa: S311 - a search is no secret
 
     def _receive(self, envelope: Envelope) -> None:
         try:

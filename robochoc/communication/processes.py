@@ -46,7 +46,7 @@ from robochoc.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.encoding import Unsupported
-from robochoc.solver.part import Part
+from robochoc.solver.part import NO_BRIEF, Brief, Part
 
 TICK_S = 0.2
 """Between two looks at the counters for those who watch the progress, and at who is dying."""
@@ -62,6 +62,7 @@ class ProcessesRun(Session):
     `domains` holds the compiled domains of robots whose private constraints need a solver (`solver/compile.py`).
     `observer` is told of all events; with `progress`, somebody watches the count of messages. With `survive`, robots
     whose processes end break the search off, and are told of in its result; otherwise `RobotsLost` is raised.
+    `brief` is what robots are told beside the problem.
     """
 
     def __init__(
@@ -74,6 +75,7 @@ class ProcessesRun(Session):
         progress: Callable[[Progress], None] | None = None,
         start_method: StartMethod = "fork",
         survive: bool = False,
+        brief: Brief = NO_BRIEF,
     ) -> None:
         self._protocol = protocol
         self._observer = observer
@@ -85,7 +87,7 @@ class ProcessesRun(Session):
         self._number = 0
         self._quiet = True
         self._deadline: float | None = None
-        self._waiting = Epoch(team, domains).parts(protocol)
+        self._waiting = Epoch(team, domains, brief=brief).parts(protocol)
         """Robots that are still to be started."""
         self._enter_epoch(team.order)
 
@@ -298,7 +300,8 @@ class ProcessesRun(Session):
             [report.metrics for report in reports.values()],
             wall_s,
         )
-        return replace(result, lost=dict(self._lost))
+        findings = {name: report.findings for name, report in reports.items()}
+        return replace(result, lost=dict(self._lost), findings=findings)
 
     def _await_reports(self, *, late: bool) -> None:
         """Who computes while there is no verdict is only busy: it is waited for, until the time is over."""

@@ -331,7 +331,8 @@ class _RobotLoop:
         self._early = []
         self._report_events()
         metrics = replace(self._host.metrics(), memory=own_memory())
-        self._say(Report(self._epoch, self._host.protocol.assignment, metrics))
+        protocol = self._host.protocol
+        self._say(Report(self._epoch, protocol.assignment, metrics, protocol.findings))
 
     def _change(self, order: Change) -> None:
         """Go over to the next epoch: with a changed problem, and nothing under way."""

@@ -9,6 +9,7 @@ from operator import add
 from typing import NamedTuple, Self
 
 from robochoc.outcome import Metrics, Verdict
+from robochoc.protocols.findings import Findings
 
 
 class Progress(NamedTuple):
@@ -24,7 +25,7 @@ class RunResult:
     """How a run ended. `assignments` maps each robot to its variables' values (empty: it has none).
 
     `witness` is the robot that could tell the verdict alone; None when it follows from quiescence or a limit. `lost`
-    says why, by name, robots were lost whose loss broke the search off.
+    says why, by name, robots were lost whose loss broke the search off. `findings` is what robots know of the whole.
     """
 
     verdict: Verdict
@@ -32,6 +33,7 @@ class RunResult:
     assignments: dict[str, dict[str, int]]
     metrics: Metrics
     lost: dict[str, str] = field(default_factory=dict)
+    findings: dict[str, Findings] = field(default_factory=dict)
 
     @classmethod
     def of(

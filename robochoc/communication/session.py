@@ -12,7 +12,7 @@ from robochoc.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.explanation import Void
-from robochoc.solver.part import Part, parts
+from robochoc.solver.part import NO_BRIEF, Brief, Part, parts
 
 
 class Epoch(NamedTuple):
@@ -20,17 +20,19 @@ class Epoch(NamedTuple):
 
     `domains` holds the compiled domains of robots whose private constraints need a solver (`solver/compile.py`);
     `void` is what of the epoch before no longer stands; the robots in `fresh` begin anew, though there may have been
-    others of their names before.
+    others of their names before; `brief` is what robots are told beside the problem.
     """
 
     team: Team
     domains: Mapping[str, CompiledDomain] = MappingProxyType({})
     void: Void = Void(frozenset(), frozenset())
     fresh: frozenset[str] = frozenset()
+    brief: Brief = NO_BRIEF
 
     def parts(self, protocol: type[Protocol]) -> dict[str, Part]:
         """What each robot knows when it speaks `protocol`."""
-        return parts(self.team, self.domains, everywhere=protocol.traits.everywhere, tree=protocol.traits.tree)
+        traits = protocol.traits
+        return parts(self.team, self.domains, self.brief, everywhere=traits.everywhere, tree=traits.tree)
 
 
 class Session(ABC):

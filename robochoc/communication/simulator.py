@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 from robochoc.communication.host import Host
@@ -19,7 +20,7 @@ from robochoc.outcome import Verdict
 from robochoc.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.domain import CompiledDomain
-from robochoc.solver.part import Part
+from robochoc.solver.part import NO_BRIEF, Brief, Part
 
 PROGRESS_EVERY = 256
 """Packets between two reports of progress."""
@@ -28,7 +29,8 @@ PROGRESS_EVERY = 256
 class Simulation(Session):
     """One team in this thread. `observer` is told of all events, with the schedule's time.
 
-    `domains` holds the compiled domains of robots whose private constraints need a solver (`solver/compile.py`).
+    `domains` holds the compiled domains of robots whose private constraints need a solver (`solver/compile.py`);
+    `brief` is what robots are told beside the problem.
     """
 
     def __init__(
@@ -40,6 +42,7 @@ class Simulation(Session):
         domains: Mapping[str, CompiledDomain] = MappingProxyType({}),
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
+        brief: Brief = NO_BRIEF,
     ) -> None:
         self._protocol = protocol
         self._schedule = schedule
@@ -48,7 +51,9 @@ class Simulation(Session):
         self._quiet = True
         self._verdict: Verdict | None = None
         self._witness: str | None = None
-        self._hosts = {name: self._host(part) for name, part in Epoch(team, domains).parts(protocol).items()}
+        self._hosts = {
+            name: self._host(part) for name, part in Epoch(team, domains, brief=brief).parts(protocol).items()
+        }
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
         """See `Session.search`; a limit on messages is looked at after each packet."""
@@ -56,13 +61,14 @@ class Simulation(Session):
         if self._verdict is None:
             self._play(began, timeout, messages)
             self._schedule.clear()
-        return RunResult.of(
+        result = RunResult.of(
             self._verdict or Verdict.UNKNOWN,
             self._witness,
             {name: host.protocol.assignment for name, host in self._hosts.items()},
             [host.metrics() for host in self._hosts.values()],
             time.monotonic() - began,
         )
+        return replace(result, findings={name: host.protocol.findings for name, host in self._hosts.items()})
 
     def change(self, epoch: Epoch) -> None:
         """See `Session.change`."""

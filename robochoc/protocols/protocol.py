@@ -8,14 +8,26 @@ empties. A protocol never asks the time, draws a lot, or knows whether it runs i
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import Any, ClassVar
+
+import msgspec
 
 from robochoc.message import Message
 from robochoc.outcome import Verdict
+from robochoc.protocols.findings import NOTHING, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Void
+
+
+class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What can be set of a protocol (`--set NAME=VALUE`): fields of simple types, each with its default.
+
+    A subclass's docstring says what they mean; `robochoc protocols NAME` shows it. `__post_init__` raises
+    `ValueError` where a value will not do.
+    """
 
 
 class Protocol(ABC):
@@ -27,6 +39,10 @@ class Protocol(ABC):
 
     messages: ClassVar[Any]
     traits: ClassVar[Traits] = Traits()
+    settings: Settings = Settings()
+    """The defaults; the host puts what was asked for in their place before `start`."""
+    chance: Callable[[], float]
+    """Draws from [0, 1): the host's, seeded for each robot. There before `start`."""
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         self.problem = problem
@@ -60,6 +76,11 @@ class Protocol(ABC):
     def assignment(self) -> dict[str, int]:
         """The own variables' values as decided; empty while unassigned."""
         return {} if self.value is None else self.problem.solution(self.value)
+
+    @property
+    def findings(self) -> Findings:
+        """What this robot knows of the whole besides its own value. May be asked at any time."""
+        return NOTHING
 
 
 class DynamicProtocol(Protocol):

@@ -27,6 +27,7 @@ from robochoc.solver.shared import Conflict, Others, OwnValues, SharedConstraint
 
 if TYPE_CHECKING:
     from robochoc.solver.conflict_table import ConflictTable
+    from robochoc.solver.cost_table import CostTable
 
 LARGE = 64
 """From so many values on, conflicts are looked up for all of them at once, in numpy."""
@@ -40,6 +41,10 @@ class LocalProblem:
     that this robot knows; each in priority order. `partners` are the parents with whom a partially known constraint
     is shared: they have to hear of the own value too. `checks` counts constraint checks so far. Raises `Unsupported`
     when the robot has private constraints among its variables and comes without its compiled domain.
+
+    `charges[i]` is what the i-th value costs before anybody else has said a word: what its private constraints
+    charge. Where robots may step aside, the last value is to do so: all its parts are None, it breaks nothing, and no
+    constraint asks anything of whoever is there with it.
     """
 
     def __init__(self, part: Part) -> None:
@@ -50,8 +55,12 @@ class LocalProblem:
         self.children = tuple(sorted((child.name for child in robot.children), key=rank.__getitem__))
         self._domain = compiled_domain(robot) if part.domain is None else part.domain
         self.values: tuple[Value, ...] = self._domain.values
+        self.charges: tuple[float, ...] = self._domain.costs
+        if part.brief.aside is not None:
+            self.values = (*self.values, (None,) * len(robot.interface))
+            self.charges = (*self.charges, part.brief.aside * robot.weight)
         self.checks = 0
-        own = OwnValues(robot.interface, self._domain.values)
+        own = OwnValues(robot.interface, self.values)
         owners = {name: agent for agent, names in part.interfaces.items() for name in names if agent != self.agent}
 
         def ready(known: Known) -> SharedConstraint:
@@ -76,8 +85,8 @@ class LocalProblem:
         self._part = part
 
     def solution(self, index: int) -> dict[str, int]:
-        """Values of all own variables when the compiled variable takes `values[index]`."""
-        return dict(zip(self._domain.variables, self._domain.solutions[index], strict=True))
+        """Values of all own variables when the compiled variable takes `values[index]`; none when it steps aside."""
+        return self._domain.solution(index)
 
     def conflict(self, index: int, view: Mapping[str, Value], since: int = -1) -> Conflict | None:
         """Why `values[index]` is against `view`: what the first constraint that it breaks sees, or None.
@@ -134,6 +143,31 @@ class LocalProblem:
         """How many constraints `values[index]` breaks, of those whose other variables are all known in `view`."""
         return sum(not constraint.mask(others) >> index & 1 for constraint, others in self._known(view))
 
+    def cost(self, index: int, view: Mapping[str, Value]) -> float:
+        """What `values[index]` costs in `view`: its charge, and all constraints whose other variables are known."""
+        return sum([c.prices(others)[index] for c, others in self._known(view)], self.charges[index])
+
+    def costs(self, view: Mapping[str, Value]) -> list[float]:
+        """Like `cost`, of every own value: as many checks for each constraint as there are values."""
+        known = [constraint.prices(others) for constraint, others in self._known(view, len(self.values))]
+        return [sum(prices) for prices in zip(self.charges, *known, strict=True)]
+
+    def tables(self, domains: Mapping[str, Sequence[Value]]) -> list[CostTable]:
+        """What constraints charge for every combination of values, of those whose other robots are all in `domains`.
+
+        A check for each combination that a constraint can tell apart. The own charges are not among them. Numpy's:
+        see `solver/cost_table.py`, also for how large a table may be.
+        """
+        from robochoc.solver.cost_table import cost_table  # noqa: PLC0415 - numpy is for those who want tables only
+
+        found = []
+        for constraint in self._constraints:
+            if set(constraint.agents) <= domains.keys():
+                checks, table = cost_table(constraint, domains, len(self.values))
+                self.checks += checks
+                found.append(table)
+        return found
+
     def alike(self, value: Value) -> Sequence[int]:
         """The places of all own values that agree with `value` wherever that is not None.
 
@@ -144,10 +178,10 @@ class LocalProblem:
         wanted = [(place, part) for place, part in enumerate(value) if part is not None]
         return [index for index, own in enumerate(self.values) if all(own[place] == part for place, part in wanted)]
 
-    def _known(self, view: Mapping[str, Value]) -> list[tuple[SharedConstraint, Others]]:
-        """The constraints whose other variables are all known, which is a check of each, and what they see."""
+    def _known(self, view: Mapping[str, Value], values: int = 1) -> list[tuple[SharedConstraint, Others]]:
+        """The constraints whose other variables are all known, and what they see: for so many own `values`."""
         known = [(c, others) for c in self._constraints if (others := c.others(view)) is not None]
-        self.checks += len(known)
+        self.checks += len(known) * values
         return known
 
     def _broken(self, index: int, view: Mapping[str, Value], since: int) -> tuple[SharedConstraint, Others] | None:

@@ -12,8 +12,9 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from robochoc.problem import Robot
-from robochoc.solver.encoding import Codes, Component, Network, Unsupported, components
+from robochoc.message import Value
+from robochoc.problem import Constraint, Robot
+from robochoc.solver.encoding import Codes, Component, Network, Unsupported, components, is_soft, price_on
 
 MOST_SOLUTIONS = 100_000
 """How many local solutions a robot may have, unless more are asked for."""
@@ -38,26 +39,41 @@ class CompiledDomain:
     """A robot's values as neighbours see them.
 
     `values[i]` holds the interface variables' values; `solutions[i]` one local solution behind it (the values of
-    `variables`, the lexicographically first), and `counts[i]` the number of local solutions that look like it.
+    `variables`: of the cheapest, the lexicographically first), `counts[i]` the number of local solutions that look
+    like it, and `costs[i]` what the private constraints charge for the cheapest.
     """
 
     variables: tuple[str, ...]
     values: tuple[tuple[int, ...], ...]
     solutions: tuple[tuple[int, ...], ...]
     counts: tuple[int, ...]
+    costs: tuple[float, ...]
 
     @property
     def total(self) -> int:
         """The number of local solutions."""
         return sum(self.counts)
 
+    def solution(self, index: int) -> dict[str, int]:
+        """The values of all variables behind the value at `index`; none behind the last, which is to step aside."""
+        return {} if index == len(self.values) else dict(zip(self.variables, self.solutions[index], strict=True))
+
+    def behind(self, value: Value) -> dict[str, int]:
+        """The same for `value`, as neighbours see it. Raises `ValueError` when the robot has no such value."""
+        return self.solution(len(self.values) if None in value else self.values.index(value))
+
 
 @dataclass
 class _Group:
-    """Local solutions that look alike: the first of them, and how many there are."""
+    """Local solutions that look alike: the first of the cheapest, what it costs, and how many there are."""
 
     solution: tuple[int, ...]
+    cost: float
     count: int
+
+    def add(self, solution: tuple[int, ...], cost: float) -> None:
+        self.count += 1
+        self.cost, self.solution = min((self.cost, self.solution), (cost, solution))
 
 
 def compiled_domain(robot: Robot, solve: SolveNetwork | None = None, limit: int = MOST_SOLUTIONS) -> CompiledDomain:
@@ -66,32 +82,48 @@ def compiled_domain(robot: Robot, solve: SolveNetwork | None = None, limit: int 
     `solve` is asked for the solutions of what private constraints connect; a robot without such needs none. Raises
     `TooManySolutions`, and `Unsupported` when there is a part to solve and no `solve`.
     """
-    parts = components(robot.variables, robot.private)
+    soft = [constraint for constraint in robot.private if is_soft(constraint)]
+    parts = components(robot.variables, robot.private, [constraint.variables for constraint in soft])
     if any(part.network.impossible for part in parts):
-        return CompiledDomain(tuple(variable.name for variable in robot.variables), (), (), ())
-    grouped = [_grouped(part, set(robot.interface), _solutions(robot, part, solve)) for part in parts]
+        return CompiledDomain(tuple(variable.name for variable in robot.variables), (), (), (), ())
+    seen = set(robot.interface)
+    paid = [[one for one in soft if _is_paid_in(one, part, parts[0])] for part in parts]
+    grouped = [
+        _grouped(part, seen, charged, _solutions(robot, part, solve, limit))
+        for part, charged in zip(parts, paid, strict=True)
+    ]
     if math.prod(len(groups) for groups in grouped) > limit:
         raise TooManySolutions(robot.name, limit)
     return _joined(robot, [part.names for part in parts], grouped)
 
 
-def _solutions(robot: Robot, part: Component, solve: SolveNetwork | None) -> Iterable[Sequence[int]]:
-    if len(part.names) == 1:
-        return ((code,) for code in part.network.domains[0])
+def _solutions(robot: Robot, part: Component, solve: SolveNetwork | None, limit: int) -> Iterable[Sequence[int]]:
+    if not part.network.tables:
+        if math.prod(map(len, part.network.domains)) > limit:
+            raise TooManySolutions(robot.name, limit)
+        return itertools.product(*part.network.domains)
     if solve is None:
         raise Unsupported(f"{robot.name} has private constraints among its variables, and no solver to compile them")
     return solve(part.network)
 
 
-def _grouped(part: Component, seen: set[str], solutions: Iterable[Sequence[int]]) -> list[_Group]:
+def _is_paid_in(constraint: Constraint, part: Component, first: Component) -> bool:
+    """Whether `constraint` is on variables of `part`; one that is on constants only is paid in the `first`."""
+    return part is first if not constraint.variables else constraint.variables[0] in part.names
+
+
+def _grouped(
+    part: Component, seen: set[str], soft: Iterable[Constraint], solutions: Iterable[Sequence[int]]
+) -> list[_Group]:
     """Solutions of one part that agree on its variables in `seen`, joined."""
     shown = [place for place, name in enumerate(part.names) if name in seen]
+    prices = [price_on(constraint, part.names) for constraint in soft]
     groups: dict[Codes, _Group] = {}
     for codes in solutions:
         solution = part.decoded(codes)
-        group = groups.setdefault(tuple([solution[place] for place in shown]), _Group(solution, 0))
-        group.count += 1
-        group.solution = min(group.solution, solution)
+        cost = sum(price(solution) for price in prices)
+        group = groups.setdefault(tuple([solution[place] for place in shown]), _Group(solution, cost, 0))
+        group.add(solution, cost)
     return list(groups.values())
 
 
@@ -104,11 +136,14 @@ def _joined(robot: Robot, names: Sequence[Sequence[str]], grouped: Sequence[Sequ
     found = []
     for combination in itertools.product(*grouped):
         flat = tuple(itertools.chain.from_iterable(group.solution for group in combination))
-        found.append((tuple([flat[index] for index in order]), math.prod(group.count for group in combination)))
+        solution = tuple([flat[index] for index in order])
+        count = math.prod(group.count for group in combination)
+        found.append((solution, count, sum(group.cost for group in combination)))
     found.sort()
     return CompiledDomain(
         variables=variables,
-        values=tuple(tuple([solution[index] for index in shown]) for solution, _ in found),
-        solutions=tuple(solution for solution, _ in found),
-        counts=tuple(count for _, count in found),
+        values=tuple(tuple([solution[index] for index in shown]) for solution, _, _ in found),
+        solutions=tuple(solution for solution, _, _ in found),
+        counts=tuple(count for _, count, _ in found),
+        costs=tuple(cost for _, _, cost in found),
     )

@@ -68,11 +68,14 @@ class Component:
         return tuple([self.values[code] for code in codes])
 
 
-def components(variables: Iterable[Variable], constraints: Iterable[Constraint]) -> list[Component]:
+def components(
+    variables: Iterable[Variable], constraints: Iterable[Constraint], together: Iterable[Sequence[str]] = ()
+) -> list[Component]:
     """The problem of `variables` and the hard part of `constraints`, split into what does not depend on each other.
 
     Components are in the order of their first variables, variables within in their given order. Constraints are on
-    `variables` only. Raises `Unsupported` when a constraint has too many tuples to be made a table.
+    `variables` only; so are the scopes in `together`, each of which is to be in one component. Raises `Unsupported`
+    when a constraint has too many tuples to be made a table.
     """
     domains = {variable.name: sorted(variable.domain) for variable in variables}
     unary: list[Constraint] = []
@@ -84,7 +87,7 @@ def components(variables: Iterable[Variable], constraints: Iterable[Constraint])
         _fold(constraint, domains)
     tables = _Tables(domains)
     relevant = [rows for rows in map(tables.of, wider) if rows is not None]
-    groups = _connected(domains, [rows.scope for rows in relevant])
+    groups = _connected(domains, [*(rows.scope for rows in relevant), *together])
     held: dict[str, list[_Rows]] = {names[0]: [] for names in groups}
     first = {name: names[0] for names in groups for name in names}
     for rows in relevant:
@@ -94,18 +97,36 @@ def components(variables: Iterable[Variable], constraints: Iterable[Constraint])
 
 def holds_on(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
     """`constraint` as a test of the values of the variables `names`; what is soft is allowed."""
-    place = {name: index for index, name in enumerate(names)}
-    terms = [(place[term], 0) if isinstance(term, str) else (None, term) for term in constraint.parameters]
-
-    def arguments(values: Sequence[int]) -> list[int]:
-        return [constant if index is None else values[index] for index, constant in terms]
-
     definition = constraint.definition
     if not isinstance(definition, Predicate):
-        return lambda values: definition.cost(arguments(values)) < INFINITE
+        price = price_on(constraint, names)
+        return lambda values: price(values) < INFINITE
     if constraint.cost < INFINITE:
         return lambda values: True  # noqa: ARG005 - a soft predicate forbids nothing
-    body = compiled(definition.body, definition.parameters)
+    return _truth_on(constraint, definition, names)
+
+
+def price_on(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], float]:
+    """What values of the variables `names` pay at `constraint`: 0 where it holds, `INFINITE` where it is hard."""
+    definition = constraint.definition
+    if isinstance(definition, Predicate):
+        holds = _truth_on(constraint, definition, names)
+        cost = constraint.cost
+        return lambda values: 0 if holds(values) else cost
+    arguments = _arguments(constraint, names)
+    return lambda values: definition.cost(arguments(values))
+
+
+def is_soft(constraint: Constraint) -> bool:
+    """Whether `constraint` may cost something without being broken."""
+    definition = constraint.definition
+    return definition.semantics is Semantics.SOFT if isinstance(definition, Relation) else constraint.cost < INFINITE
+
+
+def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
+    """Whether the predicate of `constraint` is true of values of `names`; where it is undefined, it is not."""
+    arguments = _arguments(constraint, names)
+    body = compiled(predicate.body, predicate.parameters)
 
     def holds(values: Sequence[int]) -> bool:
         try:
@@ -114,6 +135,13 @@ def holds_on(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence
             return False
 
     return holds
+
+
+def _arguments(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], list[int]]:
+    """What the definition of `constraint` receives, of values of the variables `names`."""
+    place = {name: index for index, name in enumerate(names)}
+    terms = [(place[term], 0) if isinstance(term, str) else (None, term) for term in constraint.parameters]
+    return lambda values: [constant if index is None else values[index] for index, constant in terms]
 
 
 def _forbids_something(constraint: Constraint) -> bool:

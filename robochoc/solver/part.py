@@ -20,6 +20,22 @@ Links = Mapping[str, tuple[str, ...]]
 """The parents of each robot."""
 
 
+class Brief(NamedTuple):
+    """What all robots of a run are told beside the problem.
+
+    `seed` is what their chance is drawn from, `settings` are the protocol's, as they were given. `aside` is what it
+    costs that a robot of weight 1 steps aside (None: nobody may); then its constraints, its private ones too, fall
+    away.
+    """
+
+    seed: int = 0
+    settings: Mapping[str, str] = MappingProxyType({})
+    aside: float | None = None
+
+
+NO_BRIEF = Brief()
+
+
 class Part(NamedTuple):
     """What one robot knows when the search begins.
 
@@ -28,6 +44,7 @@ class Part(NamedTuple):
     variables that lower robots hold, for protocols in which all robots of a scope have to know them. `links` is
     for protocols that work on a pseudo-tree. `secretive` are the parents that hold parts of partially known
     constraints towards this robot: that there is such a constraint both sides know, the parts they do not.
+    `brief` is what all robots are told; whoever may step aside does so at the `brief.aside` times its weight.
     """
 
     robot: Robot
@@ -38,11 +55,13 @@ class Part(NamedTuple):
     domains: Mapping[str, Domain] = MappingProxyType({})
     links: Links | None = None
     secretive: tuple[str, ...] = ()
+    brief: Brief = NO_BRIEF
 
 
 def parts(
     team: Team,
     domains: Mapping[str, CompiledDomain] = MappingProxyType({}),
+    brief: Brief = NO_BRIEF,
     *,
     everywhere: bool = False,
     tree: bool = False,
@@ -76,6 +95,7 @@ def parts(
             known,
             links,
             tuple(secretive[robot.name]),
+            brief,
         )
         for robot in team.robots
     }

@@ -7,7 +7,7 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 
 from robochoc.message import Value
 from robochoc.problem import Constraint
-from robochoc.solver.encoding import holds_on
+from robochoc.solver.encoding import holds_on, price_on
 
 Conflict = Mapping[str, Value]
 """Assignments of other robots that rule out an own value: the left side of a nogood."""
@@ -23,20 +23,20 @@ class OwnValues:
     same ones.
     """
 
-    def __init__(self, names: Sequence[str], values: Sequence[tuple[int, ...]]) -> None:
+    def __init__(self, names: Sequence[str], values: Sequence[Value]) -> None:
         self._names = names
         self._values = values
-        self._coded: dict[tuple[int, ...], tuple[list[int], list[tuple[int, ...]]]] = {}
+        self._coded: dict[tuple[int, ...], tuple[list[int], list[Value]]] = {}
 
     def seen(self, scope: Container[str]) -> tuple[tuple[int, ...], list[str]]:
         """The places and names of the own variables in `scope`."""
         places = tuple([place for place, name in enumerate(self._names) if name in scope])
         return places, [self._names[place] for place in places]
 
-    def codes(self, places: tuple[int, ...]) -> tuple[list[int], list[tuple[int, ...]]]:
+    def codes(self, places: tuple[int, ...]) -> tuple[list[int], list[Value]]:
         """For each value its code, and for each code what it stands for, when only `places` are looked at."""
         if places not in self._coded:
-            codes: dict[tuple[int, ...], int] = {}
+            codes: dict[Value, int] = {}
             coded = [codes.setdefault(tuple([value[place] for place in places]), len(codes)) for value in self._values]
             self._coded[places] = coded, list(codes)
         return self._coded[places]
@@ -76,17 +76,19 @@ class SharedConstraint:
         self._names = [known[agent][place] for agent, place in self._seen]
         self._widths = {agent: len(known[agent]) for agent in self.agents}
         self._masks: dict[Others, int] = {}
+        self._prices: dict[Others, list[float]] = {}
         self._conflicts: dict[Others, Conflict] = {}
 
     def compile(self, own: OwnValues) -> None:
         """Get ready for the own compiled domain."""
         self._own = own
         self._places, names = own.seen(self._scope)
-        self._holds = holds_on(self._constraint, [*self._names, *names])
+        self._test = holds_on(self._constraint, [*self._names, *names])
+        self._price = price_on(self._constraint, [*self._names, *names])
         self.codes, self._distinct = own.codes(self._places)
 
     def others(self, view: Mapping[str, Value]) -> Others | None:
-        """What the constraint sees in `view`; None as long as a part of it is unknown."""
+        """What the constraint sees in `view`; None as long as a part of it is unknown, or has stepped aside."""
         try:
             seen = [view[agent][place] for agent, place in self._seen]
         except KeyError:
@@ -96,6 +98,18 @@ class SharedConstraint:
     def holds(self, others: Others) -> list[bool]:
         """For each code of own values, whether it goes with `others`."""
         return [self._holds((*others, *own)) for own in self._distinct]
+
+    def _holds(self, values: Sequence[int | None]) -> bool:
+        """Whether the constraint holds on `values`; of a robot that steps aside (None) it asks nothing."""
+        return None in values or self._test(values)  # type: ignore[arg-type]
+
+    def prices(self, others: Others) -> list[float]:
+        """What each own value pays when the others are as `others` says."""
+        prices = self._prices.get(others)
+        if prices is None:
+            paid = [0 if None in own else self._price((*others, *own)) for own in self._distinct]  # type: ignore[arg-type]
+            prices = self._prices[others] = [paid[code] for code in self.codes]
+        return prices
 
     def mask(self, others: Others) -> int:
         """The own values that go with `others`: bit i for the i-th."""

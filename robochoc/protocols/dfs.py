@@ -1,0 +1,203 @@
+"""Pseudo-trees that the robots build themselves: leader election, then a distributed depth-first search.
+
+Each part of the team that constraints connect elects the robot with the most neighbours, by waves that the strongest
+candidate's one survives (the echo algorithm with extinction; Tel, "Introduction to Distributed Algorithms", 2nd
+edition, 2000, Section 7.2). From there a token visits all robots depth first (Cheung, "Graph traversal techniques and
+the maximum flow problem in distributed computation", IEEE TSE 9(4), 1983); it carries the names of those visited, so
+it never asks in vain: Awerbuch 1985 has other means for that. Of its unvisited neighbours a robot sends it to the one
+with the most neighbours itself. Ties go to who is higher in the priority order.
+
+Neighbours then stand one above the other, as in every depth-first search of an undirected graph; so do all robots of
+an n-ary constraint, as they are all neighbours. What it takes: 2 messages a robot for the token, and for the election
+at least 2 an edge.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterable, Sequence
+
+from robochoc.message import Message
+from robochoc.outcome import Place, Verdict
+from robochoc.protocols.findings import Findings
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled import LocalProblem
+
+
+class Wave(Message, frozen=True):
+    """`candidate`, who has so many neighbours, wants to be the root; back from all neighbours, it is."""
+
+    neighbours: int
+    candidate: str
+
+
+class Token(Message, frozen=True):
+    """You are the sender's child; those `visited` are in the tree already."""
+
+    visited: list[str]
+
+
+class Back(Message, frozen=True):
+    """All below me are in the tree; these are `visited` by now."""
+
+    visited: list[str]
+
+
+TreeMessage = Wave | Token | Back
+"""What every `TreeProtocol` receives besides its own messages."""
+
+
+class TreeProtocol(Protocol):
+    """One agent that takes its place in a pseudo-tree first, and then speaks a protocol on it.
+
+    `parent` (None: a root), `pseudo_parents`, `children` and `pseudo_children` are known, in priority order, from
+    `begin` on; then come `hear` for each message and `decide` for each packet. Messages that come before are kept
+    for then. Children may begin before their parents, never after.
+    """
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.parent: str | None = None
+        self.pseudo_parents: tuple[str, ...] = ()
+        self.children: tuple[str, ...] = ()
+        self.pseudo_children: tuple[str, ...] = ()
+        self.placed = False
+        """Whether this robot, and all below it, have their places in the tree."""
+        self._election = _Election(problem.agent, problem.neighbours, order)
+        self._early: list[tuple[str, Message]] = []
+
+    @abstractmethod
+    def begin(self) -> None:
+        """The place in the tree is known: the search may begin."""
+
+    @abstractmethod
+    def hear(self, sender: str, message: Message) -> None:
+        """Take in one message of the search."""
+
+    def decide(self) -> None:
+        """All waiting messages have been heard."""
+
+    def start(self) -> None:
+        """Stand for election; who has no value at all ends the search."""
+        if not self.problem.values:
+            self.conclude(Verdict.NO_SOLUTION)
+        elif not self.problem.neighbours:
+            self._visit(None, [])
+            self.settle()
+        else:
+            self._propagate(self._election.stand())
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Build the tree; keep what comes before its time."""
+        if self.verdict is not None:
+            return
+        match message:
+            case Wave():
+                self._propagate(self._election.hear(sender, message))
+                if self._election.won:
+                    self._visit(None, [])
+            case Token(visited):
+                self._visit(sender, visited)
+            case Back(visited):
+                self._go_on(visited)
+            case _ if self.placed:
+                self.hear(sender, message)
+            case _:
+                self._early.append((sender, message))
+
+    def settle(self) -> None:
+        """Nothing is decided before the place in the tree is known."""
+        if self.placed and self.verdict is None:
+            self.decide()
+
+    @property
+    def ancestors(self) -> tuple[str, ...]:
+        """The neighbours above: the parent and the pseudo-parents."""
+        return self.pseudo_parents if self.parent is None else (self.parent, *self.pseudo_parents)
+
+    @property
+    def descendants(self) -> tuple[str, ...]:
+        """The neighbours below: the children and the pseudo-children."""
+        return (*self.children, *self.pseudo_children)
+
+    @property
+    def findings(self) -> Findings:
+        """The place in the tree."""
+        return Findings(place=Place(self.parent, self.pseudo_parents) if self.placed else None)
+
+    def _propagate(self, waves: Sequence[tuple[str, Wave]]) -> None:
+        for receiver, wave in waves:
+            self.send(receiver, wave)
+
+    def _visit(self, parent: str | None, visited: Sequence[str]) -> None:
+        """The token comes for the first time: neighbours that it has visited are above."""
+        self.parent = parent
+        self.pseudo_parents = self._sorted(name for name in self.problem.neighbours if name in {*visited} - {parent})
+        self._go_on([*visited, self.problem.agent])
+
+    def _go_on(self, visited: list[str]) -> None:
+        """Send the token to another neighbour, or back when all are in the tree."""
+        left = [name for name in self.problem.neighbours if name not in visited]
+        if left:
+            child = max(left, key=self._election.strength)
+            self.children = self._sorted((*self.children, child))
+            self.send(child, Token(visited))
+            return
+        known = {*self.ancestors, *self.children}
+        self.pseudo_children = self._sorted(name for name in self.problem.neighbours if name not in known)
+        if self.parent is not None:
+            self.send(self.parent, Back(visited))
+        self.placed = True
+        self.begin()
+        early, self._early = self._early, []
+        for sender, message in early:
+            self.receive(sender, message)
+
+    def _sorted(self, names: Iterable[str]) -> tuple[str, ...]:
+        return tuple(sorted(names, key=self.order.rank.__getitem__))
+
+
+class _Election:
+    """One agent's part in the election: the strongest `candidate` that it has heard of, and who told it first.
+
+    `_heard` are the neighbours from which that candidate's wave has come; with the last of them it goes back.
+    """
+
+    def __init__(self, agent: str, neighbours: Sequence[str], order: PriorityOrder) -> None:
+        self._neighbours = neighbours
+        self._order = order
+        self._degrees = {agent: len(neighbours)}
+        self._agent = self._candidate = agent
+        self._from: str | None = None
+        self._heard: set[str] = set()
+        self.won = False
+
+    def strength(self, name: str) -> tuple[int, int]:
+        """Who has more neighbours is stronger; of equals, who is higher in the order."""
+        return self._degrees[name], -self._order.rank[name]
+
+    def stand(self) -> list[tuple[str, Wave]]:
+        """The own wave goes out."""
+        return [(name, self._wave) for name in self._neighbours]
+
+    def hear(self, sender: str, wave: Wave) -> list[tuple[str, Wave]]:
+        """What to say to a wave; a weaker candidate's one ends here."""
+        self._degrees[wave.candidate] = wave.neighbours
+        said: list[tuple[str, Wave]] = []
+        if self.strength(wave.candidate) > self.strength(self._candidate):
+            self._candidate, self._from, self._heard = wave.candidate, sender, set()
+            said = [(name, self._wave) for name in self._neighbours if name != sender]
+        if wave.candidate != self._candidate:
+            return said
+        self._heard.add(sender)
+        if len(self._heard) == len(self._neighbours):
+            if self._from is None:
+                self.won = True
+            else:
+                said.append((self._from, self._wave))
+        return said
+
+    @property
+    def _wave(self) -> Wave:
+        return Wave(self._degrees[self._candidate], self._candidate)

@@ -1,0 +1,81 @@
+"""What a run refuses before any robot starts: one sentence that says what does not fit, and what would."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from robochoc.change import changed_by
+from robochoc.communication.host import BadSettings, settings_of
+from robochoc.options import Options, Withdrawal
+from robochoc.problem import Kind, Model, Team
+from robochoc.protocols.first_fit import FirstFit
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import Traits
+from robochoc.registry import offers
+from robochoc.solver.encoding import Unsupported
+
+PAIR = 2
+
+
+def refuse_unfit(team: Team, options: Options, protocol: type[Protocol]) -> None:
+    """Raise `Unsupported` for what the options ask for and the protocol, or this version, cannot do."""
+    traits = protocol.traits
+    try:
+        settings_of(protocol, options.settings)
+    except BadSettings as wrong:
+        raise Unsupported(f"--set: {wrong} (protocol {options.protocol})") from None
+    if options.withdraw is not None:
+        refuse_scenario(team, "--withdraw")
+    if options.withdraw is Withdrawal.FEWEST:
+        _refuse_fewest(team, options, traits)
+    else:
+        for events in range(len(team.scenario) + 1):
+            refuse(changed_by(team, events), options.protocol, traits)
+    if options.withdraw is Withdrawal.MAXIMAL:
+        refuse(team, "--withdraw maximal", FirstFit.traits)
+    if options.spares:
+        refuse(team, "--spare", Traits())
+
+
+def refuse_scenario(team: Team, option: str) -> None:
+    """Raise `Unsupported` when the problem changes over time."""
+    if team.dynamic:
+        raise Unsupported(f"{team.name} has a scenario.xml; {option} is for problems that do not change")
+
+
+def refuse(team: Team, name: str, traits: Traits) -> None:
+    """Raise `Unsupported` for what whoever is called `name` cannot take of `team`."""
+    if team.kind is Kind.DISWCSP and not traits.costs:
+        raise Unsupported(
+            f"{team.name} is a DisWCSP, and {name} does not minimise costs; {_who_takes(lambda other: other.costs)}"
+        )
+    for robot in team.robots:
+        parts = (part for child in robot.children for part in child.constraints)
+        for constraint in (*robot.shared, *parts):
+            if constraint.model is Model.PKC and not traits.partially_known:
+                raise Unsupported(
+                    f"{robot.name} shares a partially known constraint (PKC, {constraint.name}), which {name}"
+                    f" does not support; {_who_takes(lambda other: other.partially_known)}"
+                )
+            if not traits.n_ary and len({team.owner[variable] for variable in constraint.variables}) > PAIR:
+                raise Unsupported(
+                    f"{robot.name} holds a constraint over more than two robots ({constraint.name}), which {name}"
+                    f" does not support; {_who_takes(lambda other: other.n_ary)}"
+                )
+
+
+def _refuse_fewest(team: Team, options: Options, traits: Traits) -> None:
+    """Who steps aside is a question of costs: a protocol for these answers it alone, any other is asked first."""
+    if traits.costs and not traits.complete:
+        raise Unsupported(
+            f"--withdraw fewest has to be proven, and {options.protocol} proves nothing;"
+            f" {_who_takes(lambda other: other.costs and other.complete)}, or --withdraw maximal"
+        )
+    if team.kind is Kind.DISCSP:
+        refuse(team, options.protocol, traits)
+    refuse(team, "--withdraw fewest", Traits(costs=True, n_ary=traits.n_ary or not traits.costs))
+
+
+def _who_takes(fits: Callable[[Traits], bool]) -> str:
+    names = [offer.name for offer in offers() if offer.protocol and fits(offer.protocol.traits)]
+    return f"these do: {', '.join(names)} (--protocol)"

@@ -1,0 +1,45 @@
+"""What a constraint charges for every combination of values, as an array: for protocols that compute with tables.
+
+Costs are floats, as a broken hard constraint costs `inf`; integers up to 2^53 are exact in them.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robochoc.message import Value
+from robochoc.solver.shared import Others, SharedConstraint
+
+Array = NDArray[np.float64]
+
+
+class CostTable(NamedTuple):
+    """What the constraint called `key` charges: an axis for each of `agents`, then one for the own values.
+
+    Axes are in the order of `agents`, places on an axis in the order of the values that were given for the robot.
+    """
+
+    key: str
+    agents: tuple[str, ...]
+    charges: Array
+
+
+def cost_table(
+    constraint: SharedConstraint, domains: Mapping[str, Sequence[Value]], size: int
+) -> tuple[int, CostTable]:
+    """How many checks it takes, and the table of `constraint` over `domains` and the `size` own values."""
+    columns = [domains[agent] for agent in constraint.agents]
+    charges = np.zeros([*map(len, columns), size], np.float64)
+    seen: set[Others] = set()
+    for place in itertools.product(*(range(len(column)) for column in columns)):
+        chosen = (column[index] for column, index in zip(columns, place, strict=True))
+        others = constraint.others(dict(zip(constraint.agents, chosen, strict=True)))
+        if others is not None:
+            seen.add(others)
+            charges[place] = constraint.prices(others)
+    return len(seen) * size, CostTable(constraint.key, constraint.agents, charges)

@@ -1,0 +1,104 @@
+"""Every protocol that minimises, on every runtime, over random problems and schedules, against brute force."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from random import Random
+
+import pytest
+from cost_problems import fewest_aside, least_cost, random_complex_cost_team, random_cost_team
+from problems import random_team
+from test_conformance import ENOUGH, random_schedule
+
+from robochoc.outcome import Outcome, Verdict
+from robochoc.problem import INFINITE, Team
+from robochoc.registry import protocol_named, protocol_names
+from robochoc.run import Options, Runtime, Withdrawal, solve
+
+MINIMISING = [name for name in protocol_names() if protocol_named(name).traits.costs]
+COMPLETE = [name for name in MINIMISING if protocol_named(name).traits.complete]
+INCOMPLETE = [name for name in MINIMISING if name not in COMPLETE]
+PER_BATCH = 200
+BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 10))]
+
+
+def team_for(protocol: str, chance: Random) -> Team:
+    """A random team that the protocol can take; one in five is of complex robots."""
+    n_ary = protocol_named(protocol).traits.n_ary
+    if n_ary and chance.random() < 0.2:
+        return random_complex_cost_team(chance)
+    return random_cost_team(chance, n_ary=n_ary)
+
+
+def agrees(team: Team, options: Options) -> Outcome:
+    """Solve `team`; the cost must be brute force's. `solve` itself has the assignment checked."""
+    least = least_cost(team)
+    outcome = solve(team, options)
+    if least == INFINITE:
+        assert outcome.verdict is Verdict.NO_SOLUTION, (team, options)
+    else:
+        assert outcome.verdict is Verdict.OPTIMAL, (team, options)
+        assert outcome.cost == least, (team, options)
+        assert outcome.verified
+    return outcome
+
+
+@pytest.mark.parametrize("protocol", COMPLETE)
+@pytest.mark.parametrize("batch", BATCHES)
+def test_the_least_cost_is_found_in_the_simulator(protocol: str, batch: int) -> None:
+    chance = Random(f"costs {protocol} {batch}")
+    seen = {Verdict.OPTIMAL: 0, Verdict.NO_SOLUTION: 0}
+    for _ in range(PER_BATCH):
+        options = replace(random_schedule(chance), protocol=protocol)
+        seen[agrees(team_for(protocol, chance), options).verdict] += 1
+    assert seen[Verdict.NO_SOLUTION] > PER_BATCH // 40
+    assert seen[Verdict.OPTIMAL] > PER_BATCH // 2
+
+
+@pytest.mark.parametrize("protocol", COMPLETE)
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 4))])
+def test_the_least_cost_is_found_in_processes(protocol: str, batch: int) -> None:
+    chance = Random(f"costs processes {protocol} {batch}")
+    for _ in range(13):
+        agrees(team_for(protocol, chance), Options(protocol=protocol, timeout=60))
+
+
+@pytest.mark.parametrize("protocol", INCOMPLETE)
+@pytest.mark.parametrize("runtime", list(Runtime))
+def test_what_is_not_proven_is_no_better_than_the_least(protocol: str, runtime: Runtime) -> None:
+    """And is an answer: its cost is that of its assignment, which breaks nothing hard."""
+    chance = Random(f"incomplete {protocol} {runtime}")
+    solved = best = 0
+    for _ in range(100 if runtime is Runtime.SIMULATOR else 8):
+        team = team_for(protocol, chance)
+        least = least_cost(team)
+        outcome = solve(team, replace(random_schedule(chance), protocol=protocol, runtime=runtime, messages=ENOUGH))
+        assert outcome.verdict in {Verdict.SOLUTION, Verdict.UNKNOWN}
+        if least == INFINITE:
+            assert outcome.verdict is Verdict.UNKNOWN
+            assert outcome.cost is None
+        elif outcome.cost is not None:
+            solved += 1
+            best += outcome.cost == least
+            assert outcome.cost >= least
+            assert outcome.verified
+    assert solved
+    assert best > solved // 4
+
+
+@pytest.mark.parametrize("protocol", COMPLETE)
+def test_as_few_as_possible_step_aside(protocol: str) -> None:
+    """By weight. A team that has a solution flies as a whole."""
+    chance = Random(f"fewest {protocol}")
+    aside = 0
+    for _ in range(60):
+        team = random_team(chance, n_ary=protocol_named(protocol).traits.n_ary)
+        robots = tuple(replace(robot, weight=chance.choice((1, 1, 2, 3))) for robot in team.robots)
+        team = replace(team, robots=robots)
+        options = replace(random_schedule(chance), protocol=protocol, withdraw=Withdrawal.FEWEST)
+        outcome = solve(team, options)
+        assert sum(team[name].weight for name in outcome.withdrawn) == fewest_aside(team)
+        assert outcome.verdict is (Verdict.OPTIMAL if outcome.withdrawn else Verdict.SOLUTION)
+        assert outcome.verified
+        aside += bool(outcome.withdrawn)
+    assert 20 < aside < 60
