@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 
-from robochoc.protocols.protocol import DynamicProtocol, Protocol
+from robochoc.protocols.protocol import DynamicProtocol, Protocol, Settings
 from robochoc.protocols.traits import Traits
 
 GROUP = "robochoc.protocols"
@@ -84,9 +84,11 @@ def _fault(loaded: object) -> str:
         return f"does not define {' and '.join(sorted(loaded.__abstractmethods__))}"
     if not hasattr(loaded, "messages"):
         return "does not declare its messages"
-    traits: object = loaded.traits
-    if not isinstance(traits, Traits):
-        return "declares traits that are no Traits"
+    declared: tuple[object, object] = (loaded.traits, loaded.settings)
+    traits, settings = declared
+    if not (isinstance(traits, Traits) and isinstance(settings, Settings)):
+        wrong = "settings that are no Settings" if isinstance(traits, Traits) else "traits that are no Traits"
+        return f"declares {wrong}"
     if traits.dynamic is not issubclass(loaded, DynamicProtocol):
         return "is to be dynamic if it is a DynamicProtocol, and only then"
     return ""

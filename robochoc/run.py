@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TypedDict, assert_never
+from typing import Any, TypedDict, assert_never
 
-from robochoc.anytime import aside_cost, best_of, bound_of, joined, tree_of
+from robochoc.answers import Refuted, answered, check, placed
 from robochoc.change import changed_by, described
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress
@@ -15,12 +15,13 @@ from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.session import Session
 from robochoc.communication.simulator import Simulation
 from robochoc.epochs import Journey, Played
-from robochoc.observers.checker import cost, could_join, has_local_solution, objections
+from robochoc.observers.checker import cost, has_local_solution
 from robochoc.observers.events import Began, Observer
+from robochoc.observers.objective import aside_cost
 from robochoc.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.orders import CannotTurn, Order, order_of
 from robochoc.outcome import Epoch, Metrics, Outcome, Verdict
-from robochoc.problem import Kind, Team
+from robochoc.problem import Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
@@ -38,10 +39,6 @@ __all__ = ["CENTRAL", "OnLoss", "Options", "Refuted", "Runtime", "ScheduleName",
 
 FEWEST = "syncbb"
 """The complete protocol that says who steps aside, when the one that was asked for cannot."""
-
-
-class Refuted(Exception):  # noqa: N818 - named for what happened to the claim
-    """The checker refutes what the protocol claims: a fault of the protocol, or ours."""
 
 
 def solve(
@@ -152,7 +149,9 @@ class _Run:
             return f"{witness} gave up, as its protocol has it"
         if self._left_s() == 0:
             return f"the time was over (--timeout {self._options.timeout:g})"
-        return f"so many messages have been sent (--messages {self._options.messages})"
+        if self._options.messages is not None:
+            return f"so many messages have been sent (--messages {self._options.messages})"
+        return f"{self._options.protocol} proves nothing, and has found nothing that breaks no hard constraint"
 
     def _play(
         self, journey: Journey, protocol: type[Protocol], domains: Mapping[str, CompiledDomain]
@@ -167,7 +166,10 @@ class _Run:
 
     def _placed(self, outcome: Outcome, journey: Journey, protocol: type[Protocol]) -> Outcome:
         """Who finds a place among those that are left, as `protocol` has it; the others step aside."""
-        brief = self._brief._replace(aside=aside_cost(self._team)) if protocol.traits.costs else self._brief
+        asked_for = protocol_named(self._options.protocol) is protocol
+        brief = Brief(self._options.seed, self._options.settings if asked_for else {})
+        if protocol.traits.costs:
+            brief = brief._replace(aside=aside_cost(self._team))
         while True:
             team = journey.arranged()
             self._announce(protocol)
@@ -179,32 +181,9 @@ class _Run:
             journey.leave(result.lost.keys())
             if not journey.team.robots:
                 raise RobotsLost(result.lost)
-        outcome = _without(outcome, journey)
         spent = replace(outcome.metrics + result.metrics, compile_s=self._compile_s)
-        placed = replace(outcome, verdict=Verdict.UNKNOWN, metrics=spent, verified=False, tree=tree_of(result.findings))
-        ended = result.verdict is Verdict.SOLUTION
-        found = None
-        if brief.aside is not None and not ended:
-            found = best_of(team, result, domains, brief.aside)
-            least = bound_of(result.findings)
-            bound = None if least is None else least // brief.aside
-            placed = replace(placed, bound=bound, reason=self._limit(None))
-        if not ended and found is None:
-            return placed
-        assignment = found.assignment if found else joined(result.assignments)
-        aside = tuple(robot.name for robot in team.robots if robot.variables[0].name not in assignment)
-        check(journey.team, assignment, aside, maximal=ended)
-        proven = (
-            Verdict.OPTIMAL if brief.aside is not None and (aside or team.kind is Kind.DISWCSP) else Verdict.SOLUTION
-        )
-        return replace(
-            placed,
-            verdict=proven if ended else Verdict.UNKNOWN,
-            assignment=assignment,
-            withdrawn=(*journey.withdrawn, *aside),
-            cost=cost(journey.team, assignment),
-            verified=True,
-        )
+        outcome = placed(replace(_without(outcome, journey), metrics=spent), journey.team, result, domains, brief.aside)
+        return replace(outcome, reason=self._limit(None)) if outcome.verdict is Verdict.UNKNOWN else outcome
 
     # Epochs
 
@@ -218,24 +197,10 @@ class _Run:
             metrics=result.metrics,
             witness=result.witness,
             lost=tuple(result.lost),
-            tree=tree_of(result.findings),
         )
         if result.verdict is Verdict.NO_SOLUTION:
             return replace(epoch, verified=self._options.verify and self._confirmed(team, None))
-        if result.lost or (result.verdict is Verdict.UNKNOWN and not traits.costs):
-            return epoch
-        if result.verdict is Verdict.SOLUTION and traits.complete:
-            assignment = joined(result.assignments)
-            verdict = Verdict.OPTIMAL if team.kind is Kind.DISWCSP else Verdict.SOLUTION
-        else:
-            found = best_of(team, result, self._compiled)
-            if found is None:
-                return replace(epoch, verdict=Verdict.UNKNOWN, bound=bound_of(result.findings))
-            assignment = found.assignment
-            verdict = Verdict.SOLUTION if team.kind is Kind.DISCSP else result.verdict
-            epoch = replace(epoch, bound=bound_of(result.findings))
-        check(team, assignment, ())
-        return replace(epoch, verdict=verdict, assignment=assignment, cost=cost(team, assignment), verified=True)
+        return answered(epoch, team, result, traits, self._compiled)
 
     def _told(self, epoch: Epoch) -> Outcome:
         """The outcome of a run that ended with `epoch`."""
@@ -344,8 +309,10 @@ class _Run:
 
     def _announce(self, protocol: type[Protocol], number: int = 0, opened: str = "") -> None:
         if self._observer:
-            detail = {"epoch": number, "opened_by": opened} if number else {}
-            self._observer(Began(t=0, protocol=protocol.__name__, **detail))  # type: ignore[arg-type]
+            detail: dict[str, Any] = {"epoch": number, "opened_by": opened} if number else {}
+            if protocol.traits.costs:
+                detail["minimises"] = True
+            self._observer(Began(t=0, protocol=protocol.__name__, **detail))
 
     def _left_s(self) -> float | None:
         return None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
@@ -374,12 +341,3 @@ def _schedule(options: Options) -> Schedule:
             return RandomChannels(options.seed)
         case never:
             assert_never(never)
-
-
-def check(team: Team, assignment: dict[str, int], withdrawn: tuple[str, ...], *, maximal: bool = True) -> None:
-    """Hold the claim against every constraint of every file: also that nobody could be added (`maximal`)."""
-    faults = [*objections(team, assignment, withdrawn)]
-    if maximal:
-        faults += [f"{name} has stepped aside and could be added" for name in could_join(team, assignment, withdrawn)]
-    if faults:
-        raise Refuted(f"the checker refutes the answer for {team.name}: {faults[0]} ({len(faults)} objections)")

@@ -15,6 +15,7 @@ from rich.table import Table
 
 from robochoc import __version__
 from robochoc.formats import on_one_line
+from robochoc.protocols.protocol import NO_SETTINGS, Settings
 from robochoc.protocols.traits import Traits
 from robochoc.registry import Offer, offers
 from robochoc.run import CENTRAL
@@ -37,6 +38,8 @@ class Row:
     broken: str = ""
     module: str = ""
     """Where its docstring stands."""
+    settings: Settings = NO_SETTINGS
+    """What can be set of it, with the defaults."""
 
 
 def rows() -> list[Row]:
@@ -67,7 +70,17 @@ def explained(row: Row) -> str:
     """What the protocol is in a line, where it comes from, and what its author says of it."""
     head = f"{row.name}: {_in_a_line(row.traits)}" if row.traits else row.name
     place = f"{row.place}, from the package {row.package}"
-    return f"{head}\n{place}\n\n{_docstring(row) or 'Its module has no docstring.'}"
+    return f"{head}\n{place}\n{_settings(row)}\n{_docstring(row) or 'Its module has no docstring.'}"
+
+
+def _settings(row: Row) -> str:
+    """What can be set, each with its default, and what it means; empty where there is nothing."""
+    there = msgspec.structs.asdict(row.settings)
+    if not there:
+        return ""
+    defaults = "  ".join(f"{name}={value}" for name, value in there.items())
+    meaning = inspect.cleandoc(type(row.settings).__doc__ or "")
+    return f"--set {defaults}\n\n{meaning}\n"
 
 
 def _in_a_line(traits: Traits) -> str:
@@ -87,7 +100,15 @@ def _in_a_line(traits: Traits) -> str:
 def _row(offer: Offer) -> Row:
     if offer.protocol is None:
         return Row(offer.name, offer.place, offer.package, None, offer.broken)
-    return Row(offer.name, offer.place, offer.package, offer.protocol.traits, module=offer.protocol.__module__)
+    protocol = offer.protocol
+    return Row(
+        offer.name,
+        offer.place,
+        offer.package,
+        protocol.traits,
+        module=protocol.__module__,
+        settings=protocol.settings,
+    )
 
 
 def _judge() -> Row:
@@ -99,6 +120,7 @@ def _judge() -> Row:
 def _object(row: Row, *, explain: bool) -> dict[str, object]:
     traits = asdict(row.traits) if row.traits else {}
     known = {"name": row.name, "place": row.place, "package": row.package, "distributed": row.name != CENTRAL, **traits}
+    known["settings"] = msgspec.structs.asdict(row.settings)
     if row.broken:
         known["broken"] = row.broken
     if explain:

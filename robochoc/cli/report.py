@@ -9,7 +9,7 @@ from robochoc.change import changed_by
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
 from robochoc.outcome import Metrics, Outcome, Verdict
-from robochoc.problem import Team, natural
+from robochoc.problem import Kind, Team, natural
 
 WIDTH = 100
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
@@ -17,7 +17,7 @@ _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 
 def report(team: Team, outcome: Outcome) -> str:
     """The verdict, why, where everybody flies, and what it cost, in a few lines."""
-    lines = [f"{on_one_line(outcome.team)}: {_verdict(outcome)}", *_epochs(outcome)]
+    lines = [f"{on_one_line(outcome.team)}: {_verdict(team, outcome)}", *_epochs(outcome)]
     team = changed_by(team, outcome.events)
     if outcome.assignment:
         lines += _board(team, outcome.assignment) or _list(team, outcome.assignment)
@@ -65,7 +65,7 @@ def _place(team: Team, outcome: Outcome) -> str:
             return f"{outcome.runtime}, seed {outcome.seed}"
 
 
-def _verdict(outcome: Outcome) -> str:
+def _verdict(team: Team, outcome: Outcome) -> str:
     why = outcome.witness and f"{outcome.witness} has derived the empty nogood"
     if outcome.reason and not outcome.epochs:
         why = outcome.reason
@@ -75,15 +75,39 @@ def _verdict(outcome: Outcome) -> str:
             proof = f"no solution{left} ({why})" if why else f"no solution{left}"
             return f"{proof}, confirmed centrally" if outcome.verified else proof
         case Verdict.UNKNOWN:
-            return f"unknown: {outcome.reason or 'a limit was reached before a verdict'}"
+            return f"unknown: {outcome.reason or 'a limit was reached before a verdict'}{_so_far(team, outcome)}"
         case _ if outcome.count is not None:
             return f"{outcome.count:,} solution{'s' * (outcome.count != 1)}"
         case Verdict.SOLUTION | Verdict.OPTIMAL if not outcome.aside:
-            return f"{outcome.verdict}{left}, checked against every constraint"
+            return f"{_proven(team, outcome)}{left}, checked against every constraint"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             who = "some step" if outcome.assignment else "all step"
+            if outcome.verdict is Verdict.OPTIMAL:
+                who = "as few as possible step"
             whole = left or " for the whole team"
-            return f"no solution{whole} ({why}); {who} aside, checked against every constraint"
+            because = f" ({why})" if why else ""
+            return f"no solution{whole}{because}; {who} aside, checked against every constraint"
+
+
+def _proven(team: Team, outcome: Outcome) -> str:
+    """The verdict, and the cost where there are costs."""
+    if team.kind is Kind.DISCSP:
+        return outcome.verdict
+    least = "" if outcome.verdict is Verdict.OPTIMAL else ", which may not be the least"
+    return f"{outcome.verdict}, cost {outcome.cost:,.0f}{least}"
+
+
+def _so_far(team: Team, outcome: Outcome) -> str:
+    """The best that is known when a limit is reached, and what it could come to at best."""
+    bound = outcome.bound
+    if outcome.aside:
+        least = f"; at least {bound:,.0f} have to" if bound else ""
+        return f"; in the best answer so far {len(outcome.aside)} step aside{least}"
+    if team.kind is Kind.DISCSP:
+        return ""
+    known = [f"the best so far costs {outcome.cost:,.0f}"] if outcome.assignment else []
+    known += [f"nothing costs less than {bound:,.0f}"] if bound else []
+    return "; " + ", and ".join(known) if known else ""
 
 
 def _metrics(outcome: Outcome) -> str:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,54 +14,41 @@ from robochoc.cli.failure import INVALID, LIMIT, Failure, failures_told, worst
 from robochoc.cli.local import limits, local_options
 from robochoc.cli.order import GIVEN, OrderName, order_for
 from robochoc.cli.paths import InputPath, OutputFile
+from robochoc.cli.solve_settings import (
+    MINIMISES,
+    SATISFIES,
+    WITHDRAWALS,
+    Products,
+    SolveCommand,
+    Wanted,
+    check_settings,
+    protocol_settings,
+)
 
 if TYPE_CHECKING:
     from robochoc.observers.journal import Recorder
+    from robochoc.observers.objective import Objective
     from robochoc.outcome import Outcome
     from robochoc.problem import Team
     from robochoc.run import Options
-
-WITHDRAWALS = ("maximal",)
-
-
-class SolveCommand(click.Command):
-    """Lets `--withdraw` and `--spare` stand alone: the word after them is their value only when it can be one."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Give a bare option its value."""
-        plain = args.index("--") if "--" in args else len(args)
-        for place, word in enumerate(args[:plain]):
-            following = args[place + 1] if place + 1 < len(args) else ""
-            if word == "--withdraw" and following not in (*WITHDRAWALS, "fewest"):
-                args = [*args[:place], f"--withdraw={WITHDRAWALS[0]}", *args[place + 1 :]]
-            elif word == "--spare" and not following.isdecimal():
-                args = [*args[:place], "--spare=1", *args[place + 1 :]]
-        return super().parse_args(ctx, args)
-
-
-@dataclass(frozen=True)
-class Products:
-    """What is made of a run besides what is printed."""
-
-    html: Path | None
-    journal: Path | None
-    serve: bool
-
-    def __bool__(self) -> bool:
-        return bool(self.html or self.journal or self.serve)
 
 
 @click.command(cls=SolveCommand, short_help="Solve teams, each robot in its own process.")
 @click.argument("paths", nargs=-1, required=True, type=InputPath(), metavar="PATH ...")
 @click.option(
     "--protocol",
-    default="abt",
-    show_default=True,
     metavar="NAME",
     help=(
-        "abt: the robots solve it together; central: no robots, ACE decides all files merged into one model. All that"
-        " there are: robochoc protocols."
+        f"The robots solve it together by this one; by default {SATISFIES}, and {MINIMISES} where there are costs."
+        " central: no robots, ACE decides all files merged into one model. All that there are: robochoc protocols."
     ),
+)
+@click.option(
+    "--set",
+    "settings_given",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="A setting of the protocol, such as --set cycles=500 for dsa; robochoc protocols NAME shows them.",
 )
 @click.option(
     "--order",
@@ -82,7 +69,11 @@ class Products:
     help="processes: one OS process per robot; simulator: one thread, repeatable.",
 )
 @click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the simulator and of --order random."
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Seed of the simulator, of --order random, and of protocols that draw lots.",
 )
 @click.option(
     "--schedule",
@@ -107,10 +98,11 @@ class Products:
 @click.option(
     "--withdraw",
     type=click.Choice(WITHDRAWALS),
-    metavar="[=maximal]",
+    metavar="[=fewest|maximal]",
     help=(
-        "When the whole team has no solution, robots that find no place step aside, in priority order. maximal (also"
-        " without a word): nobody who stepped aside could be added; fewer might do."
+        "When the whole team has no solution, robots step aside. fewest (also without a word): as few as possible, by"
+        " their weights, and proven; maximal: whoever finds no place, in priority order, which is quick: nobody could"
+        " be added, but fewer might do."
     ),
 )
 @click.option(
@@ -138,6 +130,7 @@ class Products:
         " the order. Implies --on-loss withdraw."
     ),
 )
+@click.option("--explain", is_flag=True, help="Show the pseudo-tree too, if the robots have built one.")
 @click.option("--count", is_flag=True, help="With --protocol central: count all solutions.")
 @click.option(
     "--verify",
@@ -169,6 +162,7 @@ def solve(
     html: Path | None,
     journal: Path | None,
     serve: bool,
+    explain: bool,
     **settings: Any,  # noqa: ANN401 - the options of `robochoc.run.Options`, by their names
 ) -> None:
     """Solve every team at PATH or below: by default each robot in its own OS process.
@@ -177,13 +171,17 @@ def solve(
     """
     from robochoc.run import OnLoss, Options, Runtime, ScheduleName, Withdrawal
 
-    _check_settings(settings)
+    check_settings(settings)
+    if explain and as_json:
+        raise click.UsageError("--explain is for people; the JSON result has the tree without it")
     withdraw = settings.pop("withdraw")
+    protocol = settings.pop("protocol")
     on_loss = settings.pop("on_loss") or ("withdraw" if settings["spares"] else "fail")
     order = settings.pop("order")
     options = Options(
         local=limits(settings.pop("local_solutions"), settings.pop("local_timeout")),
         cache=not settings.pop("no_cache"),
+        settings=protocol_settings(settings.pop("settings_given")),
         runtime=Runtime(settings.pop("runtime")),
         schedule=ScheduleName(settings.pop("schedule")),
         withdraw=Withdrawal(withdraw) if withdraw else None,
@@ -198,41 +196,10 @@ def solve(
         raise click.UsageError("--count gives a number: there is nothing for --html, --journal or --serve to show")
     if products and len(folders) > 1:
         raise click.UsageError(f"--html, --journal and --serve are for one team; {len(folders)} were found")
+    wanted = Wanted(protocol, order, as_json=as_json, explain=explain)
     for folder in folders:
-        statuses.append(_solve_one(folder, options, products, order, as_json=as_json))
+        statuses.append(_solve_one(folder, options, products, wanted))
     context.exit(worst(statuses))
-
-
-def _check_settings(settings: dict[str, Any]) -> None:
-    """Options that would be ignored are wrong usage."""
-    if settings["runtime"] != "simulator" and (settings["delay"] or settings["schedule"] != "concurrent"):
-        raise click.UsageError("--delay and --schedule are the simulator's; add --runtime simulator")
-    if settings["timeout"] is not None and not settings["timeout"] > 0:
-        raise click.UsageError("--timeout takes a number of seconds")
-    if settings["delay"] and settings["schedule"] != "concurrent":
-        raise click.UsageError("--delay is for --schedule concurrent: in a random one any message may take any time")
-    if settings["protocol"] == "central":
-        _check_central(settings)
-    elif settings["count"]:
-        raise click.UsageError("--count is for --protocol central")
-    if (settings["on_loss"] or settings["spares"]) and settings["runtime"] != "processes":
-        raise click.UsageError(
-            "--on-loss and --spare are for processes, which can die; drop --runtime simulator, or write a scenario.xml"
-        )
-    if settings["spares"] and settings["on_loss"] == "fail":
-        raise click.UsageError("--spare brings robots back that died; --on-loss fail ends the run instead")
-
-
-def _check_central(settings: dict[str, Any]) -> None:
-    """There are no robots, and no second opinion."""
-    if settings["verify"]:
-        raise click.UsageError("--verify asks ACE, which is --protocol central itself")
-    asked = {name: settings[name] for name in ("withdraw", "messages", "on_loss", "spares")}
-    asked["order"] = settings["order"] != GIVEN
-    for name, value in asked.items():
-        if value:
-            option = "--" + name.removesuffix("s" if name == "spares" else "").replace("_", "-")
-            raise click.UsageError(f"{option} is for robots that solve it together, not for --protocol central")
 
 
 def _teams(paths: tuple[Path, ...]) -> tuple[list[Path], list[int]]:
@@ -250,24 +217,25 @@ def _teams(paths: tuple[Path, ...]) -> tuple[list[Path], list[int]]:
     return list(folders), statuses
 
 
-def _solve_one(folder: Path, options: Options, products: Products, order: str | Path, *, as_json: bool) -> int:
+def _solve_one(folder: Path, options: Options, products: Products, wanted: Wanted) -> int:
     """Solve the team in `folder`, tell the outcome, and return the exit status."""
     from robochoc.formats import on_one_line, read_team
 
     try:
         with failures_told(folder):
             team = read_team(folder)
-            options = replace(options, order=order_for(team, order))
+            protocol = wanted.protocol or (SATISFIES if team.kind == "DisCSP" else MINIMISES)
+            options = replace(options, protocol=protocol, order=order_for(team, wanted.order))
             with _journal(team, options, products.journal) as recorder:
                 outcome = _run(team, options, recorder)
-                _tell(team, outcome, as_json=as_json)
+                _tell(team, outcome, wanted)
     except Failure as failure:
         failure.show()
         return failure.exit_code
-    _show(team, outcome, products, quiet=as_json)
+    _show(team, outcome, products, quiet=wanted.as_json)
     if outcome.verdict != "unknown":
         return 0
-    if outcome.reason and as_json:
+    if outcome.reason and wanted.as_json:
         click.echo(on_one_line(f"{folder}: {outcome.reason}"), err=True)
     return LIMIT
 
@@ -302,7 +270,8 @@ def _journal(team: Team, options: Options, path: Path | None) -> Iterator[Record
             runtime=options.runtime,
             seed=options.seed,
             order=options.order or UNSET,
-        )
+        ),
+        _objective(team, options),
     )
     try:
         yield recorder
@@ -310,8 +279,19 @@ def _journal(team: Team, options: Options, path: Path | None) -> Iterator[Record
         write_atomically(path, recorder.content())
 
 
-def _tell(team: Team, outcome: Outcome, *, as_json: bool) -> None:
-    if as_json:
+def _objective(team: Team, options: Options) -> Callable[[], Objective] | None:
+    """What the journal weighs decisions by; None where nothing is minimised, or the problem changes."""
+    from robochoc.observers.objective import Objective, aside_cost
+    from robochoc.run import Withdrawal
+
+    fewest = options.withdraw is Withdrawal.FEWEST
+    if team.dynamic or not (fewest or team.kind == "DisWCSP"):
+        return None
+    return lambda: Objective(team, aside_cost(team) if fewest else None)
+
+
+def _tell(team: Team, outcome: Outcome, wanted: Wanted) -> None:
+    if wanted.as_json:
         from robochoc.formats.result import result_json
 
         click.echo(result_json(outcome))
@@ -319,6 +299,10 @@ def _tell(team: Team, outcome: Outcome, *, as_json: bool) -> None:
         from robochoc.cli.report import report
 
         click.echo(report(team, outcome))
+        if wanted.explain:
+            from robochoc.cli.explain import explained
+
+            click.echo(explained(outcome))
 
 
 def _show(team: Team, outcome: Outcome, products: Products, *, quiet: bool) -> None:

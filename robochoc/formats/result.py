@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from robochoc.outcome import Epoch, Metrics, Outcome, Verdict
+from robochoc.outcome import Epoch, Metrics, Outcome, Place, Verdict
 
 
 class BadResult(ValueError):  # noqa: N818 - named for what was found
@@ -53,6 +53,8 @@ class _Form(msgspec.Struct, omit_defaults=True):
     reason: str | None = None
     lost: list[str] = []
     order: str | None = None
+    bound: float | int | None = None
+    tree: dict[str, Place] = {}
 
 
 def result_json(outcome: Outcome) -> bytes:
@@ -84,6 +86,8 @@ def result_json(outcome: Outcome) -> bytes:
         reason=outcome.reason,
         lost=list(outcome.lost),
         order=outcome.order,
+        bound=outcome.bound,
+        tree=outcome.tree,
     )
     return msgspec.json.encode(form)
 
@@ -143,5 +147,7 @@ def read_result(content: bytes) -> Outcome:
         reason=form.reason,
         lost=tuple(form.lost),
         order=form.order,
+        bound=form.bound,
+        tree=form.tree,
         epochs=tuple(map(_epoch_of, form.epochs)),
     )

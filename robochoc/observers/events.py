@@ -19,12 +19,14 @@ class Began(Event, frozen=True):
     """A run of `protocol` begins, or its epoch `epoch`, which `opened_by` has opened.
 
     Withdrawing is a run of its own after the search.
-    Counts start again from 0; times are compared within a run, or an epoch, only.
+    Counts start again from 0; times are compared within a run, or an epoch, only. `minimises`: costs are what it is
+    about, so there may be `Improved` events.
     """
 
     protocol: str
     epoch: int | UnsetType = UNSET
     opened_by: str | UnsetType = UNSET
+    minimises: bool | UnsetType = UNSET
 
 
 class Registered(Event, frozen=True):
@@ -61,6 +63,16 @@ class Decided(Event, frozen=True):
     clock: int
 
 
+class Improved(Event, frozen=True):
+    """What all robots have decided by now is cheaper than all before; who has no value counts as stepping aside.
+
+    No robot reports it: it follows from what they have decided, and stands in journals only.
+    """
+
+    cost: float | int
+    assignment: dict[str, int]
+
+
 class Settled(Event, frozen=True):
     """A robot has dealt with its packet: its NCCC clock, and its constraint checks since the start of the run."""
 
@@ -83,5 +95,5 @@ class Lost(Event, frozen=True):
     why: str
 
 
-AnyEvent = Began | Registered | Sent | Received | Decided | Settled | Concluded | Lost
+AnyEvent = Began | Registered | Sent | Received | Decided | Improved | Settled | Concluded | Lost
 Observer = Callable[[AnyEvent], None]

@@ -7,13 +7,15 @@ from it; robots do not know that it is kept.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import msgspec
 
-from robochoc.observers.events import AnyEvent, Began, Event, Sent, Settled
+from robochoc.observers.events import AnyEvent, Began, Decided, Event, Improved, Sent, Settled
+from robochoc.observers.objective import Objective
 from robochoc.outcome import Metrics, Outcome
+from robochoc.problem import INFINITE, natural
 
 VERSION = 1
 
@@ -46,13 +48,17 @@ Line = AnyEvent | Header | Ended
 
 
 class Recorder:
-    """An observer that keeps events, and makes a journal of them."""
+    """An observer that keeps events, and makes a journal of them.
+
+    With an `objective`, it notes when what the robots have decided is the cheapest so far, in runs that minimise.
+    """
 
     outcome: Outcome | None = None
     """How the run ended; None: not yet, or it broke off."""
 
-    def __init__(self, header: Header) -> None:
+    def __init__(self, header: Header, objective: Callable[[], Objective] | None = None) -> None:
         self._header = header
+        self._objective = objective
         self._runs: list[list[AnyEvent]] = []
 
     def __call__(self, event: AnyEvent) -> None:
@@ -67,12 +73,36 @@ class Recorder:
         Robots report their events in bundles, so each run's are put in the order of their times; events of equal
         times stay in the order in which they came, which is each robot's own.
         """
-        events = (event for run in self._runs for event in sorted(run, key=lambda event: event.t))
+        events = (event for run in self._runs for event in self._told(run))
         lines: list[object] = [self._header, *events]
         if self.outcome:
             lines.append(Ended(outcome=self.outcome))
         encode = msgspec.json.Encoder().encode
         return b"".join(encode(line) + b"\n" for line in lines)
+
+    def _told(self, run: Sequence[AnyEvent]) -> Iterator[AnyEvent]:
+        """The events of one run in order, with improvements among them."""
+        events = sorted(run, key=lambda event: event.t)
+        opening = run[0]
+        if self._objective is None or not isinstance(opening, Began) or opening.minimises is not True:
+            return iter(events)
+        return improvements(events, self._objective())
+
+
+def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[AnyEvent]:
+    """`events`, and after each that makes what the robots have decided cheaper than ever an `Improved`."""
+    best = INFINITE
+    own: dict[str, dict[str, int]] = {}
+    for event in events:
+        yield event
+        if not isinstance(event, Decided):
+            continue
+        own[event.robot] = event.assignment
+        objective.change({event.robot: event.assignment})
+        if objective.cost < best:
+            best = objective.cost
+            values = {name: value for robot in sorted(own, key=natural) for name, value in own[robot].items()}
+            yield Improved(t=event.t, cost=best, assignment=values)
 
 
 @dataclass(frozen=True)

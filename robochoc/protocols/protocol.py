@@ -30,6 +30,9 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """
 
 
+NO_SETTINGS = Settings()
+
+
 class Protocol(ABC):
     """One robot's side of a protocol.
 
@@ -39,7 +42,7 @@ class Protocol(ABC):
 
     messages: ClassVar[Any]
     traits: ClassVar[Traits] = Traits()
-    settings: Settings = Settings()
+    settings: Settings = NO_SETTINGS
     """The defaults; the host puts what was asked for in their place before `start`."""
     chance: Callable[[], float]
     """Draws from [0, 1): the host's, seeded for each robot. There before `start`."""

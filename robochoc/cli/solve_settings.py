@@ -1,0 +1,100 @@
+"""What `robochoc solve` is asked for: how its options are parsed, and which of them do not go together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from robochoc.cli.order import GIVEN
+
+WITHDRAWALS = ("fewest", "maximal")
+SATISFIES = "abt"
+MINIMISES = "syncbb"
+"""What solves a team without costs, and one with costs, unless something else is asked for."""
+
+
+class SolveCommand(click.Command):
+    """Lets `--withdraw` and `--spare` stand alone: the word after them is their value only when it can be one."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Give a bare option its value."""
+        plain = args.index("--") if "--" in args else len(args)
+        for place, word in enumerate(args[:plain]):
+            following = args[place + 1] if place + 1 < len(args) else ""
+            if word == "--withdraw" and following not in WITHDRAWALS:
+                args = [*args[:place], f"--withdraw={WITHDRAWALS[0]}", *args[place + 1 :]]
+            elif word == "--spare" and not following.isdecimal():
+                args = [*args[:place], "--spare=1", *args[place + 1 :]]
+        return super().parse_args(ctx, args)
+
+
+@dataclass(frozen=True)
+class Products:
+    """What is made of a run besides what is printed."""
+
+    html: Path | None
+    journal: Path | None
+    serve: bool
+
+    def __bool__(self) -> bool:
+        return bool(self.html or self.journal or self.serve)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is asked for of each team: by which protocol (None: by its kind), in which order, and how it is told."""
+
+    protocol: str | None
+    order: str | Path
+    as_json: bool
+    explain: bool
+
+
+def protocol_settings(given: Iterable[str]) -> dict[str, str]:
+    """`NAME=VALUE`, parsed; the last one of a name counts."""
+    found = {}
+    for word in given:
+        name, equals, value = word.partition("=")
+        if not equals or not name:
+            raise click.UsageError(
+                f"--set takes NAME=VALUE, not {word!r}; robochoc protocols NAME shows what can be set"
+            )
+        found[name] = value
+    return found
+
+
+def check_settings(settings: dict[str, Any]) -> None:
+    """Options that would be ignored are wrong usage."""
+    if settings["runtime"] != "simulator" and (settings["delay"] or settings["schedule"] != "concurrent"):
+        raise click.UsageError("--delay and --schedule are the simulator's; add --runtime simulator")
+    if settings["timeout"] is not None and not settings["timeout"] > 0:
+        raise click.UsageError("--timeout takes a number of seconds")
+    if settings["delay"] and settings["schedule"] != "concurrent":
+        raise click.UsageError("--delay is for --schedule concurrent: in a random one any message may take any time")
+    if settings["protocol"] == "central":
+        _check_central(settings)
+    elif settings["count"]:
+        raise click.UsageError("--count is for --protocol central")
+    if (settings["on_loss"] or settings["spares"]) and settings["runtime"] != "processes":
+        raise click.UsageError(
+            "--on-loss and --spare are for processes, which can die; drop --runtime simulator, or write a scenario.xml"
+        )
+    if settings["spares"] and settings["on_loss"] == "fail":
+        raise click.UsageError("--spare brings robots back that died; --on-loss fail ends the run instead")
+
+
+def _check_central(settings: dict[str, Any]) -> None:
+    """There are no robots, and no second opinion."""
+    if settings["verify"]:
+        raise click.UsageError("--verify asks ACE, which is --protocol central itself")
+    asked = {name: settings[name] for name in ("withdraw", "messages", "on_loss", "spares")}
+    asked["order"] = settings["order"] != GIVEN
+    asked["set"] = settings["settings_given"]
+    for name, value in asked.items():
+        if value:
+            option = "--" + name.removesuffix("s" if name == "spares" else "").replace("_", "-")
+            raise click.UsageError(f"{option} is for robots that solve it together, not for --protocol central")

@@ -1,0 +1,181 @@
+"""What is known of a search that minimises: the objective, the best that robots tell of, bounds, and trees."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from random import Random
+
+import pytest
+from cost_problems import cost_of, random_complex_cost_team, random_cost_team, with_costs
+from problems import team_of
+
+from robochoc.anytime import best_of, bound_of, course, tree_of
+from robochoc.cli.explain import explained
+from robochoc.communication.run_result import RunResult
+from robochoc.expression import Type, parse
+from robochoc.observers.events import AnyEvent, Decided, Improved
+from robochoc.observers.journal import improvements
+from robochoc.observers.objective import Objective, aside_cost
+from robochoc.outcome import Metrics, Outcome, Place, Verdict
+from robochoc.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
+from robochoc.protocols.findings import Best, Findings, Trail
+from robochoc.solver.domain import CompiledDomain, compiled_domain
+
+PRICES = Relation("price", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1)), (4, 3, INFINITE), 7)
+PAIR = with_costs(team_of({"A": (1, 2), "B": (1, 2)}, [Constraint("C", PRICES, ("A", "B"), ("A", "B"))]))
+"""(1, 1) costs 4, (1, 2) costs 3, (2, 1) is forbidden, (2, 2) costs 7."""
+
+
+def domains(team: Team) -> dict[str, CompiledDomain]:
+    return {robot.name: compiled_domain(robot) for robot in team.robots}
+
+
+def own(team: Team, assignment: Mapping[str, int]) -> dict[str, dict[str, int]]:
+    """`assignment`, by robot."""
+    return {robot.name: {v.name: assignment[v.name] for v in robot.variables} for robot in team.robots}
+
+
+def result(assignments: Mapping[str, dict[str, int]], findings: Mapping[str, Findings] | None = None) -> RunResult:
+    return RunResult(Verdict.UNKNOWN, None, dict(assignments), Metrics(), findings=dict(findings or {}))
+
+
+# The objective
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_objective_follows_changes_and_equals_the_sum_of_all_prices(seed: int) -> None:
+    chance = Random(seed)
+    team = random_complex_cost_team(chance) if seed % 3 == 0 else random_cost_team(chance)
+    objective = Objective(team)
+    assignment = {name: chance.choice(list(variable.domain)) for name, variable in team.variables.items()}
+    objective.change(own(team, assignment))
+    for _ in range(20):
+        robot = chance.choice(team.robots)
+        values = {variable.name: chance.choice(list(variable.domain)) for variable in robot.variables}
+        assignment.update(values)
+        objective.change({robot.name: values})
+        assert objective.cost == cost_of(assignment, list(team.constraints()))
+
+
+def test_without_leave_to_step_aside_a_robot_without_values_has_no_cost() -> None:
+    objective = Objective(PAIR)
+    objective.change({"RA": {"A": 1}})
+    assert objective.cost == INFINITE
+    objective.change({"RB": {"B": 2}})
+    assert objective.cost == 3
+    objective.change({"RB": {}})
+    assert objective.cost == INFINITE
+
+
+def test_who_steps_aside_costs_its_weight_and_frees_its_constraints() -> None:
+    team = replace(PAIR, robots=(PAIR.robots[0], replace(PAIR.robots[1], weight=3)))
+    objective = Objective(team, 10)
+    assert objective.cost == 40
+    objective.change({"RA": {"A": 2}, "RB": {"B": 1}})
+    assert objective.cost == INFINITE
+    objective.change({"RB": {}})
+    assert objective.cost == 30
+    objective.change({"RA": {}, "RB": {"B": 2}})
+    assert objective.cost == 10
+
+
+def test_stepping_aside_costs_more_than_all_that_can_be_paid_without() -> None:
+    predicate = Predicate("p", ("X",), parse("eq(X, 2)", ("X",), Type.BOOLEAN))
+    soft = Constraint("S", predicate, ("A",), ("A",), cost=5)
+    hard = Constraint("H", predicate, ("B",), ("B",))
+    team = with_costs(team_of({"A": (1,), "B": (1,)}, [soft, hard, *PAIR.constraints()]))
+    assert aside_cost(team) == 1 + 5 + 7
+    assert aside_cost(team_of({"B": (1,)}, [hard])) == 1
+
+
+# The best that robots tell of
+
+
+def test_the_values_at_the_end_are_an_answer() -> None:
+    found = best_of(PAIR, result(own(PAIR, {"A": 2, "B": 2})), domains(PAIR))
+    assert found == ({"A": 2, "B": 2}, 7)
+
+
+def test_what_breaks_something_hard_is_none() -> None:
+    assert best_of(PAIR, result(own(PAIR, {"A": 2, "B": 1})), domains(PAIR)) is None
+    assert best_of(PAIR, result({"RA": {"A": 1}, "RB": {}}), domains(PAIR)) is None
+
+
+def test_the_cheapest_that_a_robot_has_heard_of_is_better_than_the_values_at_the_end() -> None:
+    findings = {
+        "RA": Findings(best=Best(4, {"RA": (1,), "RB": (1,)})),
+        "RB": Findings(best=Best(3, {"RA": (1,), "RB": (2,)})),
+    }
+    found = best_of(PAIR, result(own(PAIR, {"A": 2, "B": 2}), findings), domains(PAIR))
+    assert found == ({"A": 1, "B": 2}, 3)
+
+
+def test_who_steps_aside_in_the_best_has_no_values_in_it() -> None:
+    findings = {"RA": Findings(best=Best(11, {"RA": (2,), "RB": (None,)}))}
+    found = best_of(PAIR, result({"RA": {}, "RB": {}}, findings), domains(PAIR), 11)
+    assert found == ({"A": 2}, 11)
+
+
+def test_the_best_cycle_is_found_and_unfinished_cycles_do_not_count() -> None:
+    findings = {
+        "RA": Findings(trail=Trail([(0, 1), (1, 0), (3, 1)], 4)),  # 2, then 1 in cycles 1 and 2, then 2
+        "RB": Findings(trail=Trail([(0, 1), (1, 0), (2, 1)], 2)),  # 2, 1, 2
+    }
+    trails = {name: found.trail for name, found in findings.items() if found.trail}
+    assert list(course(PAIR, trails, domains(PAIR))) == [7, 4, 3]
+    found = best_of(PAIR, result(own(PAIR, {"A": 2, "B": 2}), findings), domains(PAIR))
+    assert found == ({"A": 1, "B": 2}, 3)
+
+
+def test_a_robot_without_a_trail_leaves_the_cycles_out() -> None:
+    findings = {"RA": Findings(trail=Trail([(0, 0)], 1)), "RB": Findings()}
+    assert best_of(PAIR, result(own(PAIR, {"A": 2, "B": 2}), findings), domains(PAIR)) == ({"A": 2, "B": 2}, 7)
+
+
+def test_bounds_of_several_roots_are_summed_and_an_infinite_one_is_none() -> None:
+    assert bound_of({"A": Findings(bound=3), "B": Findings(), "C": Findings(bound=4.0)}) == 7
+    assert bound_of({"A": Findings()}) is None
+    assert bound_of({"A": Findings(bound=INFINITE)}) is None
+
+
+# Improvements in journals
+
+
+def test_improvements_stand_right_behind_the_decision_that_made_them() -> None:
+    decisions = [("RA", {"A": 2}), ("RB", {"B": 2}), ("RA", {"A": 1}), ("RB", {"B": 1}), ("RB", {"B": 2})]
+    events: list[AnyEvent] = [
+        Decided(t=number, robot=name, assignment=values, clock=0) for number, (name, values) in enumerate(decisions)
+    ]
+    told = [event for event in improvements(events, Objective(PAIR)) if isinstance(event, Improved)]
+    assert [(event.t, event.cost, event.assignment) for event in told] == [
+        (1, 7, {"A": 2, "B": 2}),
+        (2, 3, {"A": 1, "B": 2}),
+    ]
+
+
+# Trees, explained
+
+
+def test_a_tree_is_drawn_with_its_depth_and_width() -> None:
+    places = {
+        "R1": Place(None),
+        "R2": Place("R1"),
+        "R3": Place("R2", ("R1",)),
+        "R10": Place("R2"),
+        "S": Place(None),
+    }
+    assert tree_of({name: Findings(place=place) for name, place in places.items()} | {"T": Findings()}) == places
+    outcome = Outcome("team", "dpop", "simulator", 0, Verdict.OPTIMAL, tree=places)
+    assert explained(outcome).splitlines() == [
+        "  pseudo-tree, built by the robots: depth 2, induced width 2, 2 roots ([neighbours further up])",
+        "    R1",
+        "    └── R2",
+        "        ├── R3 [R1]",
+        "        └── R10",
+        "    S",
+    ]
+
+
+def test_who_builds_no_tree_says_so() -> None:
+    assert explained(Outcome("team", "abt", "simulator", 0, Verdict.SOLUTION)) == "  abt builds no pseudo-tree"
