@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from statistics import mean
+from statistics import mean, median
 from typing import NamedTuple
 
 import dynamic
 import matplotlib as mpl
+import optimum
 import sweep
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
@@ -140,6 +141,33 @@ def _over_rates(
     return Line(f"{series.kind}, {series.tightness:g}", SERIES_STYLES[place], list(dynamic.RATES), heights)
 
 
+def draw_optimum() -> None:
+    """What each protocol that minimises needs: a dot a problem, a bar the median; a row of panels a density."""
+    runs = read_rows(optimum.DATA, optimum.Run)
+    titles = {"messages": "messages", "ncccs": "NCCCs", "bytes": "bytes", "wall_s": "seconds in the simulator"}
+    names = optimum.PROTOCOLS[::-1]
+    figure, places = plt.subplots(len(optimum.DENSITIES), len(titles), figsize=(13, 5.4), sharex="col", sharey=True)
+    for row, density in zip(places, optimum.DENSITIES, strict=True):
+        for axes, (metric, title) in zip(row, titles.items(), strict=True):
+            for height, name in enumerate(names):
+                mine = [run for run in runs if run.density == density and run.protocol == name]
+                _dots(axes, height, [getattr(run, metric) for run in mine], [run.verdict != "unknown" for run in mine])
+            axes.set(xscale="log", title=f"{title}, density {density:g}")
+            axes.set_yticks(range(len(names)), names)
+            axes.spines[["top", "right"]].set_visible(False)
+            axes.grid(axis="x", color="#e6e6e6", linewidth=0.7)
+            axes.set_axisbelow(True)
+    _save(figure, "optimum")
+
+
+def _dots(axes: Axes, height: int, values: Sequence[float], ended: Sequence[bool]) -> None:
+    """One protocol's runs, those that were broken off as open triangles, and their median."""
+    for mark, face, chosen in (("o", "#0072b2", True), (">", "white", False)):
+        here = [value for value, end in zip(values, ended, strict=True) if end is chosen]
+        axes.scatter(here, [height] * len(here), s=14, marker=mark, facecolor=face, edgecolor="#0072b2", alpha=0.7)
+    axes.plot([median(values)] * 2, [height - 0.3, height + 0.3], color="#d55e00", linewidth=2)
+
+
 # Lines with their labels
 
 
@@ -197,7 +225,7 @@ def _save(figure: Figure, name: str) -> None:
     plt.close(figure)
 
 
-DRAWN: dict[str, Callable[[], None]] = {"sweep": draw_sweep, "dynamic": draw_dynamic}
+DRAWN: dict[str, Callable[[], None]] = {"sweep": draw_sweep, "dynamic": draw_dynamic, "optimum": draw_optimum}
 
 mpl.use("svg")
 mpl.rcParams.update({"svg.hashsalt": "robochoc", "svg.fonttype": "none", "path.simplify": True})

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import dynamic
 import flagship
+import optimum
 import peers
 import simulated
 import solver
@@ -38,6 +39,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "sweep": sweep.measured,
     "variants": variants.measured,
     "dynamic": dynamic.measured,
+    "optimum": optimum.measured,
 }
 """Parts that take longer than all others together: only when they are named."""
 ALL = {**PARTS, **LONG}
