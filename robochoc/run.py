@@ -19,7 +19,7 @@ from robochoc.observers.checker import cost, has_local_solution
 from robochoc.observers.events import Began, Observer
 from robochoc.observers.objective import aside_cost
 from robochoc.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
-from robochoc.orders import CannotTurn, Order, order_of
+from robochoc.orders import CannotTurn, Order, in_order, order_of
 from robochoc.outcome import Epoch, Metrics, Outcome, Verdict
 from robochoc.problem import Team
 from robochoc.protocols.first_fit import FirstFit
@@ -37,7 +37,7 @@ from robochoc.solver.part import Brief
 
 __all__ = ["CENTRAL", "OnLoss", "Options", "Refuted", "Runtime", "ScheduleName", "Withdrawal", "solve"]
 
-FEWEST = "syncbb"
+FEWEST = "sfb"
 """The complete protocol that says who steps aside, when the one that was asked for cannot."""
 
 
@@ -171,7 +171,7 @@ class _Run:
         if protocol.traits.costs:
             brief = brief._replace(aside=aside_cost(self._team))
         while True:
-            team = journey.arranged()
+            team = self._favourable(journey.arranged(), protocol)
             self._announce(protocol)
             domains = self._domains(team)
             with self._session(protocol, team, domains, brief) as session:
@@ -184,6 +184,16 @@ class _Run:
         spent = replace(outcome.metrics + result.metrics, compile_s=self._compile_s)
         outcome = placed(replace(_without(outcome, journey), metrics=spent), journey.team, result, domains, brief.aside)
         return replace(outcome, reason=self._limit(None)) if outcome.verdict is Verdict.UNKNOWN else outcome
+
+    def _favourable(self, team: Team, protocol: type[Protocol]) -> Team:
+        """`team` in an order that soon shows who has to step aside, where neither order nor protocol was asked for."""
+        asked = self._options.order is not None or protocol is protocol_named(self._options.protocol)
+        if asked or not protocol.traits.costs:
+            return team
+        try:
+            return in_order(team, Order.DOM_DEG)
+        except CannotTurn:
+            return team
 
     # Epochs
 

@@ -13,7 +13,7 @@ from robochoc.cli.order import GIVEN
 
 WITHDRAWALS = ("fewest", "maximal")
 SATISFIES = "abt"
-MINIMISES = "syncbb"
+MINIMISES = "sfb"
 """What solves a team without costs, and one with costs, unless something else is asked for."""
 
 

@@ -152,8 +152,10 @@ class LocalProblem:
         known = [constraint.prices(others) for constraint, others in self._known(view, len(self.values))]
         return [sum(prices) for prices in zip(self.charges, *known, strict=True)]
 
-    def tables(self, domains: Mapping[str, Sequence[Value]]) -> list[CostTable]:
+    def tables(self, domains: Mapping[str, Sequence[Value]], lowest: str | None = None) -> list[CostTable]:
         """What constraints charge for every combination of values, of those whose other robots are all in `domains`.
+
+        With `lowest`, only of those among whose other robots that one is the lowest.
 
         A check for each combination that a constraint can tell apart. The own charges are not among them. Numpy's:
         see `solver/cost_table.py`, also for how large a table may be.
@@ -162,6 +164,8 @@ class LocalProblem:
 
         found = []
         for constraint in self._constraints:
+            if lowest is not None and constraint.agents[-1:] != (lowest,):
+                continue
             if set(constraint.agents) <= domains.keys():
                 checks, table = cost_table(constraint, domains, len(self.values))
                 self.checks += checks

@@ -1,0 +1,154 @@
+"""Partial assignments as rows of an array, and what one robot adds to them: for `sfb`.
+
+A row is a partial assignment: its lower bound, what its robots pay, the place of each one's value, and then, for
+each robot below in priority order, a vector: what each of that robot's values would cost it by what stands above.
+The bound is what is paid, plus the least of each vector.
+
+All costs are whole numbers. More than all constraints and charges together can come to is the `ceiling`: it stands
+for infinity, and whatever grows beyond is cut to it. So the numbers are as small as the problem allows, mostly a
+byte each.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robochoc.message import Value
+from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.compiled import LocalProblem
+
+Rows = NDArray[np.integer[Any]]
+
+BOUND, COST, VALUES = 0, 1, 2
+"""The columns of a row: its bound, what is paid, the first value's place."""
+
+_SIZES = ("<u1", "<u2", "<u4", "<i8")
+
+
+class _NAry(NamedTuple):
+    """What a constraint with robots above, too, adds to the vector in `columns`, that of its lowest robot.
+
+    `table` has an axis for the value of each robot in `ranks`, all above, one for the own value, and the vector's.
+    """
+
+    ranks: tuple[int, ...]
+    columns: slice
+    table: NDArray[Any]
+
+
+class ForwardBounds:
+    """What the robot of `problem` adds to partial assignments of those above it; `domains` are all robots' values.
+
+    It prices the constraints of which it is the last but one: the vector is that of the last. So each constraint is
+    priced once, as soon as one robot only has to choose. `most` is the most that all of these come to.
+    """
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder, domains: Sequence[Sequence[Value]]) -> None:
+        self.rank = order.rank[problem.agent]
+        self.most = 0
+        self.ceiling = 0
+        self._own = len(domains[self.rank])
+        self._largest = max(map(len, domains))
+        self._sizes = [len(domain) for domain in domains[self.rank + 1 :]]
+        self._starts = np.cumsum([0, *self._sizes])
+        self._prices: NDArray[Any] = np.zeros((self._own, self._starts[-1]))
+        self._n_ary: list[_NAry] = []
+        above = dict(zip(order.names[: self.rank], domains, strict=False))
+        for place, name in enumerate(order.names[self.rank + 1 :]):
+            columns = slice(int(self._starts[place]), int(self._starts[place + 1]))
+            for _, agents, charges in problem.tables({**above, name: domains[self.rank + 1 + place]}, lowest=name):
+                self.most += int(charges[np.isfinite(charges)].max(initial=0))
+                table = np.moveaxis(charges, -1, -2)
+                if len(agents) == 1:
+                    self._prices[:, columns] += table
+                else:
+                    self._n_ary.append(_NAry(tuple(order.rank[one] for one in agents[:-1]), columns, table))
+
+    def count_up_to(self, ceiling: int) -> None:
+        """From now on, costs are counted up to `ceiling`."""
+        self.ceiling = ceiling
+        largest = max(2 * ceiling, self._largest)
+        self._type = np.dtype(next(size for size in _SIZES if largest <= np.iinfo(size).max))
+        self._prices = self._cut(self._prices)
+        self._n_ary = [one._replace(table=self._cut(one.table)) for one in self._n_ary]
+
+    def nothing(self, charges: Sequence[Sequence[float]]) -> Rows:
+        """The partial assignment of no robot, where all robots' values are charged as `charges` has it."""
+        bound = sum(min(charged) for charged in charges)
+        row = [bound, 0, *(charge for charged in charges for charge in charged)]
+        return self._cut(np.array([row], np.float64))
+
+    def read(self, content: bytes, count: int) -> Rows:
+        """The `count` partial assignments, of all robots above, in `content`: what `tobytes` made of them there."""
+        return np.frombuffer(content, self._type).reshape(count, self._first + self._own + int(self._starts[-1]))
+
+    @property
+    def width(self) -> int:
+        """How many bytes an extended partial assignment takes."""
+        return (self._first + 1 + int(self._starts[-1])) * self._type.itemsize
+
+    def extended(self, rows: Rows, least: int) -> Rows:
+        """All partial assignments that `rows` and an own value make and that may cost less than `least`.
+
+        The lowest bounds first; where they are the same, those which leave others the most.
+        """
+        own = rows[:, self._first : self._first + self._own]
+        before = rows[:, BOUND].astype(np.int64) - own.min(axis=1)  # the bound, without this robot's part
+        row, value = np.nonzero(before[:, None] + own < least)
+        vectors = self._vectors(rows, row, value)
+        costs = rows[row, COST].astype(np.int64) + own[row, value]
+        bounds = costs + self._cheapest(vectors).sum(axis=1, dtype=np.int64)
+        (kept,) = np.nonzero(bounds < least)
+        kept = kept[np.lexsort((vectors[kept].sum(axis=1, dtype=np.int64), bounds[kept]))]
+        extended = np.empty((len(kept), self._first + 1 + vectors.shape[1]), self._type)
+        extended[:, BOUND] = bounds[kept]
+        extended[:, COST] = costs[kept]
+        extended[:, VALUES : self._first] = rows[row[kept], VALUES : self._first]
+        extended[:, self._first] = value[kept]
+        extended[:, self._first + 1 :] = vectors[kept]
+        return extended
+
+    def completed(self, rows: Rows) -> tuple[int, list[int]]:
+        """The cheapest assignment that `rows`, of all robots but this one, and an own value make; and its cost."""
+        costs = rows[:, COST, None].astype(np.int64) + rows[:, self._first :]
+        row, value = divmod(int(costs.argmin()), self._own)
+        return int(costs[row, value]), [*rows[row, VALUES : self._first].tolist(), value]
+
+    def _vectors(self, rows: Rows, row: NDArray[np.intp], value: NDArray[np.intp]) -> Rows:
+        """What the robots below would have to pay, once each of the rows at `row` has the own `value`."""
+        vectors = rows[row, self._first + self._own :]
+        vectors += self._prices[value]
+        np.minimum(vectors, self.ceiling, out=vectors)
+        for ranks, columns, table in self._n_ary:
+            chosen = tuple(rows[row, VALUES + rank] for rank in ranks)
+            priced = vectors[:, columns] + table[(*chosen, value)]
+            vectors[:, columns] = np.minimum(priced, self.ceiling)
+        return vectors
+
+    def _cheapest(self, vectors: Rows) -> Rows:
+        """The least of each robot's vector."""
+        if len(set(self._sizes)) > 1:
+            return np.minimum.reduceat(vectors, self._starts[:-1], axis=1)
+        blocks = vectors.reshape(len(vectors), len(self._sizes), self._sizes[0])
+        least = blocks[:, :, 0].copy()
+        for place in range(1, self._sizes[0]):  # many short rows: by columns it is four times as fast
+            np.minimum(least, blocks[:, :, place], out=least)
+        return least
+
+    def _cut(self, costs: NDArray[Any]) -> Rows:
+        return np.asarray(np.minimum(costs, self.ceiling), self._type)
+
+    @property
+    def _first(self) -> int:
+        """The column after the values of those above: the own value's, or the own vector's first."""
+        return VALUES + self.rank
+
+
+def dearest(charges: Sequence[float]) -> int:
+    """The most of `charges` that is not infinite."""
+    return int(max((charge for charge in charges if charge < math.inf), default=0))
