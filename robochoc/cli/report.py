@@ -83,7 +83,7 @@ def _verdict(team: Team, outcome: Outcome) -> str:
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             who = "some step" if outcome.assignment else "all step"
             if outcome.verdict is Verdict.OPTIMAL:
-                who = "as few as possible step"
+                who = "as few as possible (proven) step"
             whole = left or " for the whole team"
             because = f" ({why})" if why else ""
             return f"no solution{whole}{because}; {who} aside, checked against every constraint"
