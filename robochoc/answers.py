@@ -45,7 +45,7 @@ def placed(outcome: Outcome, team: Team, result: RunResult, domains: Domains, as
     `aside` is what it cost that a robot of weight 1 does so; None where nothing was minimised. Robots that were lost
     before are withdrawn as well. Raises `Refuted`.
     """
-    outcome = replace(outcome, verdict=Verdict.UNKNOWN, verified=False, tree=tree_of(result.findings))
+    outcome = replace(outcome, verdict=Verdict.UNKNOWN, verified=False, confirmed=False, tree=tree_of(result.findings))
     ended = result.verdict is Verdict.SOLUTION
     assignment: Mapping[str, int] | None = joined(result.assignments) if ended else None
     if aside is not None and not ended:

@@ -77,6 +77,7 @@ class Epoch:
     lost: tuple[str, ...] = ()
     bound: float | None = None
     tree: dict[str, Place] = field(default_factory=dict)
+    confirmed: bool = False
 
 
 @dataclass(frozen=True)
@@ -110,6 +111,8 @@ class Outcome:
     """No assignment costs less (with withdrawal: no fewer robots, by weight, step aside); None: nobody can tell."""
     tree: dict[str, Place] = field(default_factory=dict)
     """The pseudo-tree that the robots have built, if their protocol builds one."""
+    confirmed: bool = False
+    """Whether the central judge, who was asked, comes to the same `no-solution` or the same least cost."""
     epochs: tuple[Epoch, ...] = ()
     """What happened in each epoch; empty where there was but one, as nothing changed."""
 

@@ -37,6 +37,27 @@ def refuse_unfit(team: Team, options: Options, protocol: type[Protocol]) -> None
         refuse(team, "--spare", Traits())
 
 
+def refuse_central(team: Team, options: Options) -> None:
+    """Raise `Unsupported` for what the options ask of the central judge and it does not do."""
+    refuse(team, options.protocol, Traits(partially_known=True, costs=True))
+    if options.count:
+        refuse_scenario(team, "--count")
+        if team.kind is Kind.DISWCSP:
+            raise Unsupported(
+                f"{team.name} is a DisWCSP, where every assignment that breaks nothing hard is a solution; --count is"
+                " for problems without costs"
+            )
+        if options.withdraw is not None:
+            raise Unsupported("--count is of solutions for all robots; --withdraw asks who can do without")
+    if options.withdraw is not None:
+        refuse_scenario(team, "--withdraw")
+    if options.withdraw is Withdrawal.MAXIMAL:
+        raise Unsupported(
+            "--withdraw maximal is settled by the robots, in priority order; the central judge finds the fewest"
+            " (--withdraw fewest)"
+        )
+
+
 def refuse_scenario(team: Team, option: str) -> None:
     """Raise `Unsupported` when the problem changes over time."""
     if team.dynamic:

@@ -15,17 +15,18 @@ from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.session import Session
 from robochoc.communication.simulator import Simulation
 from robochoc.epochs import Journey, Played
-from robochoc.observers.checker import cost, has_local_solution
+from robochoc.observers.checker import has_local_solution
 from robochoc.observers.events import Began, Observer
 from robochoc.observers.objective import aside_cost
+from robochoc.opinion import absent, contradiction, decided, total_cost
 from robochoc.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.orders import CannotTurn, Order, in_order, order_of
 from robochoc.outcome import Epoch, Metrics, Outcome, Verdict
-from robochoc.problem import Team
+from robochoc.problem import INFINITE, Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
-from robochoc.refusals import refuse, refuse_scenario, refuse_unfit
+from robochoc.refusals import refuse_central, refuse_unfit
 from robochoc.registry import protocol_named
 from robochoc.solver.ace import AceProcess, SolverTimeout
 from robochoc.solver.cache import SolutionCache
@@ -131,8 +132,8 @@ class _Run:
             outcome = _without(self._summary(), journey)
         else:
             reason = f"{alone} alone has none: its private constraints leave it no local solution"
-            verified = self._options.verify and self._confirmed(journey.team, alone)
-            epoch = Epoch(Verdict.NO_SOLUTION, journey.team.order, verified=verified, witness=alone)
+            sure = self._confirmed(journey.team, alone)
+            epoch = Epoch(Verdict.NO_SOLUTION, journey.team.order, verified=sure, witness=alone, confirmed=sure)
             outcome = replace(self._told(epoch), reason=reason)
         if outcome.verdict is Verdict.UNKNOWN and outcome.reason is None:
             outcome = replace(outcome, reason=self._limit(outcome.witness))
@@ -183,7 +184,12 @@ class _Run:
                 raise RobotsLost(result.lost)
         spent = replace(outcome.metrics + result.metrics, compile_s=self._compile_s)
         outcome = placed(replace(_without(outcome, journey), metrics=spent), journey.team, result, domains, brief.aside)
-        return replace(outcome, reason=self._limit(None)) if outcome.verdict is Verdict.UNKNOWN else outcome
+        if outcome.verdict is Verdict.UNKNOWN:
+            return replace(outcome, reason=self._limit(None))
+        if outcome.verdict is not Verdict.OPTIMAL or brief.aside is None:
+            return outcome
+        total = total_cost(journey.team, outcome.assignment, brief.aside)
+        return replace(outcome, confirmed=self._confirmed(journey.team, total=total, aside=int(brief.aside)))
 
     def _favourable(self, team: Team, protocol: type[Protocol]) -> Team:
         """`team` in an order that soon shows who has to step aside, where neither order nor protocol was asked for."""
@@ -209,8 +215,12 @@ class _Run:
             lost=tuple(result.lost),
         )
         if result.verdict is Verdict.NO_SOLUTION:
-            return replace(epoch, verified=self._options.verify and self._confirmed(team, None))
-        return answered(epoch, team, result, traits, self._compiled)
+            sure = self._confirmed(team)
+            return replace(epoch, verified=sure, confirmed=sure)
+        epoch = answered(epoch, team, result, traits, self._compiled)
+        if epoch.verdict is not Verdict.OPTIMAL or epoch.cost is None:
+            return epoch
+        return replace(epoch, confirmed=self._confirmed(team, total=epoch.cost))
 
     def _told(self, epoch: Epoch) -> Outcome:
         """The outcome of a run that ended with `epoch`."""
@@ -221,6 +231,7 @@ class _Run:
             cost=epoch.cost,
             witness=epoch.witness,
             verified=epoch.verified,
+            confirmed=epoch.confirmed,
             bound=epoch.bound,
             tree=epoch.tree,
             metrics=replace(epoch.metrics, compile_s=self._compile_s),
@@ -237,9 +248,7 @@ class _Run:
 
     def centrally(self) -> Outcome:
         """One model of all files, decided by ACE; if the problem changes over time, one for each epoch."""
-        refuse(self._team, CENTRAL, Traits(partially_known=True))
-        if self._options.count:
-            refuse_scenario(self._team, "--count")
+        refuse_central(self._team, self._options)
         self._outcome = replace(self._outcome, runtime=CENTRAL)
         count = None
         with AceProcess() as warm:
@@ -248,31 +257,43 @@ class _Run:
                 changes = self._team.scenario[events - 1].changes if events else ()
                 opened = ", ".join(map(described, changes)) or "nothing" if events else "the start"
                 count = self._judged(changed_by(self._team, events), opened)
-        return replace(self._summary(), count=count)
+        outcome = replace(self._summary(), count=count)
+        aside = absent(self._team, outcome.assignment) if self._options.withdraw and outcome.verified else ()
+        return replace(outcome, withdrawn=aside)
 
     def _judged(self, team: Team, opened: str) -> int | None:
         """One epoch, decided by ACE; the number of solutions if that was asked for."""
         began = time.monotonic()
-        judgement = self._judge().judge(team, count=self._options.count)
+        count = None
+        if self._options.count:
+            judgement = self._judge().judge(team, count=True)
+            epoch, count = Epoch(judgement.verdict, team.order), judgement.count
+        else:
+            epoch = decided(self._judge(), team, self._options, int(aside_cost(team)))
+        if epoch.verified:
+            aside = absent(team, epoch.assignment) if self._options.withdraw else ()
+            check(team, epoch.assignment, aside, maximal=epoch.verdict is not Verdict.UNKNOWN)
         spent = Metrics(wall_s=time.monotonic() - began)
-        epoch = Epoch(judgement.verdict, team.order, opened, judgement.assignment, metrics=spent)
-        if judgement.verdict in {Verdict.SOLUTION, Verdict.OPTIMAL} and judgement.count is None:
-            check(team, judgement.assignment, ())
-            epoch = replace(epoch, cost=cost(team, judgement.assignment), verified=True)
-        self._epochs.append(epoch)
-        return judgement.count
+        self._epochs.append(replace(epoch, opened_by=opened, metrics=spent))
+        return count
 
-    def _confirmed(self, team: Team, alone: str | None) -> bool:
-        """Let the central judge decide what the robots have found to have no solution.
+    def _confirmed(
+        self, team: Team, alone: str | None = None, *, total: float = INFINITE, aside: int | None = None
+    ) -> bool:
+        """Whether the central judge comes to the same: that the least cost is `total`, or that there is no solution.
 
         A robot that had none `alone` is looked at by the checker as well, as judge and compiler share their encoding.
-        Raises `Refuted` when one of them finds a solution.
+        Raises `Refuted` when one of them finds something else.
         """
-        opinion = self._judge().judge(team, count=False)
-        if opinion.verdict is Verdict.SOLUTION or (alone is not None and has_local_solution(team[alone])):
-            name = self._options.protocol
-            raise Refuted(f"{name} says that {team.name} has no solution, and a judge has found one")
-        return opinion.verdict is Verdict.NO_SOLUTION
+        if not self._options.verify:
+            return False
+        opinion = self._judge().judge(team, aside=aside)
+        against = contradiction(opinion, total)
+        if against or (alone is not None and has_local_solution(team[alone])):
+            claim = "no solution" if total == INFINITE else f"a solution of the least cost, {total:,}"
+            found = f"{team.name} has {claim}, and a judge has found {against or 'one'}"
+            raise Refuted(f"{self._options.protocol} says that {found}")
+        return opinion.verdict is not Verdict.UNKNOWN
 
     def _judge(self) -> Judge:
         return Judge(self._cache, self._deadline, lambda: self._show("ACE decides the whole team"), self._solver)

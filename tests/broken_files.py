@@ -117,6 +117,14 @@ SCHEMA = [
         [(R3, 'nbTopics="1"', 'nbTopics="one"')],
         (R3, "<topics", ('nbTopics="one"', "a number")),
     ),
+    *(
+        case(
+            f"a weight of {weight[:7]}",
+            [(R3, 'type="DisCSP"', f'type="DisCSP" weight="{weight}"')],
+            (R3, "<presentation", ('weight="' + weight[:7], "in <presentation> is not allowed", "from 1 to 1000000")),
+        )
+        for weight in ("0", "-1", "x", "1.5", "", "1000001", "9" * 5000, "it's")
+    ),
     case("text where none belongs", [(R3, "<topic ", "here <topic ")], (R3, "<topics", "text inside <topics>")),
     case("an element in a text", [(R2, ">1..4 7 9<", "><b/><")], (R2, "<b/>", "<domain>, which holds text only")),
     case("MathML", [(R2, "functional>", "mathml>")], (R2, "<mathml>", ("<mathml> does not belong", "<functional>"))),

@@ -261,7 +261,8 @@ def robots(draw: st.DrawFn) -> Robot:
         Topic(f"/t{i}", draw(st.sampled_from([Topic.type, "std/Int"])), x=draw(where))
         for i in range(draw(st.integers(0, 2)))
     )
-    return Robot("Robot1", variables, kind, private, parents, children, topics)
+    weight = draw(st.sampled_from((1, 1, 2, 1_000_000)))
+    return Robot("Robot1", variables, kind, private, parents, children, topics, weight=weight)
 
 
 @settings(

@@ -42,6 +42,7 @@ def compile_team(
     private    constraints on own variables only
     local      solutions of these
     groups     of local solutions that look alike from outside
+    cost       of the cheapest local solution of a group, from the cheapest group to the dearest (DisWCSP)
     how        ACE: solved now; cached: before; equal: for a robot above; direct: without solver
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.formats import find_teams
@@ -77,15 +78,11 @@ def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_js
     from robochoc.cli.progress import progress_line
     from robochoc.communication.run_result import Progress
     from robochoc.formats import on_one_line, read_team
-    from robochoc.problem import Kind
     from robochoc.solver.compile import Compilation, Compiler, CompileTimeout
     from robochoc.solver.domain import TooManySolutions
-    from robochoc.solver.encoding import Unsupported
 
     began = time.monotonic()
     team = read_team(folder)
-    if team.kind is Kind.DISWCSP:
-        raise Unsupported(f"{team.name} is a DisWCSP; local problems with costs are not compiled yet")
     found: list[Compilation | TooManySolutions | CompileTimeout] = []
     with progress_line(team.name) as progress, Compiler(bounds, cache) as compiler:
         for number, robot in enumerate(team.robots, 1):

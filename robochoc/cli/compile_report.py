@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from robochoc.formats import encodable, on_one_line
-from robochoc.problem import Team
+from robochoc.problem import Kind, Team
 from robochoc.solver.compile import Compilation, CompileTimeout
 from robochoc.solver.domain import TooManySolutions
 
@@ -57,13 +57,16 @@ def _row(team: Team, one: Found) -> dict[str, Any]:
     if not isinstance(one, Compilation):
         return {**row, "reason": str(one)}
     known = {"local_solutions": one.domain.total, "groups": len(one.domain.values)}
+    if one.domain.costs and team.kind is Kind.DISWCSP:
+        known |= {"cheapest": int(min(one.domain.costs)), "dearest": int(max(one.domain.costs))}
     return {**row, **known, "seconds": round(one.seconds, 6), "source": str(one.source)}
 
 
 def _table(team: Team, found: Sequence[Found]) -> Table:
     table = Table(title=escape(on_one_line(team.name)), title_justify="left", box=None, header_style="bold")
     table.add_column("robot", no_wrap=True)
-    for heading in ("variables", "seen", "private", "local", "groups", "time"):
+    costs = ("cost",) if team.kind is Kind.DISWCSP else ()
+    for heading in ("variables", "seen", "private", "local", "groups", *costs, "time"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("how", no_wrap=True)
     for one in found:
@@ -73,6 +76,7 @@ def _table(team: Team, found: Sequence[Found]) -> Table:
         table.add_row(
             escape(on_one_line(row["robot"])),
             *("?" if count is None else f"{count:,}" for count in counts),
+            *(f"{row['cheapest']:,}..{row['dearest']:,}" if "cheapest" in row else "?" for _ in costs),
             "?" if seconds is None else f"{1000 * seconds:,.1f} ms",
             "limit reached" if source is None else {"ace": "ACE", "cache": "cached"}.get(source, source),
         )

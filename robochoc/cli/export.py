@@ -17,7 +17,8 @@ from robochoc.cli.paths import InputPath, OutputFile
 def export(folder: Path, kind: str, output: Path | None) -> None:  # noqa: ARG001 - the only format there is
     """Write the problem of the team in the folder TEAM, all its files merged, for other solvers.
 
-    xcsp3: one XCSP3-core file (tables, allDifferent), which ACE, Choco and others read.
+    xcsp3: one XCSP3-core file (tables, allDifferent; of a DisWCSP, the sum of costs to be minimised), which ACE, Choco
+    and others read.
     """
     from robochoc.files import write_atomically
     from robochoc.formats import read_team

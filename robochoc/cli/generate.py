@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from robochoc.cli.failure import invalid_input_fails
 from robochoc.cli.paths import InputPath
+
+if TYPE_CHECKING:
+    from robochoc.problem import Team
 
 
 @click.group(short_help="Write a team of a known family.")
@@ -54,14 +58,23 @@ def queens3d(n: int, model: str, robots: str, output: Path | None, *, force: boo
 @click.option("--agents", required=True, type=click.IntRange(1, 1000), help="Robots, of one variable each.")
 @click.option("--domain", required=True, type=click.IntRange(1, 1000), help="Values of each variable.")
 @click.option("--density", required=True, type=float, help="Part of all pairs of robots that is constrained, 0 to 1.")
-@click.option("--tightness", required=True, type=float, help="Part of all pairs of values that is forbidden, 0 to 1.")
+@click.option(
+    "--tightness",
+    type=float,
+    help="Part of all pairs of values that is forbidden, 0 to 1  [default: 0 with --max-cost, else required]",
+)
+@click.option(
+    "--max-cost",
+    type=click.IntRange(0, 1_000_000),
+    help="Make a DisWCSP: each pair of values that is not forbidden costs from 0 to this, all as likely.",
+)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="The same seed, the same problem.")
 @click.option("--connected", is_flag=True, help="Draw graphs of constraints until one is connected.")
 @click.option(
     "-o",
     "--output",
     type=InputPath(),
-    help="Folder to write  [default: instances/random-AGENTS-DOMAIN-DENSITY-TIGHTNESS-SEED[-connected]]",
+    help="Folder to write  [default: instances/random-AGENTS-DOMAIN-DENSITY-TIGHTNESS[-costMAX]-SEED[-connected]]",
 )
 @click.option("--force", is_flag=True, help="Replace the folder if it is there.")
 @invalid_input_fails
@@ -71,15 +84,52 @@ def random_problem(output: Path | None, *, force: bool, **problem: Any) -> None:
     Of all pairs of robots exactly the part DENSITY is constrained, and each constraint forbids exactly the part
     TIGHTNESS of all pairs of values. Robot3 has the variable V3. At --agents 20 --domain 10 --density 0.2, about half
     of the problems have a solution at --tightness 0.65; there they are hardest.
+
+    With --max-cost, what is not forbidden costs something, and the sum of costs is to be minimised: --agents 10
+    --domain 5 --density 0.4 --max-cost 100.
     """
-    from robochoc.formats import write_team
     from robochoc.generators.random_csp import random_csp
 
+    if problem["tightness"] is None and problem["max_cost"] is None:
+        raise click.UsageError("Missing option '--tightness' (without --max-cost).")
+    problem["tightness"] = problem["tightness"] or 0
+    _write(lambda: random_csp(**problem), output, replace=force)
+
+
+@generate.command(short_help="Graph colouring with too few colours: a cost for each conflict.")
+@click.option("--agents", required=True, type=click.IntRange(1, 1000), help="Robots, of one variable each.")
+@click.option("--colors", default=3, show_default=True, type=click.IntRange(1, 1000), help="Values of each variable.")
+@click.option("--degree", required=True, type=float, help="Neighbours of a robot, on the average.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="The same seed, the same problem.")
+@click.option("--connected", is_flag=True, help="Draw graphs until one is connected.")
+@click.option(
+    "-o",
+    "--output",
+    type=InputPath(),
+    help="Folder to write  [default: instances/coloring-AGENTS-COLORS-DEGREE-SEED[-connected]]",
+)
+@click.option("--force", is_flag=True, help="Replace the folder if it is there.")
+@invalid_input_fails
+def coloring(output: Path | None, *, force: bool, **problem: Any) -> None:  # noqa: ANN401 - `coloring`'s own
+    """Random graphs to be coloured (a DisWCSP): two neighbours of one colour cost 1.
+
+    The graph has exactly AGENTS x DEGREE / 2 edges, every such graph as likely as any other. Robot3 has the variable
+    V3.
+    """
+    from robochoc.generators.coloring import coloring as graph_to_color
+
+    _write(lambda: graph_to_color(**problem), output, replace=force)
+
+
+def _write(make: Callable[[], Team], output: Path | None, *, replace: bool) -> None:
+    """Write what `make` makes; numbers that do not fit together are wrong usage."""
+    from robochoc.formats import write_team
+
     try:
-        team = random_csp(**problem)
+        team = make()
     except ValueError as error:
         raise click.UsageError(str(error)) from None
     folder = output or Path("instances") / team.name
-    write_team(team, folder, replace=force)
+    write_team(team, folder, replace=replace)
     constraints = sum(len(robot.shared) for robot in team.robots)
     click.echo(f"{folder}: {len(team.robots)} robots, {constraints} constraints; next: robochoc solve {folder}")

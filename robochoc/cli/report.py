@@ -69,6 +69,7 @@ def _verdict(team: Team, outcome: Outcome) -> str:
     why = outcome.witness and f"{outcome.witness} has derived the empty nogood"
     if outcome.reason and not outcome.epochs:
         why = outcome.reason
+    confirmed = ", confirmed centrally" * outcome.confirmed
     left = " for the robots that are left" if outcome.lost else ""
     match outcome.verdict:
         case Verdict.NO_SOLUTION:
@@ -79,14 +80,14 @@ def _verdict(team: Team, outcome: Outcome) -> str:
         case _ if outcome.count is not None:
             return f"{outcome.count:,} solution{'s' * (outcome.count != 1)}"
         case Verdict.SOLUTION | Verdict.OPTIMAL if not outcome.aside:
-            return f"{_proven(team, outcome)}{left}, checked against every constraint"
+            return f"{_proven(team, outcome)}{left}, checked against every constraint{confirmed}"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             who = "some step" if outcome.assignment else "all step"
             if outcome.verdict is Verdict.OPTIMAL:
                 who = "as few as possible (proven) step"
             whole = left or " for the whole team"
             because = f" ({why})" if why else ""
-            return f"no solution{whole}{because}; {who} aside, checked against every constraint"
+            return f"no solution{whole}{because}; {who} aside, checked against every constraint{confirmed}"
 
 
 def _proven(team: Team, outcome: Outcome) -> str:

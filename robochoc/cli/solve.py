@@ -135,7 +135,7 @@ if TYPE_CHECKING:
 @click.option(
     "--verify",
     is_flag=True,
-    help="Have a no-solution confirmed by the central judge, on all files merged: two ways must agree.",
+    help="Have a no-solution or a least cost confirmed by the central judge, on all files merged: two ways must agree.",
 )
 @local_options
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a team, and nothing else, on standard output.")

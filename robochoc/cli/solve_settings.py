@@ -92,6 +92,8 @@ def _check_central(settings: dict[str, Any]) -> None:
     if settings["verify"]:
         raise click.UsageError("--verify asks ACE, which is --protocol central itself")
     asked = {name: settings[name] for name in ("withdraw", "messages", "on_loss", "spares")}
+    if asked["withdraw"] == "fewest":
+        del asked["withdraw"]
     asked["order"] = settings["order"] != GIVEN
     asked["set"] = settings["settings_given"]
     for name, value in asked.items():

@@ -35,6 +35,7 @@ class _EpochForm(msgspec.Struct, omit_defaults=True):
     wall_s: float
     verified: bool
     lost: list[str] = []
+    confirmed: bool = False
 
 
 class _Form(msgspec.Struct, omit_defaults=True):
@@ -55,6 +56,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     order: str | None = None
     bound: float | int | None = None
     tree: dict[str, Place] = {}
+    confirmed: bool = False
 
 
 def result_json(outcome: Outcome) -> bytes:
@@ -88,6 +90,7 @@ def result_json(outcome: Outcome) -> bytes:
         order=outcome.order,
         bound=outcome.bound,
         tree=outcome.tree,
+        confirmed=outcome.confirmed,
     )
     return msgspec.json.encode(form)
 
@@ -107,6 +110,7 @@ def _epoch(epoch: Epoch) -> _EpochForm:
         wall_s=round(spent.wall_s, 6),
         verified=epoch.verified,
         lost=list(epoch.lost),
+        confirmed=epoch.confirmed,
     )
 
 
@@ -121,6 +125,7 @@ def _epoch_of(form: _EpochForm) -> Epoch:
         metrics=metrics,
         verified=form.verified,
         lost=tuple(form.lost),
+        confirmed=form.confirmed,
     )
 
 
@@ -149,5 +154,6 @@ def read_result(content: bytes) -> Outcome:
         order=form.order,
         bound=form.bound,
         tree=form.tree,
+        confirmed=form.confirmed,
         epochs=tuple(map(_epoch_of, form.epochs)),
     )

@@ -86,7 +86,9 @@ class _Reader:
         children = tuple(self._children(context, copies))
         self._check_neighbours(parents, children)
         self._report.finish()
-        robot = Robot(self._name, variables, kind, private, parents, children, topics, self._report.file)
+        weight = int(attribute(presentation, "weight") or Robot.weight)
+        file = self._report.file
+        robot = Robot(self._name, variables, kind, private, parents, children, topics, file, weight=weight)
         unsaid = frozenset(
             attribute(agent, "name") for agent in self._agents("agents_children") if agent.get("variable") is None
         )

@@ -23,6 +23,8 @@ _PARTS = (
     re.compile(
         r"(?s)The value '(?P<value>.*)' is not (?:an element of the set|accepted by the pattern) (?P<rule>.*)\.$"
     ),
+    re.compile(r"(?s): '(?P<value>.*)' is not a valid value of the atomic type (?P<rule>'[^']*')\.$"),
+    re.compile(r"(?s)The value '(?P<value>.*)' is greater than the maximum value allowed \((?P<rule>'[^']*')\)\.$"),
     re.compile(r"Expected is (?:one of )?\( (?P<expected>.*) \)\.$"),
 )
 """What libxml2's messages are made of."""
@@ -35,6 +37,7 @@ _PHRASES = (
     ("is required but missing", "<{element}> lacks its attribute '{missing}'", 'write <{element} {missing}="...">'),
     ("' is not allowed.", "<{element}> has no attribute '{attribute}'", "mend its spelling or delete it"),
     ("[facet", '{attribute}="{value}" in <{element}> is not allowed', "expected {rule}"),
+    ("is not a valid value of", '{attribute}="{value}" in <{element}> is not allowed', "expected {rule}"),
     ("Element content is not allowed", "an element inside <{element}>, which holds text only", "delete it"),
     ("Character content", "text inside <{element}>, where none belongs", "delete it"),
     ("", "{message}", "see the schemas in xsd/"),
@@ -46,6 +49,8 @@ _PATTERNS = {
     r"'\S+'": "a name without blanks",
     "'[0-9]{1,18}'": "a number of at most 18 digits, 0 or more",
     r"'[+\-]?[0-9]{1,18}'": "an integer of at most 18 digits",
+    "'weight'": "an integer from 1 to 1000000",
+    "'1000000'": "an integer from 1 to 1000000",
     "'solved|[0-9]{1,18} messages'": "'solved', or a number and 'messages': 200 messages",
 }
 

@@ -30,7 +30,9 @@ def robot_xml(robot: Robot) -> bytes:
     is no integer.
     """
     instance = etree.Element("instance")
-    etree.SubElement(instance, "presentation", type=robot.kind)
+    presentation = etree.SubElement(instance, "presentation", type=robot.kind)
+    if robot.weight != Robot.weight:
+        presentation.set("weight", str(robot.weight))
     _write_domains(instance, robot)
     variables = etree.SubElement(instance, "variables", nbVariables=str(len(robot.variables)))
     for variable in robot.variables:

@@ -12,14 +12,16 @@ from robochoc.solver.merged import identifiers, merged
 def xcsp3(team: Team) -> bytes:
     """The merged problem of `team` as an XCSP3-core document: tables over the true values, and allDifferent.
 
-    Variables get names that XCSP3 allows; the attribute `note` says whose variable each is. Raises `Unsupported`,
+    Variables get names that XCSP3 allows; the attribute `note` says whose variable each is. With costs it is a COP:
+    what soft constraints charge are variables too, and their sum is to be minimised. Raises `Unsupported`,
     and `SolverLost` when pycsp3, which writes it in a process of its own, fails.
     """
-    network = merged(team)
+    network, costs = merged(team)
     names = list(team.variables)
+    charged = [f"cost{number}" for number in range(1, len(costs) + 1)]
     with AceProcess(java=False) as solver:
-        document = solver.export(network, identifiers(names))
+        document = solver.export(network, identifiers([*names, *charged]), costs)
     root = etree.fromstring(document, etree.XMLParser(huge_tree=True, resolve_entities=False, no_network=True))
-    for element, name in zip(root.iterfind("variables/var"), names, strict=True):
+    for element, name in zip(root.iterfind("variables/var"), names, strict=False):
         element.set("note", f"{name} of {team.owner[name]}")
     return etree.tostring(root, pretty_print=True, xml_declaration=True, encoding="UTF-8")

@@ -1,4 +1,4 @@
-"""Uniform binary random DisCSPs: Model B, a robot a variable.
+"""Uniform binary random problems: Model B, a robot a variable; with or without costs.
 
 Gent, MacIntyre, Prosser, Smith and Walsh, "Random constraint satisfaction: flaws and structure", Constraints 6
 (2001), Section 2; Prosser, "An empirical study of phase transitions in binary constraint satisfaction problems", AIJ
@@ -10,21 +10,38 @@ As the 2001 paper shows, problems with p2 >= 1/d are flawed when they are large 
 variable of which each value alone is ruled out by a neighbour. At the sizes that protocols are compared on (up to
 some tens of variables) that is rare.
 
+With `max_cost`, pairs of values that are not forbidden cost something: each a number from 0 to `max_cost`, all as
+likely, whatever the others cost. With a tightness of 0 nothing is forbidden. That is the usual random DCOP.
+
 A seed makes the same problem on every machine and with every version of Python: of `random.Random` only the seeding
 by an integer and `random()` are used, which Python's documentation promises to keep.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterator, Mapping
 from random import Random
 
-from robochoc.problem import Child, Constraint, Domain, Parent, Relation, Robot, Semantics, Team, Variable
+from robochoc.problem import (
+    INFINITE,
+    Child,
+    Constraint,
+    Domain,
+    Kind,
+    Parent,
+    Relation,
+    Robot,
+    Semantics,
+    Team,
+    Variable,
+)
 
 MOST_AGENTS = 1000
 MOST_VALUES = 1000
 MOST_FORBIDDEN = 1_000_000
-"""Of all constraints together: so no robot's file grows beyond what can be read."""
+"""Of all constraints together: so no robot's file grows beyond what can be read. With costs: most pairs of values."""
+HIGHEST_COST = 1_000_000
 DRAWS = 1000
 """So many graphs are drawn in search of a connected one."""
 
@@ -33,12 +50,19 @@ Edge = tuple[int, int]
 
 
 def random_csp(
-    agents: int, domain: int, density: float, tightness: float, seed: int = 0, *, connected: bool = False
+    agents: int,
+    domain: int,
+    density: float,
+    tightness: float,
+    seed: int = 0,
+    *,
+    connected: bool = False,
+    max_cost: int | None = None,
 ) -> Team:
     """The team of the problem <agents, domain, density, tightness> that `seed` stands for.
 
     `Robot3` owns `V3` and holds its constraints with robots of smaller numbers. With `connected`, graphs are drawn
-    until one is connected, so that each connected graph is as likely as any other.
+    until one is connected, so that each connected graph is as likely as any other. With `max_cost`, it is a DisWCSP.
 
     Raises `ValueError` for a problem that cannot be, or is too large; its text says which number to change.
     """
@@ -46,10 +70,23 @@ def random_csp(
     count, forbidden = round(density * pairs), round(tightness * domain**2)
     if count * forbidden > MOST_FORBIDDEN:
         raise ValueError(f"{count:,} constraints of {forbidden:,} forbidden pairs are more than {MOST_FORBIDDEN:,}")
+    if max_cost is not None:
+        _check_costs(max_cost, count * rows)
     chance = Random(seed)  # noqa: S311 - a problem, not a secret
-    edges = _connected(chance, agents, count) if connected else _edges(chance, agents, count)
-    constraints = {edge: _constraint(edge, _some(chance, rows, forbidden), domain) for edge in edges}
-    name = f"random-{agents}-{domain}-{float(density)}-{float(tightness)}-{seed}{'-connected' * connected}"
+    constraints = {}
+    for edge in graph(chance, agents, count, connected=connected):
+        relation = _forbidding(edge, _some(chance, rows, forbidden), domain)
+        if max_cost is not None:
+            relation = _charging(chance, relation, domain, max_cost)
+        scope = tuple(f"V{number}" for number in edge)
+        constraints[edge] = Constraint(f"C{edge[0]}.{edge[1]}", relation, scope, scope)
+    costs = "" if max_cost is None else f"-cost{max_cost}"
+    name = f"random-{agents}-{domain}-{float(density)}-{float(tightness)}{costs}-{seed}{'-connected' * connected}"
+    return team_on(name, agents, domain, constraints, Kind.DISCSP if max_cost is None else Kind.DISWCSP)
+
+
+def team_on(name: str, agents: int, domain: int, constraints: Mapping[Edge, Constraint], kind: Kind) -> Team:
+    """The team of `Robot1`, `Robot2`, ..., where `Robot3` owns `V3`, and the lower one of an edge its constraint."""
     values = Domain("D", (range(1, domain + 1),))
     above: dict[int, list[Parent]] = {number: [] for number in range(1, agents + 1)}
     below: dict[int, list[Child]] = {number: [] for number in above}
@@ -60,6 +97,7 @@ def random_csp(
         Robot(
             name=f"Robot{number}",
             variables=(Variable(f"V{number}", values),),
+            kind=kind,
             parents=tuple(above[number]),
             children=tuple(below[number]),
         )
@@ -77,6 +115,19 @@ def _sizes(agents: int, domain: int, density: float, tightness: float) -> tuple[
         if not 0 <= share <= 1:
             raise ValueError(f"{what} is {share}; it must be from 0 to 1")
     return agents * (agents - 1) // 2, domain**2
+
+
+def _check_costs(max_cost: int, pairs: int) -> None:
+    """Raise `ValueError` unless so many pairs of values can have costs of at most `max_cost`."""
+    if not 0 <= max_cost <= HIGHEST_COST:
+        raise ValueError(f"max-cost is {max_cost}; it must be from 0 to {HIGHEST_COST}")
+    if pairs > MOST_FORBIDDEN:
+        raise ValueError(f"all constraints together have {pairs:,} pairs of values, more than {MOST_FORBIDDEN:,}")
+
+
+def graph(chance: Random, agents: int, count: int, *, connected: bool = False) -> list[Edge]:
+    """`count` pairs of robots, in ascending order, each choice as likely as any other; see `random_csp`."""
+    return _connected(chance, agents, count) if connected else _edges(chance, agents, count)
 
 
 def _edges(chance: Random, agents: int, count: int) -> list[Edge]:
@@ -115,12 +166,20 @@ def _links_all(edges: list[Edge], agents: int) -> bool:
     return len(met) == agents
 
 
-def _constraint(edge: Edge, forbidden: list[int], domain: int) -> Constraint:
+def _forbidding(edge: Edge, forbidden: list[int], domain: int) -> Relation:
     higher, lower = edge
     tuples = tuple((place // domain + 1, place % domain + 1) for place in forbidden)
-    relation = Relation(f"R{higher}.{lower}", 2, Semantics.CONFLICTS, tuples)
-    scope = (f"V{higher}", f"V{lower}")
-    return Constraint(f"C{higher}.{lower}", relation, scope, scope)
+    return Relation(f"R{higher}.{lower}", 2, Semantics.CONFLICTS, tuples)
+
+
+def _charging(chance: Random, relation: Relation, domain: int, max_cost: int) -> Relation:
+    """`relation`, which forbids pairs of values, with a cost for all others."""
+    priced: dict[tuple[int, ...], float] = dict.fromkeys(relation.tuples, INFINITE)
+    for pair in itertools.product(range(1, domain + 1), repeat=2):
+        if pair not in priced:
+            priced[pair] = int(chance.random() * (max_cost + 1))
+    listed = sorted(pair for pair, cost in priced.items() if cost)
+    return Relation(relation.name, 2, Semantics.SOFT, tuple(listed), tuple(priced[pair] for pair in listed))
 
 
 def _some(chance: Random, size: int, count: int) -> list[int]:

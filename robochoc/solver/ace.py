@@ -28,6 +28,7 @@ from typing import Self
 import msgspec
 
 from robochoc.solver.ace_words import (
+    BEST,
     LENGTH,
     Broken,
     Export,
@@ -38,6 +39,7 @@ from robochoc.solver.ace_words import (
     TableForm,
     Task,
     ToSolver,
+    codes_of,
 )
 from robochoc.solver.encoding import Codes, Network
 from robochoc.solver.propagation import propagated
@@ -57,7 +59,11 @@ class SolverLost(Exception):  # noqa: N818 - named for what happened
 
 
 class SolverTimeout(Exception):  # noqa: N818 - a limit that was reached
-    """The time was over before the solver's answer."""
+    """The time was over before the solver's answer. `best` is the cheapest solution so far, where one was sought."""
+
+    def __init__(self, best: Codes | None = None) -> None:
+        super().__init__()
+        self.best = best
 
 
 @dataclass(frozen=True)
@@ -139,17 +145,21 @@ class AceProcess:
         limit: int | None = None,
         count_only: bool = False,
         strategy: Strategy = "default",
+        costs: Codes = (),
     ) -> bool:
         """Give the solver a task, whose `answer` is to be asked for before the next. Raises `SolverLost`.
 
-        False when there was nothing left to ask, and so nothing to wait for.
+        With `costs`, the answer is one solution, for which the codes of the variables at these places sum up to the
+        least. False when there was nothing left to ask, and so nothing to wait for.
         """
-        self._question = question = _Question.of(propagated(network), limit, count_only=count_only)
+        limit = 1 if costs else limit
+        self._question = question = _Question.of(propagated(network), limit, count_only=count_only, costs=costs)
         if question.trivial:
             return False
         if self._tasks == TASKS:
             self.close()
-        self._ask(_task(question.asked, limit, count_only=count_only, strategy=strategy))
+        task = _task(question.asked, limit, count_only=count_only, strategy=strategy)
+        self._ask(msgspec.structs.replace(task, costs=list(question.costs)))
         return True
 
     def answer(self, deadline: float | None = None) -> Answer:
@@ -165,18 +175,33 @@ class AceProcess:
         word = self._hear(deadline)
         if not isinstance(word, Solved):
             raise SolverLost(f"the solver answered with a {type(word).__name__}")
-        if not word.complete and (question.limit is None or word.found < question.limit):
+        if not word.complete and (question.costs or question.limit is None or word.found < question.limit):
             raise SolverLost("the constraint solver stopped before it had seen everything")
         numbers = array("i")
         numbers.frombytes(word.solutions)
-        flat, width = numbers.tolist(), len(question.asked.domains)
-        solutions = [tuple(flat[start : start + width]) for start in range(0, len(flat), width)]
-        return question.answered(word.found, complete=word.complete, solutions=solutions)
+        return question.answered(word.found, complete=word.complete, solutions=question.rows(numbers))
 
-    def export(self, network: Network, names: Sequence[str], deadline: float | None = None) -> bytes:
-        """`network` as an XCSP3 document, its variables called `names`. Raises as `solve` does."""
-        self._ask(Export(list(names), _task(network, None, count_only=True, strategy="default")))
-        word = self._hear(deadline)
+    def give_up(self) -> SolverTimeout:
+        """End the process: there is no time left for the task in hand. What it has found so far goes with it."""
+        question, said = self._question, b""
+        if question is not None and question.costs and self._folder is not None:
+            with suppress(OSError):
+                said = (self._folder / BEST).read_bytes()
+        self.close()
+        if question is None or b"</values>" not in said:
+            return SolverTimeout()
+        width = len(question.asked.domains)
+        best = question.answered(1, complete=False, solutions=question.rows(codes_of(said, width)[-width:]))
+        return SolverTimeout(best.solutions[0])
+
+    def export(self, network: Network, names: Sequence[str], costs: Codes = ()) -> bytes:
+        """`network` as an XCSP3 document, its variables called `names`, and the sum of those at `costs` minimised.
+
+        Raises as `solve` does.
+        """
+        task = _task(network, None, count_only=True, strategy="default")
+        self._ask(Export(list(names), msgspec.structs.replace(task, costs=list(costs))))
+        word = self._hear(None)
         if not isinstance(word, Exported):
             raise SolverLost(f"the solver answered with a {type(word).__name__}")
         return word.xml
@@ -254,8 +279,7 @@ class AceProcess:
     def _receive(self, deadline: float | None) -> None:
         left = None if deadline is None else max(0.0, deadline - time.monotonic())
         if not select.select([self.fileno()], [], [], left)[0]:
-            self.close()
-            raise SolverTimeout
+            raise self.give_up()
         chunk = b""
         with suppress(OSError):
             chunk = self._socket.recv(CHUNK) if self._socket else b""
@@ -303,6 +327,8 @@ class _Question:
     free: dict[int, Codes]
     limit: int | None
     count_only: bool
+    costs: Codes
+    """Of the variables at `places`, those whose codes are minimised. The `free` ones' least come first of all."""
 
     @property
     def trivial(self) -> bool:
@@ -310,7 +336,7 @@ class _Question:
         return not self.places
 
     @classmethod
-    def of(cls, network: Network, limit: int | None, *, count_only: bool) -> Self:
+    def of(cls, network: Network, limit: int | None, *, count_only: bool, costs: Codes) -> Self:
         bound = {place for table in network.tables for place in table.scope}
         bound.update(place for scope in network.different for place in scope)
         places = tuple(sorted(bound))
@@ -321,7 +347,12 @@ class _Question:
             tuple(tuple([at[place] for place in scope]) for scope in network.different),
         )
         free = {place: domain for place, domain in enumerate(network.domains) if place not in bound}
-        return cls(asked, places, free, limit, count_only)
+        return cls(asked, places, free, limit, count_only, tuple([at[place] for place in costs if place in at]))
+
+    def rows(self, numbers: Sequence[int]) -> list[Codes]:
+        """The solutions of `asked` whose codes stand one after the other in `numbers`."""
+        width = len(self.asked.domains)
+        return [tuple(numbers[start : start + width]) for start in range(0, len(numbers), width)]
 
     def answered(self, found: int, *, complete: bool, solutions: Sequence[Codes]) -> Answer:
         """The answer for the whole, from that for `asked`."""

@@ -13,10 +13,8 @@ before the first task comes; without it, it has to do without.
 
 from __future__ import annotations
 
-import array
 import atexit
 import os
-import re
 import shutil
 import signal
 import socket
@@ -30,6 +28,7 @@ from typing import Any
 import msgspec
 
 from robochoc.solver.ace_words import (
+    BEST,
     LENGTH,
     Broken,
     Export,
@@ -40,6 +39,7 @@ from robochoc.solver.ace_words import (
     TableForm,
     Task,
     ToSolver,
+    codes_of,
 )
 
 JVM_OPTIONS = (
@@ -62,7 +62,8 @@ STRATEGIES: dict[Strategy, tuple[str, ...]] = {
 HEAD_USES = 40
 """After so many models another `Head` is made: it never forgets one, and memory runs out."""
 MOST = 2**63 - 1
-_VALUES = re.compile(rb"<values>([^<]*)</values>")
+MINIMISE = ("-os=DECREASING",)
+"""As ACE does by itself; that it is said gives these models a `Head` of their own."""
 
 
 def main() -> None:
@@ -132,6 +133,8 @@ class _Ace:
         self._input = self._java.JClass("dashboard.Input")
         self._head = self._java.JClass("main.Head")
         self._buffer = self._java.JClass("java.io.ByteArrayOutputStream")
+        self._best = folder / BEST
+        self._file = self._java.JClass("java.io.FileOutputStream")
         self._printer = self._java.JClass("java.io.PrintStream")
         self._system = self._java.JClass("java.lang.System")
         self._heads: dict[tuple[str, ...], tuple[Any, int]] = {}
@@ -144,16 +147,32 @@ class _Ace:
 
     def solve(self, task: Task) -> Solved:
         self._model.write_bytes(self.models.document(task, [f"x{place}" for place in range(len(task.domains))]))
+        if task.costs:
+            return self._minimise(len(task.domains))
         each = () if task.count_only else ("-xe",)
-        said, found = self._run((*each, *ACE_OPTIONS, *STRATEGIES[task.strategy]), task.limit)
-        self._model.unlink()
-        solutions = b"" if task.count_only else _codes(said, len(task.domains))
+        output = self._buffer()
+        found = self._run((*each, *ACE_OPTIONS, *STRATEGIES[task.strategy]), task.limit, output)
+        said = bytes(output.toByteArray())
+        _check(said)
+        solutions = b"" if task.count_only else codes_of(said, len(task.domains)).tobytes()
         # A search that a limit cut off says so; neither a status line nor the number of solutions does.
         return Solved(found, b"d COMPLETE EXPLORATION" in said, solutions)
 
-    def _run(self, options: tuple[str, ...], limit: int | None) -> tuple[bytes, int]:
-        """What ACE prints, and how many solutions it has found, up to `limit`."""
-        output = self._buffer()
+    def _minimise(self, width: int) -> Solved:
+        """The cheapest solution, the last that ACE has printed. Until then the parent may look at what it prints."""
+        output = self._file(str(self._best))
+        try:
+            self._run(("-xe", *ACE_OPTIONS, *MINIMISE), None, output)
+        finally:
+            output.close()
+            said = self._best.read_bytes()
+            self._best.unlink()
+        _check(said)
+        last = codes_of(said, width)[-width:]
+        return Solved(len(last) // width, b"d COMPLETE EXPLORATION" in said, last.tobytes())
+
+    def _run(self, options: tuple[str, ...], limit: int | None, output: Any) -> int:  # noqa: ANN401 - a Java object
+        """How many solutions ACE has found, up to `limit`; what it prints goes to `output`."""
         self._system.setOut(self._printer(output))
         self._input.loadArguments([str(self._model), *options])
         head, uses = self._heads.get(options, (None, 0))
@@ -164,18 +183,16 @@ class _Ace:
         head.problem = head.solver = None
         head.run()
         self._system.out.flush()
-        said = bytes(output.toByteArray())
-        if head.solver is None or b"! ERROR" in said:
+        self._model.unlink()
+        if head.solver is None:
             raise RuntimeError("ACE gave up on the model, for a reason of its own")
-        return said, int(head.solver.solutions.found)
+        return int(head.solver.solutions.found)
 
 
-def _codes(said: bytes, width: int) -> bytes:
-    """The solutions in what ACE has printed."""
-    numbers = array.array("i", map(int, b" ".join(_VALUES.findall(said)).split()))
-    if len(numbers) % width:
-        raise RuntimeError("ACE's answer has values missing")
-    return numbers.tobytes()
+def _check(said: bytes) -> None:
+    """Raise `RuntimeError` when ACE has printed an error."""
+    if b"! ERROR" in said:
+        raise RuntimeError("ACE gave up on the model, for a reason of its own")
 
 
 def _started_java() -> Any:  # noqa: ANN401 - JPype has no types
@@ -246,7 +263,12 @@ class _Models:
             chosen = [variables[place] for place in scope]
             posted.append(self._entities.ECtr(constraints.ConstraintAllDifferent(chosen, None)))
         self._entities.EToSatisfy(posted)
-        return bytes(etree.tostring(self._xcsp.build_document(), pretty_print=True))
+        root = self._xcsp.build_document()
+        if task.costs:
+            root.set("type", "COP")
+            total = etree.SubElement(etree.SubElement(root, "objectives"), "minimize", type="sum")
+            etree.SubElement(total, "list").text = " ".join(names[place] for place in task.costs)
+        return bytes(etree.tostring(root, pretty_print=True))
 
     def _rows(self, task: Task, table: TableForm) -> list[Any]:
         rows = task.rows[table.rows]

@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+import re
 import struct
+from array import array
 from typing import Literal
 
 import msgspec
 
+BEST = "best"
+"""The file in the solver's folder that holds what ACE prints while it minimises: the solutions, cheaper and cheaper."""
+
 LENGTH = struct.Struct("!Q")
+
+_VALUES = re.compile(rb"<values>([^<]*)</values>")
 
 Strategy = Literal["default", "static"]
 """How ACE searches: as it does by itself (weighted degrees, restarts), or in the order of the variables."""
+
+
+def codes_of(said: bytes, width: int) -> array[int]:
+    """The codes of all solutions in what ACE has printed, `width` each. Raises `ValueError`."""
+    numbers = array("i", map(int, b" ".join(_VALUES.findall(said)).split()))
+    if len(numbers) % width:
+        raise ValueError("ACE's answer has values missing")
+    return numbers
 
 
 class TableForm(msgspec.Struct, frozen=True, array_like=True):
@@ -22,9 +37,10 @@ class TableForm(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Task(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """Solve this network: all solutions up to `limit`, or only their number.
+    """Solve this network: all solutions up to `limit`, or only their number, or one that costs least.
 
-    `domains` holds each variable's codes, `different` scopes on which all differ.
+    `domains` holds each variable's codes, `different` scopes on which all differ. What a solution costs is the sum of
+    the codes of the variables at the places `costs`; where there are none, nothing is minimised.
     """
 
     domains: list[list[int]]
@@ -34,6 +50,7 @@ class Task(msgspec.Struct, frozen=True, array_like=True, tag=True):
     limit: int | None
     count_only: bool
     strategy: Strategy
+    costs: list[int] = []
 
 
 class Export(msgspec.Struct, frozen=True, array_like=True, tag=True):
@@ -44,7 +61,10 @@ class Export(msgspec.Struct, frozen=True, array_like=True, tag=True):
 
 
 class Solved(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """`found` solutions, `complete` if there are no others; `solutions` are their codes, four bytes each."""
+    """`found` solutions, `complete` if there are no others; `solutions` are their codes, four bytes each.
+
+    Where costs are minimised: one solution at most, `complete` if none costs less.
+    """
 
     found: int
     complete: bool

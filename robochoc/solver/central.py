@@ -1,4 +1,4 @@
-"""The central judge: a whole team's problem as one, decided or counted by ACE.
+"""The central judge: a whole team's problem as one, decided, counted or minimised by ACE.
 
 It sees every file, which no robot does. What it is for: to hold a team's verdict against an independent one, and to
 say how many solutions there are. Robots that share nothing are solved apart; what is left goes to ACE with cliques
@@ -15,12 +15,13 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 from robochoc.outcome import Verdict
-from robochoc.problem import Team
+from robochoc.problem import Kind, Team
 from robochoc.solver.ace import AceProcess, Answer, SolverTimeout
 from robochoc.solver.ace_words import Strategy
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.cliques import strengthened
 from robochoc.solver.encoding import Codes, Component, Network, components
+from robochoc.solver.priced import Priced, charged_anyway, priced, with_robots_aside
 from robochoc.solver.symmetry import broken, orbits, symmetries
 
 LONGEST_TABLE = 20_000
@@ -37,11 +38,16 @@ NOTHING = Answer(0, complete=True, solutions=())
 
 @dataclass(frozen=True)
 class Judgement:
-    """What the judge has found. `count` is None unless it was asked for."""
+    """What the judge has found. `count` is None unless it was asked for.
+
+    Where something is minimised: `cost` is what the assignment comes to, and nothing comes to less than `bound`.
+    """
 
     verdict: Verdict
     assignment: dict[str, int] = field(default_factory=dict)
     count: int | None = None
+    cost: int | None = None
+    bound: int | None = None
 
 
 @dataclass(frozen=True)
@@ -76,11 +82,17 @@ class Judge:
         self._progress = progress
         self._tables: dict[Network, tuple[Codes, ...] | None] = {}
 
-    def judge(self, team: Team, *, count: bool = False) -> Judgement:
-        """The verdict on `team`, with a solution or (`count`) with the number of all solutions.
+    def judge(self, team: Team, *, count: bool = False, aside: int | None = None) -> Judgement:
+        """The verdict on `team`, with a solution (of a DisWCSP: the cheapest) or (`count`) the number of all.
 
-        `unknown` when the time was over. Raises `SolverMissing`, `SolverLost`, `Unsupported`.
+        With `aside`, robots may step aside, one of weight 1 at this price, and costs and prices are minimised; those
+        that do have no values. `unknown` when the time was over, with the cheapest that was found until then. Raises
+        `SolverMissing`, `SolverLost`, `Unsupported`.
         """
+        if aside is not None:
+            return self._minimum(team, with_robots_aside(team, aside))
+        if team.kind is Kind.DISWCSP and not count:
+            return self._minimum(team, priced(team.variables.values(), list(team.constraints())))
         with ExitStack() as processes:
             ace = self._solver or processes.enter_context(AceProcess())
             spare = processes.enter_context(AceProcess())
@@ -102,6 +114,60 @@ class Judge:
         for part, answer in zip(parts, found, strict=True):
             assignment.update(zip(part.names, part.decoded(answer.solutions[0]), strict=True))
         return Judgement(Verdict.SOLUTION, {name: assignment[name] for name in team.variables})
+
+    def _minimum(self, team: Team, parts: list[Priced]) -> Judgement:
+        """The cheapest solution of all `parts`, which do not depend on each other."""
+        parts.sort(key=lambda part: math.prod(len(domain) for domain in part.network.domains))
+        cost = bound = charged_anyway(team)
+        assignment: dict[str, int] | None = {}
+        proven = True
+        with ExitStack() as processes:
+            ace = self._solver or processes.enter_context(AceProcess())
+            for part in parts:
+                codes, optimal = self._cheapest(part, ace)
+                if codes is None and optimal:
+                    return Judgement(Verdict.NO_SOLUTION)
+                proven = proven and optimal
+                bound += part.cost(codes) if codes is not None and optimal else part.base
+                if codes is None or assignment is None:
+                    assignment = None
+                    continue
+                cost += part.cost(codes)
+                assignment.update(part.decoded(codes))
+        if assignment is None:
+            return Judgement(Verdict.UNKNOWN, bound=bound)
+        assignment = {name: assignment[name] for name in team.variables if name in assignment}
+        return Judgement(Verdict.OPTIMAL if proven else Verdict.UNKNOWN, assignment, cost=cost, bound=bound)
+
+    def _cheapest(self, part: Priced, ace: AceProcess) -> tuple[Codes | None, bool]:
+        """A solution, and whether none is cheaper; without one, whether there is none."""
+        network = part.network
+        if network.impossible:
+            return None, True
+        if len(part.part.names) == 1:
+            (domain, *_), tables = network.domains, network.tables
+            return min(tables[0].rows, key=lambda row: row[-1]) if tables else (domain[0],), True
+        if self._time_is_over:
+            return None, False
+        try:
+            if ace.begin(network, limit=1, costs=part.costs):
+                self._watch(ace)
+            answer = ace.answer(self._deadline)
+        except SolverTimeout as over:
+            return over.best, False
+        return (answer.solutions[0] if answer.found else None), True
+
+    def _watch(self, ace: AceProcess) -> None:
+        """Wait for the answer. Raises `SolverTimeout`."""
+        while not select.select([ace], [], [], self._patience())[0]:
+            if self._progress:
+                self._progress()
+            if self._time_is_over:
+                raise ace.give_up()
+
+    @property
+    def _time_is_over(self) -> bool:
+        return self._deadline is not None and time.monotonic() >= self._deadline
 
     def _solve(self, part: Component, ace: AceProcess, spare: AceProcess, *, count: bool) -> Answer:
         """The number of solutions of one component, or its first one."""
@@ -160,7 +226,7 @@ class Judge:
         while not (ready := select.select(running, [], [], self._patience())[0]):
             if self._progress:
                 self._progress()
-            if self._deadline is not None and time.monotonic() >= self._deadline:
+            if self._time_is_over:
                 break
             if second not in running and time.monotonic() >= hedge:
                 second.begin(network, limit=wanted.limit, count_only=wanted.count_only, strategy=other)

@@ -3,29 +3,32 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from robochoc.problem import Kind, Team
+from robochoc.problem import Constraint, Kind, Team
 from robochoc.solver.cliques import strengthened
-from robochoc.solver.encoding import Component, Network, Table, Unsupported, components
+from robochoc.solver.encoding import Codes, Component, Network, Table, Unsupported, components, is_soft
+from robochoc.solver.priced import HIGHEST, charged_anyway, charges_on
 
 
-def merged(team: Team) -> Network:
+def merged(team: Team) -> tuple[Network, Codes]:
     """All variables of `team`, in its order, with all its constraints; codes are values.
 
-    Unary constraints are folded into domains, cliques of `ne` are said outright. Raises `Unsupported` for a team
-    with costs, or that changes over time, and when a constraint is too large to be a table.
+    Unary constraints are folded into domains, cliques of `ne` are said outright. What soft constraints charge are
+    variables too, after the others: those at the places that are returned, whose sum is what the problem costs.
+    Raises `Unsupported` for a team that changes over time, and when a constraint is too large to be a table, or
+    charges too much.
     """
-    if team.kind is Kind.DISWCSP:
-        raise Unsupported(f"{team.name} is a DisWCSP; only problems without costs can be written yet")
     if team.dynamic:
         raise Unsupported(f"{team.name} has a scenario.xml; an XCSP3 file holds one problem, not its changes")
     place = {name: index for index, name in enumerate(team.variables)}
     domains = {name: tuple(sorted(variable.domain)) for name, variable in team.variables.items()}
     tables: list[Table] = []
     different: list[tuple[int, ...]] = []
-    for part in components(team.variables.values(), team.constraints()):
+    soft = [constraint for constraint in team.constraints() if is_soft(constraint) and constraint.variables]
+    charges: list[Table] = []
+    for part in components(team.variables.values(), team.constraints(), [one.variables for one in soft]):
         places = [place[name] for name in part.names]
         said = strengthened(part.network, lambda _: None)
         for name, codes in zip(part.names, said.domains, strict=True):
@@ -35,7 +38,26 @@ def merged(team: Team) -> Network:
                 tables.append(Table((place[name],), allowed=False, rows=tuple((value,) for value in domains[name])))
         tables += [_over_values(table, part, places) for table in said.tables]
         different += [tuple([places[member] for member in scope]) for scope in said.different]
-    return Network(tuple(domains.values()), tuple(tables), tuple(different))
+        if not part.network.impossible:
+            known = set(part.names)
+            charges += _charges(part, places, [one for one in soft if one.variables[0] in known])
+    paid = [tuple(sorted({row[-1] for row in table.rows})) for table in charges]
+    anyway = charged_anyway(team)
+    if anyway or (team.kind is Kind.DISWCSP and not paid):
+        paid.append((anyway,))
+    if sum(map(max, paid)) > HIGHEST:
+        raise Unsupported(f"{team.name} has costs that add up to more than {HIGHEST:,}, too much for XCSP3's solvers")
+    costs = tuple(range(len(domains), len(domains) + len(paid)))
+    tables += [replace(table, scope=(*table.scope, cost)) for table, cost in zip(charges, costs, strict=False)]
+    return Network((*domains.values(), *paid), tuple(tables), tuple(different)), costs
+
+
+def _charges(part: Component, places: Sequence[int], soft: Sequence[Constraint]) -> Iterator[Table]:
+    """Tables of values and what they are charged, in a column whose variable is still to come."""
+    for scope, prices in charges_on(part, part.network, soft).items():
+        if prices:
+            rows = tuple((*part.decoded(codes), int(price)) for codes, price in prices.items())
+            yield Table(tuple([places[member] for member in scope]), allowed=True, rows=rows)
 
 
 def identifiers(names: Sequence[str]) -> list[str]:
