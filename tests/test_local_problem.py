@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from random import Random
 
 import pytest
 from complex_problems import random_complex_team
+from cost_problems import random_complex_cost_team, random_cost_team
 from problems import random_team, team_of
 
 from robochoc.message import Value
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.solver import compiled
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.domain import CompiledDomain
-from robochoc.solver.part import Part, parts
+from robochoc.solver.part import Brief, Part, parts
 
 EQUAL = Relation("R", 2, Semantics.SUPPORTS, ((1, 1), (2, 2)))
 ONE = Relation("R", 2, Semantics.SUPPORTS, ((1, 1),))
@@ -79,6 +81,73 @@ def test_the_first_conflict_is_the_one_that_is_explained(batch: int, monkeypatch
         for part in parts(team, _any_domains(team, chance), everywhere=True).values():
             monkeypatch.setattr(compiled, "LARGE", chance.choice((1, 1000)))
             _compare(part, chance)
+
+
+@pytest.mark.parametrize("batch", range(2))
+def test_what_a_robot_adds_is_the_difference_that_it_makes(batch: int) -> None:
+    """Robots become known from the highest one on; constraints that wait for none are in the costs from the start."""
+    chance = Random(f"added {batch}")
+    seen = Counter[str]()
+    for _ in range(40):
+        team = random_complex_cost_team(chance)
+        for part in parts(team, _any_domains(team, chance), everywhere=True).values():
+            problem, again = LocalProblem(part), LocalProblem(part)
+            view: dict[str, Value] = {}
+            costs = problem.costs(view)
+            for name in part.order:
+                if name == problem.agent:
+                    continue
+                aside = chance.random() < 0.1
+                names = part.interfaces[name]
+                view[name] = tuple([None if aside else chance.choice(list(part.domains[one])) for one in names])
+                added = problem.added(name, view)
+                if added is not None:
+                    costs = [cost + more for cost, more in zip(costs, added, strict=True)]
+                assert costs == again.costs(view)
+                seen["nothing" if added is None else "aside" if aside else "something"] += 1
+            assert problem.checks <= again.checks
+    assert min(seen.values()) > 10, seen
+
+
+@pytest.mark.parametrize("batch", range(2))
+def test_the_least_is_what_the_cheapest_values_of_the_others_cost(batch: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Constraint by constraint, whatever the others' values in other constraints."""
+    chance = Random(f"least {batch}")
+    seen = Counter[bool]()
+    for _ in range(40):
+        team = random_cost_team(chance)
+        shared = [c for robot in team.robots for parent in robot.parents for c in parent.constraints]
+        robots = {name for name in team.order if chance.random() < 0.6}
+        for name, part in parts(team, everywhere=True).items():
+            problem = LocalProblem(part)
+            (own,) = (variable.name for variable in team[name].variables)
+            least = problem.least(robots - {name})
+            for index, shown in enumerate(problem.values):
+                if not shown:
+                    continue
+                (value,) = shown
+                assert value is not None
+                expected = 0.0
+                for constraint in shared:
+                    others = [one for one in constraint.variables if one != own]
+                    if own in constraint.variables and {team.owner[one] for one in others} <= robots - {name}:
+                        columns = [team.variables[one].domain for one in others]
+                        expected += min(
+                            constraint.price({own: value, **dict(zip(others, row, strict=True))})
+                            for row in itertools.product(*columns)
+                        )
+                assert least[index] == expected
+                seen[expected > 0] += 1
+            monkeypatch.setattr(compiled, "WIDE", 0)
+            assert problem.least(robots) == [0] * len(problem.values)
+            monkeypatch.undo()
+    assert min(seen.values()) > 50, seen
+
+
+def test_nothing_is_sure_to_be_charged_where_robots_may_step_aside() -> None:
+    team = team_of(dict.fromkeys("AB", (1, 2)), [Constraint("C", ONE, ("A", "B"), ("A", "B"))])
+    assert LocalProblem(parts(team, everywhere=True)["RA"]).least({"RB"}) == [0, INFINITE]
+    assert LocalProblem(parts(team, brief=Brief(aside=1), everywhere=True)["RA"]).least({"RB"}) == [0, 0, 0]
 
 
 def _compare(part: Part, chance: Random) -> None:

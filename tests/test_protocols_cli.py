@@ -175,7 +175,7 @@ def test_a_protocol_without_docstring_says_so() -> None:
     assert "no docstring" in run("zz-other").stdout
 
 
-@pytest.mark.parametrize(("name", "near"), [("abd", "abt"), ("centrl", "central"), ("ABT ", None)])
+@pytest.mark.parametrize(("name", "near"), [("abtt", "abt"), ("centrl", "central"), ("ABT ", None)])
 def test_an_unknown_protocol_is_wrong_usage(name: str, near: str | None) -> None:
     done = robochoc("protocols", name)
     assert done.returncode == 2

@@ -12,8 +12,8 @@ the domain is compiled, and are not counted; nor are look-ups of nogoods and fil
 from __future__ import annotations
 
 import itertools
-from bisect import bisect_left
-from collections.abc import Iterable, Mapping, Sequence
+from bisect import bisect_left, bisect_right
+from collections.abc import Container, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 
 LARGE = 64
 """From so many values on, conflicts are looked up for all of them at once, in numpy."""
+
+WIDE = 65_536
+"""A constraint with more combinations of values than this is not searched for the least that it charges."""
 
 
 class LocalProblem:
@@ -72,6 +75,7 @@ class LocalProblem:
         copies = [ready(known) for known in part.copies]
         shared = [*(constraint for _, constraint in above), *copies]
         self._constraints = in_order_of_lowest(shared, rank)
+        self._rank = rank
         self._depths = [rank[constraint.agents[-1]] if constraint.agents else -1 for constraint in self._constraints]
         met = {agent for constraint in shared for agent in constraint.agents}
         self.neighbours = tuple(sorted({*self.parents, *self.children, *met}, key=rank.__getitem__))
@@ -152,6 +156,35 @@ class LocalProblem:
         known = [constraint.prices(others) for constraint, others in self._known(view, len(self.values))]
         return [sum(prices) for prices in zip(self.charges, *known, strict=True)]
 
+    def added(self, robot: str, view: Mapping[str, Value]) -> list[float] | None:
+        """What each own value pays once `robot` is known too, the lowest in `view`; None: no constraint waits for it.
+
+        So much are the `costs` in `view` more than without `robot`, if all others in it are higher. Checks are only
+        those of the constraints that come in.
+        """
+        depth = self._rank[robot]
+        places = slice(bisect_left(self._depths, depth), bisect_right(self._depths, depth))
+        waiting = self._constraints[places]
+        if not waiting:
+            return None
+        known = [(constraint, others) for constraint in waiting if (others := constraint.others(view)) is not None]
+        self.checks += len(known) * len(self.values)
+        return _summed(len(self.values), [constraint.prices(others) for constraint, others in known])
+
+    def least(self, robots: Container[str]) -> list[float]:
+        """For each own value, what constraints whose other robots are all among `robots` charge at the very least.
+
+        These may take any values that their files declare. Nothing is charged for sure where robots may step aside,
+        and nothing is said of a constraint with more than `WIDE` combinations of values.
+        """
+        least: list[list[float]] = []
+        for constraint in self._constraints:
+            if self._part.brief.aside is None and constraint.agents and all(a in robots for a in constraint.agents):
+                checks, charged = constraint.least(self._part.domains, WIDE)
+                self.checks += checks
+                least.append(charged)
+        return _summed(len(self.values), least)
+
     def tables(self, domains: Mapping[str, Sequence[Value]], lowest: str | None = None) -> list[CostTable]:
         """What constraints charge for every combination of values, of those whose other robots are all in `domains`.
 
@@ -212,6 +245,11 @@ class LocalProblem:
         from robochoc.solver.conflict_table import ConflictTable  # noqa: PLC0415 - numpy is for large domains only
 
         return ConflictTable(self._constraints, len(self.values))
+
+
+def _summed(size: int, rows: Sequence[Sequence[float]]) -> list[float]:
+    """The sum of `rows`, each of `size` values."""
+    return [sum(prices) for prices in zip(*rows, strict=True)] if rows else [0] * size
 
 
 def _by_robot(constraints: Iterable[SharedConstraint]) -> dict[str, list[SharedConstraint]]:

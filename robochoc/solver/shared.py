@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Container, Iterable, Mapping, Sequence
 
 from robochoc.message import Value
@@ -110,6 +111,24 @@ class SharedConstraint:
             paid = [0 if None in own else self._price((*others, *own)) for own in self._distinct]  # type: ignore[arg-type]
             prices = self._prices[others] = [paid[code] for code in self.codes]
         return prices
+
+    def least(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[float]]:
+        """How many checks it takes, and what each own value pays at the least; the others' variables are in `domains`.
+
+        With more than `wide` combinations nobody looks, and it is 0.
+        """
+        least: list[float] = [0] * len(self.codes)
+        columns = [list(domains[name]) for name in self._names]
+        if math.prod(map(len, columns)) * len(least) > wide:
+            return 0, least
+        checks = 0
+        for number, others in enumerate(itertools.product(*columns)):
+            prices = self.prices(others)
+            least = list(map(min, least, prices)) if number else prices
+            checks += len(prices)
+            if not any(least):
+                break
+        return checks, least
 
     def mask(self, others: Others) -> int:
         """The own values that go with `others`: bit i for the i-th."""

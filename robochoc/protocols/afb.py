@@ -1,0 +1,334 @@
+"""Asynchronous Forward Bounding (AFB), with backjumping (AFB-BJ).
+
+Gershman, Meisels, Zivan: "Asynchronous forward bounding for distributed COPs", JAIR 34, 2009. Methods bear the
+names of its procedures, or of what it calls the messages that they handle:
+
+    assign_CPA    `_assign_cpa`       CPA_MSG        `_receive_cpa`
+    backtrack     `_backtrack`        FB_CPA         `_receive_fb_cpa`, `_send_fb_estimates`
+    backtrackTo   `_backtrack_to`     FB_ESTIMATE    `Estimates.save`
+                                      NEW_SOLUTION   `_receive_new_solution`
+
+Complete, for minimisation. A current partial assignment (CPA) goes from robot to robot in priority order, and its
+copies to all robots below: these tell the sender what it will cost at least to add their own values. The sender waits
+for nobody; once the CPA and the estimates cost as much as the best solution (B), it takes its next value, wherever
+the CPA is by then. So several CPAs may be under way. Each value carries its robot's counter of assignments (together
+the time-stamp), and the first counter that differs tells which CPA is stronger; the others are obsolete.
+
+Backjumping: where no value is cheap enough, a beginning of the CPA may be to blame already. So a robot tells its
+estimate for each beginning, and a CPA has with it what each of its beginnings costs at least (`least`): what its own
+robots pay, and the estimates of all robots after them that the CPA has come through. With the estimates of those
+below, that is a bound for the whole team. The CPA goes back to the last robot of the shortest beginning whose bound is
+not below B: no solution that begins like this is better, whatever anybody below takes. (The paper's bound has no
+estimates of the robots in between. One bound for each beginning is also what Wahbi, Ezzahir, Bessiere: "Asynchronous
+forward bounding revisited", CP 2013, send.)
+
+An estimate is the least of what the own values cost with the beginning, plus h: what constraints with lower robots
+only charge at least, whatever those take. So every constraint is in one term at most: until its highest robot has its
+value in that one's h, later, once all others of the scope have theirs, in the lowest one's estimate, which pays it in
+the end. Robots look h up in the domains that all of them declare, without a word; where they may step aside it is 0.
+
+What the paper leaves open, or is settled otherwise here: messages are read by packets, and a robot decides once the
+inbox has been drained; constraints may be n-ary; values are tried the cheapest first; estimates are kept as long as
+the beginning stands that they are for; robots are asked only when their estimates may have changed, and who has
+nothing new to say is silent; the next robot answers to the CPA itself; a robot looks at its bound also when B has
+changed, and when the CPA comes; every CPA tells B, so that nobody thinks that there is no solution while the news of
+one is under way; whoever finds that nothing is better, with any beginning, tells all to be silent; a robot whose
+domain is empty says so when the search begins.
+
+>>> from robochoc.communication.schedule import Concurrent
+>>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(4), AFB, Concurrent(seed=0)).run()
+>>> result.verdict.value
+'no-solution'
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import assert_never, cast
+
+from robochoc.message import Message, Value
+from robochoc.outcome import Verdict
+from robochoc.protocols.findings import Best, Findings
+from robochoc.protocols.afb_bounds import Assignment, Cost, Estimates, Prices, Told, agreement, stamp_of
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import Traits
+from robochoc.solver.compiled import LocalProblem
+
+
+class CPA(Message, frozen=True):
+    """The current partial assignment, of the robots from the first one on (`CPA_MSG`).
+
+    With the last value the receiver's own, it comes back: no solution that begins like this costs less than `bound`,
+    which is B. On its way down, `least` says of each of its beginnings, the empty one first, what that costs at least.
+    """
+
+    assignments: list[Assignment]
+    bound: Cost
+    least: list[Cost]
+
+
+class FBCPA(Message, frozen=True):
+    """A copy of the CPA down to the sender, who asks for the receiver's estimate (`FB_CPA`)."""
+
+    assignments: list[Assignment]
+
+
+class FBEstimate(Message, frozen=True):
+    """What it costs at least to add a value of the sender to each beginning of the CPA (`FB_ESTIMATE`).
+
+    The empty beginning is first; the last estimate holds for all longer ones. `stamp` is the CPA's time-stamp.
+    """
+
+    stamp: Sequence[int]
+    estimates: Sequence[Cost]
+
+
+class NewSolution(Message, frozen=True):
+    """The best solution so far: the values of all robots in priority order, and their cost B (`NEW_SOLUTION`)."""
+
+    values: list[Value]
+    cost: Cost
+
+
+class Terminate(Message, frozen=True):
+    """No solution is better than the best one: the search is over (`TERMINATE`)."""
+
+
+class AFB(Protocol):
+    """One agent of AFB. State: the strongest CPA that it knows of (`assignments`), its own `counter`, and `bound` (B).
+
+    `least` is known while this robot holds a CPA, or has handed it on: what each beginning costs at least, with the own
+    estimate. Then `paid` is what the CPA costs, `cost` the same with the own value, and `left` are the values that have
+    not been tried, the dearest first. `solution` is the best one that this robot has heard of.
+    """
+
+    messages = CPA | FBCPA | FBEstimate | NewSolution | Terminate
+    traits = Traits(
+        paper="Gershman, Meisels & Zivan 2009",
+        costs=True,
+        everywhere=True,
+        privacy="constraints that a robot has no part in",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.rank = order.rank[problem.agent]
+        self.below = order.names[self.rank + 1 :]
+        self.assignments: list[Assignment] = []
+        self.counter = 0
+        self.bound: Cost = math.inf
+        self.solution: NewSolution | None = None
+        self.over = False
+        self.prices = Prices(problem, order)
+        self.estimates = Estimates()
+        self.least: list[Cost] | None = None
+        self.paid: Cost = 0
+        self.cost: Cost = 0
+        self.left: list[int] = []
+        self._came: list[Cost] | None = None
+        self._asked: dict[str, list[Assignment]] = {}
+        self._told: dict[str, Told] = {}
+
+    def start(self) -> None:
+        """The first robot generates the CPA; the others wait."""
+        if not self.problem.values:
+            self.conclude(Verdict.NO_SOLUTION)
+            return
+        self.prices.look_ahead()
+        if self.rank == 0:
+            self._came = [0]
+            self.settle()
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        if self.verdict is not None or (self.over and not isinstance(message, NewSolution)):
+            return
+        match cast("CPA | FBCPA | FBEstimate | NewSolution | Terminate", message):
+            case CPA() as cpa:
+                self._receive_cpa(sender, cpa)
+            case FBCPA(assignments):
+                self._receive_fb_cpa(sender, assignments)
+            case FBEstimate(stamp, estimates):
+                self.estimates.save(sender, Told(stamp, estimates))
+            case NewSolution() as solution:
+                self._receive_new_solution(solution)
+            case Terminate():
+                self._stop()
+            case never:
+                assert_never(never)
+
+    def settle(self) -> None:
+        """The inbox is empty: go on with the CPA, and answer who has asked for an estimate."""
+        if self.over or self.verdict is not None:
+            return
+        came, self._came = self._came, None
+        if came is not None:
+            self._take_up(came)
+        if self.least is not None:
+            self._assign_cpa(self.least)
+        self._send_fb_estimates()
+
+    @property
+    def findings(self) -> Findings:
+        """The best solution that this robot has heard of; of the first one also what all solutions cost at least."""
+        best = None
+        if self.solution is not None:
+            best = Best(self.solution.cost, dict(zip(self.order.names, self.solution.values, strict=True)))
+        return Findings(best=best, bound=self._bound_of_all())
+
+    # What the messages do
+
+    def _receive_cpa(self, sender: str, cpa: CPA) -> None:
+        """A CPA that is not obsolete is taken up; one that comes back with the present value rules it out."""
+        self.bound = min(self.bound, cpa.bound)
+        if len(cpa.assignments) > self.rank:
+            if cpa.assignments[-1][1] == self.counter:
+                self.value = None
+        elif self._update(cpa.assignments):
+            self._came = cpa.least
+            self._asked[sender] = cpa.assignments
+
+    def _receive_fb_cpa(self, sender: str, assignments: list[Assignment]) -> None:
+        """Note who asks for an estimate, unless it is for a CPA that is obsolete."""
+        if self._update(assignments):
+            self._asked[sender] = assignments
+
+    def _receive_new_solution(self, solution: NewSolution) -> None:
+        """Only the last robot finds solutions, each better than the one before."""
+        self.solution = solution
+        self.bound = min(self.bound, solution.cost)
+        if self.over:
+            self._take_best()
+
+    def _update(self, assignments: list[Assignment]) -> bool:
+        """Whether a CPA is not obsolete. The strongest is kept; what was done with a weaker one is void."""
+        common = agreement(stamp_of(assignments), stamp_of(self.assignments))
+        if common == len(assignments):
+            return True
+        if common < len(self.assignments) and assignments[common][1] < self.assignments[common][1]:
+            return False
+        self.assignments = assignments
+        self.least = self._came = self.value = None
+        return True
+
+    # The one who holds the CPA
+
+    def _take_up(self, least: list[Cost]) -> None:
+        """The CPA is here: look at all values, unless it is known already that this is in vain."""
+        self.least, self.paid, self.left = least, least[-1], []
+        if self._backtrack_to(least, self.estimates.totals(stamp_of(self.assignments))) is None:
+            self.prices.price(self.assignments)
+            self.least = [cost + more for cost, more in zip(least, self.prices.estimates, strict=True)]
+            self.left = self.prices.dearest_first()
+
+    def _assign_cpa(self, least: list[Cost]) -> None:
+        """Keep the value while a better solution may come of it; or take the cheapest one left, or go back."""
+        while True:
+            totals = self.estimates.totals(stamp_of(self._cpa))
+            shortest = self._backtrack_to(least, totals)
+            if shortest is not None:
+                self._backtrack(shortest)
+                return
+            if self.value is not None:
+                if self.cost + totals[-1] < self.bound:
+                    return
+                self.value = None
+            if not self.left or self.paid + self.prices.at_least(self.left[-1]) + totals[self.rank] >= self.bound:
+                self._backtrack(self.rank)
+                return
+            self._assign(self.left.pop())
+            if self.below:
+                self._send_cpa(least)
+                return
+            self._send_new_solution()
+
+    def _assign(self, index: int) -> None:
+        self.value = index
+        self.counter += 1
+        self.cost = self.paid + self.prices.last[index]
+
+    def _send_cpa(self, least: list[Cost]) -> None:
+        """The CPA goes to the next robot, copies of it to all whose estimates may change."""
+        cpa = self._cpa
+        stamp = stamp_of(cpa)
+        self.send(self.below[0], CPA(cpa, self.bound, [*least, self.cost]))
+        self.estimates.ask(self.below[0], stamp)
+        for robot in self.below[1:]:
+            if self.estimates.outdated(robot, stamp):
+                self.send(robot, FBCPA(cpa))
+                self.estimates.ask(robot, stamp)
+
+    def _send_new_solution(self) -> None:
+        """The CPA is complete, and better than B: all are told."""
+        self.bound = self.cost
+        self.solution = NewSolution([value for value, _ in self._cpa], self.cost)
+        for robot in self.order.names[: self.rank]:
+            self.send(robot, self.solution)
+        self.value = None
+
+    def _backtrack_to(self, least: list[Cost], totals: list[Cost]) -> int | None:
+        """How long the shortest beginning of the CPA is that no better solution has; None: each may have one."""
+        pairs = enumerate(zip(least, totals, strict=False))
+        return next((length for length, (cost, more) in pairs if cost + more >= self.bound), None)
+
+    def _backtrack(self, length: int) -> None:
+        """No better solution begins like the CPA does up to `length`: its last robot has to take another value."""
+        self.least = self.value = None
+        self._asked = {robot: asked for robot, asked in self._asked.items() if len(asked) < length}
+        if length:
+            self.send(self.order.names[length - 1], CPA(self.assignments[:length], self.bound, []))
+        elif self.bound == math.inf:
+            self.conclude(Verdict.NO_SOLUTION)
+        else:
+            self._stop()
+            for robot in self.order.names:
+                if robot != self.problem.agent:
+                    self.send(robot, Terminate())
+
+    # The others, and the end
+
+    def _send_fb_estimates(self) -> None:
+        """Tell those who have asked, and whose CPA is not obsolete by now."""
+        asked, self._asked = self._asked, {}
+        for robot, assignments in asked.items():
+            length = len(assignments)
+            if self.assignments[:length] == assignments:
+                self.prices.price(assignments)
+                told = Told(stamp_of(assignments), self.prices.told(length))
+                if robot not in self._told or not told.follows(self._told[robot]):
+                    self._told[robot] = told
+                    self.send(robot, FBEstimate(told.stamp, told.estimates))
+
+    def _stop(self) -> None:
+        self.over = True
+        self.least = None
+        self._take_best()
+
+    def _take_best(self) -> None:
+        """Decide for the own value in the best solution. Its news may come after the end's."""
+        self.value = None if self.solution is None else self.problem.values.index(self.solution.values[self.rank])
+
+    def _bound_of_all(self) -> Cost | None:
+        """What every solution costs at least: what it takes for a better one than B, or B. None: not known here."""
+        if self.rank or (self.least is None and not self.over):
+            return None
+        if self.over:
+            return self.bound
+        totals = self.estimates.totals(stamp_of(self._cpa))
+        ways = [self.bound]
+        if self.value is not None:
+            ways.append(self.cost + totals[-1])
+        if self.left:
+            ways.append(self.prices.at_least(self.left[-1]) + totals[0])
+        return min(ways)
+
+    @property
+    def _cpa(self) -> list[Assignment]:
+        """The CPA, with the own value if there is one."""
+        if self.value is None:
+            return self.assignments
+        return [*self.assignments, (self.problem.values[self.value], self.counter)]

@@ -1,0 +1,167 @@
+"""Synchronous Branch and Bound (SyncBB).
+
+Hirayama, Yokoo: "Distributed partial constraint satisfaction problem", CP 1997.
+
+Branch and bound, distributed: one path, the values of the robots so far with what each of them costs, goes from robot
+to robot in priority order. Who holds it adds the first own value with which it costs less than the bound n, the cost
+of the best path so far, and sends it on; who has none left sends it back. The last robot's path is the new best one.
+Once the first robot has no value left, the best path is proven. One robot acts at a time, so nothing is ever obsolete.
+
+Complete, synchronous, for minimisation. The paper's cost is the largest number of constraints that one robot breaks,
+here it is the sum of all costs. What is left open: constraints may be n-ary (the lowest robot of the scope pays them,
+when it holds the path); the way back carries no values but those of the best path, for the robot before still has
+its own; the last robot looks on for a cheaper value before it sends the path back; a path that costs as much as a new
+bound goes back without a look at the values that are left; a robot whose domain is empty from the start says so at
+once; the first robot tells the others what the best path was, and who hears of it takes the value in it.
+
+>>> from robochoc.communication.schedule import Concurrent
+>>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(4), SyncBB, Concurrent(seed=0)).run()
+>>> result.verdict.value, result.witness
+('no-solution', 'Robot1.1')
+"""
+
+from __future__ import annotations
+
+import math
+from typing import assert_never, cast
+
+import msgspec
+
+from robochoc.message import Message, Value
+from robochoc.outcome import Verdict
+from robochoc.protocols.findings import Best, Findings
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import Traits
+from robochoc.solver.compiled import LocalProblem
+
+Cost = int | float
+
+
+class BestPath(msgspec.Struct, frozen=True, array_like=True):
+    """The best path so far: all robots' values in priority order, and what they cost (the bound; `inf`: none yet)."""
+
+    bound: Cost
+    values: tuple[Value, ...] = ()
+
+
+class Path(Message, frozen=True):
+    """What all robots before the receiver have taken, in priority order, and what each of them pays for it."""
+
+    assignments: list[tuple[Value, Cost]]
+    best: BestPath
+
+
+class Backtrack(Message, frozen=True):
+    """All that the robots below can make of the receiver's value costs at least as much as the best path."""
+
+    best: BestPath
+
+
+class Terminate(Message, frozen=True):
+    """Nothing is cheaper than the best path: the search is over."""
+
+    best: BestPath
+
+
+class SyncBB(Protocol):
+    """One agent of SyncBB. State: the `path` as it came last and what it costs (`paid`), and the `best` path.
+
+    `over`: this robot knows that the best path is proven.
+    """
+
+    messages = Path | Backtrack | Terminate
+    traits = Traits(paper="Hirayama & Yokoo 1997", synchronous=True, costs=True, privacy="constraints of lower robots")
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.rank = order.rank[problem.agent]
+        self.path: list[tuple[Value, Cost]] = []
+        self.paid: Cost = 0
+        self.best = BestPath(math.inf)
+        self.over = False
+        self._view: dict[str, Value] = {}
+
+    def start(self) -> None:
+        """The first robot makes the path; the others wait for it."""
+        if not self.problem.values:
+            self.conclude(Verdict.NO_SOLUTION)
+        elif self.rank == 0:
+            self._extend(0)
+
+    def receive(self, sender: str, message: Message) -> None:  # noqa: ARG002 - only neighbours in the order speak
+        """Dispatch on the message's type."""
+        if self.verdict is not None:
+            return
+        match cast("Path | Backtrack | Terminate", message):
+            case Path(assignments, best):
+                self.best = best
+                self.path = assignments
+                self.paid = sum(cost for _, cost in assignments)
+                names = zip(self.order.names, assignments, strict=False)
+                self._view = {name: value for name, (value, _) in names}
+                self._extend(0)
+            case Backtrack(best):
+                self.best = best
+                self._extend(0 if self.value is None else self.value + 1)
+            case Terminate(best):
+                self.best = best
+                self._take_best()
+            case never:
+                assert_never(never)
+
+    @property
+    def findings(self) -> Findings:
+        """The best path; of the first robot also what every path costs that is still to come."""
+        best = (
+            Best(self.best.bound, dict(zip(self.order.names, self.best.values, strict=True))) if self._known else None
+        )
+        return Findings(best=best, bound=self._least if self.rank == 0 else None)
+
+    def _extend(self, first: int) -> None:
+        """Add the first value from place `first` on with which the path is cheaper than the best one; none: back."""
+        for index in range(first, len(self.problem.values)):
+            if self.paid >= self.best.bound:
+                break
+            cost = self.problem.cost(index, self._view)
+            if self.paid + cost < self.best.bound:
+                self.value = index
+                path = [*self.path, (self.problem.values[index], cost)]
+                if self.rank + 1 < len(self.order.names):
+                    self.send(self.order.names[self.rank + 1], Path(path, self.best))
+                    return
+                self.best = BestPath(self.paid + cost, tuple(value for value, _ in path))
+        self._backtrack()
+
+    def _backtrack(self) -> None:
+        """The domain is exhausted: back to the robot before, of which the first has none."""
+        self.value = None
+        if self.rank > 0:
+            self.send(self.order.names[self.rank - 1], Backtrack(self.best))
+        elif self._known:
+            self._take_best()
+            for robot in self.order.names[1:]:
+                self.send(robot, Terminate(self.best))
+        else:
+            self.conclude(Verdict.NO_SOLUTION)
+
+    def _take_best(self) -> None:
+        """The search is over: decide for the own value in the best path."""
+        self.over = True
+        self.value = self.problem.values.index(self.best.values[self.rank])
+
+    @property
+    def _least(self) -> Cost | None:
+        """What every path costs at least, as the first robot can tell; None: it has not begun."""
+        if self.over:
+            return self.best.bound
+        if self.value is None:
+            return None
+        return min(self.best.bound, *self.problem.charges[self.value :])
+
+    @property
+    def _known(self) -> bool:
+        """Whether there is a best path."""
+        return self.best.bound < math.inf
