@@ -85,6 +85,20 @@ def refuse(team: Team, name: str, traits: Traits) -> None:
                 )
 
 
+def instead(team: Team, name: str) -> str:
+    """The complete protocols that minimise and can take `team`, without the one called `name`."""
+
+    def fits(other: str, traits: Traits) -> bool:
+        try:
+            refuse(team, other, traits)
+        except Unsupported:
+            return False
+        return other != name and traits.costs and traits.complete
+
+    names = [offer.name for offer in offers() if offer.protocol and fits(offer.name, offer.protocol.traits)]
+    return f"; these would do: {', '.join(names)} (--protocol)" if names else ""
+
+
 def _refuse_fewest(team: Team, options: Options, traits: Traits) -> None:
     """Who steps aside is a question of costs: a protocol for these answers it alone, any other is asked first."""
     if traits.costs and not traits.complete:

@@ -26,14 +26,14 @@ from robochoc.problem import INFINITE, Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
-from robochoc.refusals import refuse_central, refuse_unfit
+from robochoc.refusals import instead, refuse_central, refuse_unfit
 from robochoc.registry import protocol_named
 from robochoc.solver.ace import AceProcess, SolverTimeout
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.central import Judge
 from robochoc.solver.compile import Compiler, CompileTimeout, Source
 from robochoc.solver.domain import CompiledDomain, TooManySolutions
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import TooMuch, Unsupported
 from robochoc.solver.part import Brief
 
 __all__ = ["CENTRAL", "OnLoss", "Options", "Refuted", "Runtime", "ScheduleName", "Withdrawal", "solve"]
@@ -115,6 +115,8 @@ class _Run:
         )
         try:
             return self._travel(journey, protocol)
+        except TooMuch as refused:
+            raise Unsupported(f"{refused}{instead(self._team, options.protocol)}") from None
         except (TooManySolutions, CompileTimeout, _TimeOver) as limit:
             outcome = replace(self._summary(), verdict=Verdict.UNKNOWN, assignment={}, verified=False)
             return replace(_without(outcome, journey), reason="; ".join([str(limit), *journey.regrets]))

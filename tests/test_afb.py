@@ -14,8 +14,8 @@ from robochoc.message import Value
 from robochoc.outcome import Verdict
 from robochoc.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.afb import AFB, CPA, FBCPA, FBEstimate, NewSolution, Terminate
-from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.afb_bounds import Cost
+from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.part import NO_BRIEF, Brief, parts

@@ -73,10 +73,14 @@ class Report(OfEpoch, frozen=True):
 
 
 class Failed(_Control, frozen=True):
-    """I cannot go on; `unsupported`: because of my problem, not because something broke."""
+    """I cannot go on; `unsupported`: because of my problem, not because something broke.
+
+    `elsewhere`: another protocol may be able to (`TooMuch`).
+    """
 
     why: str
     unsupported: bool = False
+    elsewhere: bool = False
 
 
 # From the parent to a robot

@@ -45,7 +45,7 @@ from robochoc.outcome import Verdict
 from robochoc.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.domain import CompiledDomain
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import TooMuch, Unsupported
 from robochoc.solver.part import NO_BRIEF, Brief, Part
 
 TICK_S = 0.2
@@ -253,8 +253,9 @@ class ProcessesRun(Session):
                     self._observe(event)
             case Report():
                 robot.report = word
-            case Failed(why, unsupported):
-                raise Unsupported(why) if unsupported else RobotsLost({robot.name: why})
+            case Failed(why, unsupported, elsewhere):
+                refusal = TooMuch if elsewhere else Unsupported
+                raise refusal(why) if unsupported else RobotsLost({robot.name: why})
             case never:
                 assert_never(never)
 

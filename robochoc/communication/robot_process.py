@@ -45,18 +45,20 @@ from robochoc.communication.control import (
     unsealed,
 )
 from robochoc.communication.host import Host
-from robochoc.communication.queues import READ_BYTES, QueueReader, QueueWriter, unpack
+from robochoc.communication.queues import LARGEST_BODY, READ_BYTES, QueueReader, QueueWriter, unpack
 from robochoc.communication.system import own_memory
 from robochoc.message import Envelope
-from robochoc.observers.events import AnyEvent
+from robochoc.observers.events import AnyEvent, Sent
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import TooMuch, Unsupported
 from robochoc.solver.part import Part
 
 IDLE_S = 0.002
 """A robot that has heard nothing for so long reports its counters. Only when to ask; never whether it is over."""
 LOWEST_NICE = 19
 EVENTS_AT_ONCE = 500
+BUNDLE_BYTES = LARGEST_BODY // 4
+"""A bundle of events is closed once it tells of messages of so many bytes together."""
 _STAMP = struct.Struct("!IQ")
 _ROOM_FOR_FDS = socket.CMSG_SPACE(QUEUES_AT_ONCE * array.array("i").itemsize)
 _PR_SET_PDEATHSIG = 1
@@ -93,7 +95,7 @@ def robot_process(begin: Beginning, control: socket.socket, inherited: Sequence[
         host = Host.of(begin.protocol, begin.part)
         _RobotLoop(host, link, begin.epoch, observed=begin.observed).run()
     except Unsupported as refusal:
-        link.say(Failed(str(refusal), unsupported=True))
+        link.say(Failed(str(refusal), unsupported=True, elsewhere=isinstance(refusal, TooMuch)))
     except Exception as error:  # noqa: BLE001 - whatever it was, the parent has to know
         where = traceback.extract_tb(error.__traceback__)[-1]
         link.say(Failed(f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"))
@@ -378,6 +380,11 @@ class _RobotLoop:
         self._say(Counters(self._epoch, wave, *self._told))
 
     def _report_events(self) -> None:
-        if self._events:
-            self._say(Events(list(self._events)))
-            self._events.clear()
+        """Those that hold large messages go in bundles that the control pipe takes."""
+        events, self._events[:] = list(self._events), []
+        size = start = 0
+        for place, event in enumerate(events, 1):
+            size += event.bytes if isinstance(event, Sent) else 0
+            if size >= BUNDLE_BYTES or place == len(events):
+                self._say(Events(events[start:place]))
+                size, start = 0, place

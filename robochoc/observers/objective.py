@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from robochoc.problem import INFINITE, Constraint, Predicate, Team
-from robochoc.solver.encoding import price_on
+from robochoc.problem import INFINITE, Team
+from robochoc.solver.encoding import dearest, price_on
 
 
 class Objective:
@@ -53,14 +53,4 @@ class Objective:
 
 def aside_cost(team: Team) -> float:
     """What stepping aside has to cost, for a robot of weight 1, so that nobody does so to spare others their costs."""
-    return 1 + sum(_dearest(constraint) for constraint in team.constraints())
-
-
-def _dearest(constraint: Constraint) -> float:
-    """The most that `constraint` charges short of being broken."""
-    definition = constraint.definition
-    if isinstance(definition, Predicate):
-        prices: tuple[float, ...] = (constraint.cost,)
-    else:
-        prices = (*definition.costs, definition.default_cost)
-    return max((price for price in prices if price < INFINITE), default=0)
+    return 1 + sum(dearest(constraint) for constraint in team.constraints())

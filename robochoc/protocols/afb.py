@@ -51,8 +51,8 @@ from typing import assert_never, cast
 
 from robochoc.message import Message, Value
 from robochoc.outcome import Verdict
-from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.afb_bounds import Assignment, Cost, Estimates, Prices, Told, agreement, stamp_of
+from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits

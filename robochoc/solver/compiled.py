@@ -156,6 +156,14 @@ class LocalProblem:
         known = [constraint.prices(others) for constraint, others in self._known(view, len(self.values))]
         return [sum(prices) for prices in zip(self.charges, *known, strict=True)]
 
+    def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], float]]:
+        """Of each constraint whose other robots are all among `robots`: who these are, and the most that it charges.
+
+        That is, short of being broken, and whatever values there are: nothing is checked. See `tables`.
+        """
+        known = {*robots}
+        return [(c.agents, c.dearest) for c in self._constraints if known.issuperset(c.agents)]
+
     def added(self, robot: str, view: Mapping[str, Value]) -> list[float] | None:
         """What each own value pays once `robot` is known too, the lowest in `view`; None: no constraint waits for it.
 

@@ -29,6 +29,10 @@ class Unsupported(Exception):  # noqa: N818 - it is an answer, not a fault
     """The problem is well-formed, and this version (or this protocol) cannot take it; says why and what can."""
 
 
+class TooMuch(Unsupported):
+    """The problem is too much for this protocol, as could be seen during the search only; another may take it."""
+
+
 @dataclass(frozen=True)
 class Table:
     """A constraint on the variables at places `scope`: `rows` are the allowed code tuples, or the forbidden ones."""
@@ -115,6 +119,16 @@ def price_on(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence
         return lambda values: 0 if holds(values) else cost
     arguments = _arguments(constraint, names)
     return lambda values: definition.cost(arguments(values))
+
+
+def dearest(constraint: Constraint) -> float:
+    """The most that `constraint` charges short of being broken."""
+    definition = constraint.definition
+    if isinstance(definition, Predicate):
+        prices: tuple[float, ...] = (constraint.cost,)
+    else:
+        prices = (*definition.costs, definition.default_cost)
+    return max((price for price in prices if price < INFINITE), default=0)
 
 
 def is_soft(constraint: Constraint) -> bool:

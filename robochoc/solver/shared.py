@@ -8,7 +8,7 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 
 from robochoc.message import Value
 from robochoc.problem import Constraint
-from robochoc.solver.encoding import holds_on, price_on
+from robochoc.solver.encoding import dearest, holds_on, price_on
 
 Conflict = Mapping[str, Value]
 """Assignments of other robots that rule out an own value: the left side of a nogood."""
@@ -103,6 +103,11 @@ class SharedConstraint:
     def _holds(self, values: Sequence[int | None]) -> bool:
         """Whether the constraint holds on `values`; of a robot that steps aside (None) it asks nothing."""
         return None in values or self._test(values)  # type: ignore[arg-type]
+
+    @property
+    def dearest(self) -> float:
+        """The most that it charges short of being broken."""
+        return dearest(self._constraint)
 
     def prices(self, others: Others) -> list[float]:
         """What each own value pays when the others are as `others` says."""

@@ -1,0 +1,187 @@
+"""Tables of costs as DPOP joins, projects, keeps and sends them (see `dpop`).
+
+An axis stands for a robot, a place on it for one of the robot's values. Costs are integers, or `inf` where something
+hard is broken; they are added up in float64, which is exact below 2^53 (`EXACT`). Tables that stay, or travel, are
+of unsigned integers, as narrow as the costs allow; the largest of them stands for `inf`. How much memory an operation
+takes can be told before: `bytes_of`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.unsignedinteger[Any]]
+Table = Array | Codes
+Width = Literal[1, 2, 4, 8]
+"""Bytes that a cost takes."""
+
+EXACT = 1 << 53
+BLOCK = 1 << 17
+"""Cells of a join that are made at a time: they stay near the processor."""
+TEMPORARY = 32
+"""Bytes for each of these, at most: sums, a table's costs as they are added, and what finds the least."""
+LONGEST = 16
+"""So many blocks may be one where a single axis needs it."""
+PIECE = 1 << 24
+"""16 MiB, at most, of a table in one message: a quarter of what a queue takes."""
+_WIDTHS: tuple[Width, ...] = (1, 2, 4, 8)
+
+
+class Projection(NamedTuple):
+    """The least cost for each combination of the others' values, and the own value that it takes (the first)."""
+
+    costs: Codes
+    choices: Codes
+
+
+class Extent(NamedTuple):
+    """A table of so many cells, in which a cost takes `width` bytes."""
+
+    cells: int
+    width: int
+
+
+def width_of(dearest: int) -> Width:
+    """The bytes that a cost takes in a table where none is larger, short of `inf`."""
+    return next(width for width in _WIDTHS if dearest < _top(width))
+
+
+def bytes_of(shape: Sequence[int], own: int, width: int, inputs: Sequence[Extent]) -> int:
+    """The most that all arrays hold at any moment while a table is made and sent. Nothing is allocated.
+
+    `shape` is that of the table, `own` the number of own values, `inputs` are the tables that are joined.
+    """
+    cells = math.prod(shape)
+    block = own * math.prod(shape[_stepped(shape, own) :])
+    joining = sum(one.cells * one.width for one in inputs) + block * TEMPORARY
+    sending = cells * width + min(cells * width, PIECE)
+    return cells * (width + _choice(own).itemsize) + max(joining, sending)
+
+
+def aligned(table: Table, axes: Sequence[str], onto: Sequence[str]) -> Table:
+    """A view of `table` with an axis for each robot in `onto`: of length 1 where it says nothing of that robot.
+
+    `axes` are the robots that it has axes for; those that are not in `onto` have one value.
+    """
+    kept = [name for name in axes if name in onto]
+    table = table[tuple([slice(None) if name in onto else 0 for name in axes])]
+    table = table.transpose([kept.index(name) for name in onto if name in kept])
+    return table[tuple([slice(None) if name in kept else np.newaxis for name in onto])]
+
+
+def project(shape: Sequence[int], charges: Sequence[float], tables: Sequence[Table], width: Width) -> Projection:
+    """Add up `charges`, of the own values, and `tables`; then take the least over the own values.
+
+    `tables` have the own axis first, then the axes of `shape` (see `aligned`). The join, which is larger than the
+    result by the own axis, is never there as a whole, but block by block. Small tables are added up first.
+    """
+    costs = np.full(shape, _top(width), f"<u{width}")
+    choices = np.zeros(shape, _choice(len(charges)))
+    split = _stepped(shape, len(charges))
+    own = np.array(charges, np.float64).reshape(-1, *(1 for _ in shape[split:]))
+    tables = sorted(tables, key=lambda table: [length > 1 for length in table.shape[split + 1 :]])
+    for place in np.ndindex(*shape[:split]):
+        joined = own
+        for table in tables:
+            joined = joined + _block(table, place)
+        least = joined.min(axis=0)
+        np.copyto(costs[*place, ...], least, where=least < np.inf, casting="unsafe")
+        choices[*place, ...] = joined.argmin(axis=0)
+    return Projection(costs, choices)
+
+
+def is_hopeless(costs: Codes) -> bool:
+    """Whether all of them are `inf`."""
+    return bool(costs.min() == _top(costs.itemsize))
+
+
+def packed(costs: Codes) -> Iterator[tuple[Width, bytes]]:
+    """`costs` for the wire, in pieces: no cost takes more bytes than the dearest one needs."""
+    width = width_of(_dearest(costs))
+    flat = costs.reshape(-1)
+    step = PIECE // width
+    for start in range(0, flat.size, step):
+        # The code of `inf` is all ones, and so is what is left of it.
+        yield width, flat[start : start + step].astype(f"<u{width}", copy=False).tobytes()
+
+
+class Arriving:
+    """A table of this `shape`, no cost in which is above `dearest`, that comes in pieces.
+
+    It takes its memory with the first piece: ask `bytes_of` before.
+    """
+
+    def __init__(self, shape: Sequence[int], dearest: int) -> None:
+        self._shape = shape
+        self._dearest = dearest
+        self._left = math.prod(shape)
+        self._costs: Codes | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether all of it is there."""
+        return not self._left
+
+    @property
+    def costs(self) -> Codes:
+        """What has come. Raises `ValueError` before the first piece."""
+        if self._costs is None:
+            raise ValueError("no piece of the table has come")
+        return self._costs
+
+    def add(self, width: Width, piece: bytes) -> None:
+        """Take in the next piece. Raises `ValueError` for bytes that are none."""
+        if width > width_of(self._dearest) or (self._costs is not None and width != self._costs.itemsize):
+            raise ValueError(f"{width} bytes a cost are not what the table has")
+        if len(piece) % width or not 0 < len(piece) // width <= self._left:
+            raise ValueError(f"{len(piece)} bytes, {width} a cost, are no piece of a table that lacks {self._left}")
+        codes = np.frombuffer(piece, f"<u{width}")
+        if _dearest(codes) > self._dearest:
+            raise ValueError(f"a cost of {_dearest(codes)} is more than the most, {self._dearest}")
+        if self._costs is None:
+            self._costs = np.empty(self._shape, codes.dtype)
+        start = self._costs.size - self._left
+        self._costs.reshape(-1)[start : start + codes.size] = codes
+        self._left -= codes.size
+
+
+def _block(table: Table, place: Sequence[int]) -> Array:
+    """What `table` says at this place on the first axes after the own one, as costs that can be added."""
+    steps = [index if length > 1 else 0 for index, length in zip(place, table.shape[1:], strict=False)]
+    index: tuple[slice | int, ...] = (slice(None), *steps)
+    block = table[index]
+    costs = block.astype(np.float64, copy=False)
+    if block.dtype.kind == "u":
+        np.copyto(costs, np.inf, where=block == _top(block.itemsize))
+    return costs
+
+
+def _dearest(costs: Codes) -> int:
+    """The largest that is finite; 0 if there is none."""
+    flat = costs.reshape(-1)
+    blocks = (flat[start : start + BLOCK] for start in range(0, flat.size, BLOCK))
+    return int(max((block.max(where=block < _top(costs.itemsize), initial=0) for block in blocks), default=0))
+
+
+def _stepped(shape: Sequence[int], own: int) -> int:
+    """How many of the first axes are gone through place by place, so that what remains makes a block."""
+    split, cells, most = len(shape), own, BLOCK * LONGEST
+    while split and cells * shape[split - 1] <= most:
+        split -= 1
+        cells *= shape[split]
+        most = BLOCK
+    return split
+
+
+def _choice(own: int) -> np.dtype[np.unsignedinteger[Any]]:
+    return np.min_scalar_type(own - 1)
+
+
+def _top(width: int) -> int:
+    return (1 << 8 * width) - 1
