@@ -61,7 +61,9 @@ def placed(outcome: Outcome, team: Team, result: RunResult, domains: Domains, as
         proven = aside is not None and (out or team.kind is Kind.DISWCSP)
         outcome = replace(outcome, verdict=Verdict.OPTIMAL if proven else Verdict.SOLUTION)
     paid = cost(team, assignment)
-    return replace(outcome, assignment=dict(assignment), withdrawn=(*outcome.withdrawn, *out), cost=paid, verified=True)
+    return replace(
+        outcome, assignment=_in_order(team, assignment), withdrawn=(*outcome.withdrawn, *out), cost=paid, verified=True
+    )
 
 
 def check(team: Team, assignment: Mapping[str, int], withdrawn: Sequence[str] = (), *, maximal: bool = True) -> None:
@@ -81,6 +83,12 @@ def _best_verdict(team: Team) -> Verdict:
     return Verdict.OPTIMAL if team.kind is Kind.DISWCSP else Verdict.SOLUTION
 
 
+def _in_order(team: Team, assignment: Mapping[str, int]) -> dict[str, int]:
+    """`assignment` in the order of the files, whatever order the robots worked in."""
+    return {name: assignment[name] for name in team.variables if name in assignment}
+
+
 def _with(epoch: Epoch, team: Team, assignment: dict[str, int], verdict: Verdict) -> Epoch:
     check(team, assignment)
+    assignment = _in_order(team, assignment)
     return replace(epoch, verdict=verdict, assignment=assignment, cost=cost(team, assignment), verified=True)

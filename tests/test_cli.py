@@ -143,20 +143,30 @@ def test_solve_json_is_the_contract(runtime: str) -> None:
     assert sum(seven["metrics"]["messages_by_type"].values()) == seven["metrics"]["messages"]
 
 
-@pytest.mark.parametrize("words", [["--withdraw"], ["--withdraw", "maximal"], ["--withdraw=maximal"]])
-def test_withdraw_may_stand_alone_even_before_the_path(four: Path, words: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("words", "verdict"),
+    [
+        (["--withdraw"], "optimal"),
+        (["--withdraw", "fewest"], "optimal"),
+        (["--withdraw", "maximal"], "solution"),
+        (["--withdraw=maximal"], "solution"),
+    ],
+)
+def test_withdraw_may_stand_alone_even_before_the_path(four: Path, words: list[str], verdict: str) -> None:
     done = robochoc("solve", *words, four, "--json", "--runtime", "simulator")
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
-    assert (result["verdict"], result["verified"]) == ("solution", True)
-    assert len(result["withdrawn"]) + len(result["assignment"]) == 16
+    assert (result["verdict"], result["verified"]) == (verdict, True)
+    assert len(result["withdrawn"]) == {"optimal": 6, "solution": 7}[verdict]
+    assert len(result["assignment"]) == 16 - len(result["withdrawn"])
 
 
 def test_solve_tells_people_what_happened(four: Path) -> None:
     words = robochoc("solve", four, "--withdraw", "--runtime", "simulator").stdout
     assert "no solution for the whole team (Robot" in words
     assert "has derived the empty nogood" in words
-    assert "9 fly, 7 step aside" in words
+    assert "as few as possible (proven) step aside" in words
+    assert "10 fly, 6 step aside" in words
     assert re.search(r"row\\column +1 +2 +3 +4", words)
 
 
@@ -182,11 +192,19 @@ def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--protocol", "abd"], "did you mean 'abt'"),
+        (["--protocol", "abtt"], "did you mean 'abt'"),
         (["--runtime", "network"], "network"),
         (["--seed", "-1"], "--seed"),
         (["--timeout", "0"], "--timeout"),
-        (["--withdraw=fewest"], "fewest"),
+        (["--withdraw=most"], "fewest"),
+        (["--set", "cycles"], "NAME=VALUE"),
+        (["--set", "cycles=5"], "no setting"),
+        (["--protocol", "dsa", "--set", "cycles=0"], "cycles"),
+        (["--protocol", "dsa", "--set", "cycles=many"], "cycles"),
+        (["--protocol", "dsa", "--set", "circles=5"], "cycles"),
+        (["--protocol", "dsa", "--withdraw"], "proves nothing"),
+        (["--protocol", "central", "--set", "cycles=5"], "--set"),
+        (["--explain", "--json"], "--explain"),
         (["--nonsense"], "--nonsense"),
         (["--timeout", "nan"], "--timeout"),
         (["--html", ""], "--html"),

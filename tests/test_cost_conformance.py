@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 
@@ -14,6 +15,7 @@ from robochoc.outcome import Outcome, Verdict
 from robochoc.problem import INFINITE, Team
 from robochoc.registry import protocol_named, protocol_names
 from robochoc.run import Options, Runtime, Withdrawal, solve
+from robochoc.solver.ace import AceProcess
 
 MINIMISING = [name for name in protocol_names() if protocol_named(name).traits.costs]
 COMPLETE = [name for name in MINIMISING if protocol_named(name).traits.complete]
@@ -30,10 +32,17 @@ def team_for(protocol: str, chance: Random) -> Team:
     return random_cost_team(chance, n_ary=n_ary)
 
 
-def agrees(team: Team, options: Options) -> Outcome:
+@pytest.fixture(scope="module")
+def warm() -> Iterator[AceProcess]:
+    """A solver for complex robots that need not be started for each team."""
+    with AceProcess() as ace:
+        yield ace
+
+
+def agrees(team: Team, options: Options, warm: AceProcess) -> Outcome:
     """Solve `team`; the cost must be brute force's. `solve` itself has the assignment checked."""
     least = least_cost(team)
-    outcome = solve(team, options)
+    outcome = solve(team, options, solver=warm)
     if least == INFINITE:
         assert outcome.verdict is Verdict.NO_SOLUTION, (team, options)
     else:
@@ -45,22 +54,22 @@ def agrees(team: Team, options: Options) -> Outcome:
 
 @pytest.mark.parametrize("protocol", COMPLETE)
 @pytest.mark.parametrize("batch", BATCHES)
-def test_the_least_cost_is_found_in_the_simulator(protocol: str, batch: int) -> None:
+def test_the_least_cost_is_found_in_the_simulator(protocol: str, batch: int, warm: AceProcess) -> None:
     chance = Random(f"costs {protocol} {batch}")
     seen = {Verdict.OPTIMAL: 0, Verdict.NO_SOLUTION: 0}
     for _ in range(PER_BATCH):
         options = replace(random_schedule(chance), protocol=protocol)
-        seen[agrees(team_for(protocol, chance), options).verdict] += 1
+        seen[agrees(team_for(protocol, chance), options, warm).verdict] += 1
     assert seen[Verdict.NO_SOLUTION] > PER_BATCH // 40
     assert seen[Verdict.OPTIMAL] > PER_BATCH // 2
 
 
 @pytest.mark.parametrize("protocol", COMPLETE)
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 4))])
-def test_the_least_cost_is_found_in_processes(protocol: str, batch: int) -> None:
+def test_the_least_cost_is_found_in_processes(protocol: str, batch: int, warm: AceProcess) -> None:
     chance = Random(f"costs processes {protocol} {batch}")
     for _ in range(13):
-        agrees(team_for(protocol, chance), Options(protocol=protocol, timeout=60))
+        agrees(team_for(protocol, chance), Options(protocol=protocol, timeout=60), warm)
 
 
 @pytest.mark.parametrize("protocol", INCOMPLETE)
