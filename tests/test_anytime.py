@@ -14,7 +14,7 @@ from robochoc.anytime import best_of, bound_of, course, tree_of
 from robochoc.cli.explain import explained
 from robochoc.communication.run_result import RunResult
 from robochoc.expression import Type, parse
-from robochoc.observers.events import AnyEvent, Decided, Improved
+from robochoc.observers.events import AnyEvent, Decided, Heard, Improved
 from robochoc.observers.journal import improvements
 from robochoc.observers.objective import Objective, aside_cost
 from robochoc.outcome import Metrics, Outcome, Place, Verdict
@@ -152,6 +152,18 @@ def test_improvements_stand_right_behind_the_decision_that_made_them() -> None:
         (1, 7, {"A": 2, "B": 2}),
         (2, 3, {"A": 1, "B": 2}),
     ]
+
+
+def test_what_a_robot_has_heard_of_is_an_improvement_too() -> None:
+    events: list[AnyEvent] = [
+        Heard(t=1, robot="RB", cost=4, values={"RA": (1,), "RB": (1,)}),
+        Heard(t=2, robot="RA", cost=4, values={"RA": (1,), "RB": (1,)}),
+        Heard(t=3, robot="RB", cost=3, values={"RA": (1,), "RB": (2,)}),
+        Heard(t=4, robot="RB", cost=2, values={"RA": (1,), "RB": (None,)}),
+    ]
+    told = [event for event in improvements(events, Objective(PAIR, 2)) if isinstance(event, Improved)]
+    assert [(event.t, event.cost) for event in told] == [(1, 4), (3, 3), (4, 2)]
+    assert [event.assignment for event in told] == [{"A": 1, "B": 1}, {"A": 1, "B": 2}, {"A": 1}]
 
 
 # Trees, explained

@@ -7,6 +7,7 @@ runtime uses it, so the same run counts the same everywhere.
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable, Mapping, Sequence
 from typing import Self
@@ -14,7 +15,7 @@ from typing import Self
 import msgspec
 
 from robochoc.message import Envelope, Message, encode
-from robochoc.observers.events import Concluded, Decided, Observer, Received, Sent, Settled
+from robochoc.observers.events import Concluded, Decided, Heard, Observer, Received, Sent, Settled
 from robochoc.outcome import Metrics, Verdict
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import DynamicProtocol, Protocol, Settings
@@ -64,6 +65,7 @@ class Host:
         self._decoder = msgspec.msgpack.Decoder(protocol.messages)
         self._checks = 0
         self._reported: tuple[int | None, Verdict | None] = (None, None)
+        self._heard: float = math.inf
         self._observer: Observer | None = None
         self._now: Callable[[], float] = lambda: 0.0
 
@@ -99,6 +101,7 @@ class Host:
         self.clock = self.bytes = self._checks = 0
         self.sent = {}
         self._reported = (None, None)
+        self._heard = math.inf
 
     def handle(self, packet: Sequence[Envelope]) -> list[Envelope]:
         """Take in all waiting messages, let the protocol settle, and return what it says.
@@ -171,7 +174,11 @@ class Host:
         self._checks = self.protocol.problem.checks
 
     def _report_state(self, observer: Observer) -> None:
-        """Tell of a value or a verdict that is new since the last report."""
+        """Tell of a value, a verdict or a best assignment that is new since the last report."""
+        best = self.protocol.heard
+        if best is not None and best.cost < self._heard:
+            self._heard = best.cost
+            observer(Heard(t=self._now(), robot=self.name, cost=best.cost, values=best.values))
         state = self.protocol.value, self.protocol.verdict
         value, verdict = self._reported
         self._reported = state

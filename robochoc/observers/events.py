@@ -63,10 +63,22 @@ class Decided(Event, frozen=True):
     clock: int
 
 
-class Improved(Event, frozen=True):
-    """What all robots have decided by now is cheaper than all before; who has no value counts as stepping aside.
+class Heard(Event, frozen=True):
+    """A robot has heard of, or found, an assignment of all robots that is cheaper than those before.
 
-    No robot reports it: it follows from what they have decided, and stands in journals only.
+    `values` are the robots' values as others see them (null: one that steps aside).
+    """
+
+    robot: str
+    cost: float | int
+    values: dict[str, tuple[int | None, ...]]
+
+
+class Improved(Event, frozen=True):
+    """What all robots have decided by now, or what one has heard of, is cheaper than all before.
+
+    Who has no value counts as stepping aside. No robot reports it: it follows from what they do, and stands in
+    journals only. Of what was heard of, variables that no neighbour sees are not known.
     """
 
     cost: float | int
@@ -95,5 +107,5 @@ class Lost(Event, frozen=True):
     why: str
 
 
-AnyEvent = Began | Registered | Sent | Received | Decided | Improved | Settled | Concluded | Lost
+AnyEvent = Began | Registered | Sent | Received | Decided | Heard | Improved | Settled | Concluded | Lost
 Observer = Callable[[AnyEvent], None]

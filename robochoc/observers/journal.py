@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from robochoc.observers.events import AnyEvent, Began, Decided, Event, Improved, Sent, Settled
+from robochoc.observers.events import AnyEvent, Began, Decided, Event, Heard, Improved, Sent, Settled
 from robochoc.observers.objective import Objective
 from robochoc.outcome import Metrics, Outcome
 from robochoc.problem import INFINITE, natural
@@ -90,18 +90,23 @@ class Recorder:
 
 
 def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[AnyEvent]:
-    """`events`, and after each that makes what the robots have decided cheaper than ever an `Improved`."""
+    """`events`, and an `Improved` after each that tells of something cheaper than ever."""
     best = INFINITE
     own: dict[str, dict[str, int]] = {}
     for event in events:
         yield event
-        if not isinstance(event, Decided):
-            continue
-        own[event.robot] = event.assignment
-        objective.change({event.robot: event.assignment})
-        if objective.cost < best:
-            best = objective.cost
-            values = {name: value for robot in sorted(own, key=natural) for name, value in own[robot].items()}
+        match event:
+            case Decided():
+                own[event.robot] = event.assignment
+                objective.change({event.robot: event.assignment})
+                cost, now = objective.cost, own
+            case Heard():
+                cost, now = event.cost, objective.shown(event.values)
+            case _:
+                continue
+        if cost < best:
+            best = cost
+            values = {name: value for robot in sorted(now, key=natural) for name, value in now[robot].items()}
             yield Improved(t=event.t, cost=best, assignment=values)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from robochoc.message import Value
 from robochoc.problem import INFINITE, Team
 from robochoc.solver.encoding import dearest, price_on
 
@@ -20,6 +21,7 @@ class Objective:
         self._constraints = [(c.variables, price_on(c, c.variables)) for c in team.constraints()]
         self._paid: list[float] = [0] * len(self._constraints)
         self._on: dict[str, list[int]] = {name: [] for name in team.variables}
+        self._interfaces = {robot.name: robot.interface for robot in team.robots}
         self._variables = {robot.name: [variable.name for variable in robot.variables] for robot in team.robots}
         for number, (names, price) in enumerate(self._constraints):
             for name in names:
@@ -42,6 +44,13 @@ class Objective:
             names, price = self._constraints[number]
             known = all(name in self._values for name in names)
             self._paid[number] = price([self._values[name] for name in names]) if known else 0
+
+    def shown(self, values: Mapping[str, Value]) -> dict[str, dict[str, int]]:
+        """What `values`, as neighbours see them, say of each robot's variables."""
+        return {
+            robot: {name: part for name, part in zip(self._interfaces[robot], value, strict=True) if part is not None}
+            for robot, value in values.items()
+        }
 
     @property
     def cost(self) -> float:

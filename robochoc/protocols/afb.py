@@ -173,12 +173,16 @@ class AFB(Protocol):
         self._send_fb_estimates()
 
     @property
+    def heard(self) -> Best | None:
+        """The best solution."""
+        if self.solution is None:
+            return None
+        return Best(self.solution.cost, dict(zip(self.order.names, self.solution.values, strict=True)))
+
+    @property
     def findings(self) -> Findings:
         """The best solution that this robot has heard of; of the first one also what all solutions cost at least."""
-        best = None
-        if self.solution is not None:
-            best = Best(self.solution.cost, dict(zip(self.order.names, self.solution.values, strict=True)))
-        return Findings(best=best, bound=self._bound_of_all())
+        return Findings(best=self.heard, bound=self._bound_of_all())
 
     # What the messages do
 

@@ -15,7 +15,7 @@ import msgspec
 
 from robochoc.message import Message
 from robochoc.outcome import Verdict
-from robochoc.protocols.findings import NOTHING, Findings
+from robochoc.protocols.findings import NOTHING, Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
@@ -79,6 +79,11 @@ class Protocol(ABC):
     def assignment(self) -> dict[str, int]:
         """The own variables' values as decided; empty while unassigned."""
         return {} if self.value is None else self.problem.solution(self.value)
+
+    @property
+    def heard(self) -> Best | None:
+        """The cheapest assignment of all robots that this one has heard of, or has found; None: of none so far."""
+        return None
 
     @property
     def findings(self) -> Findings:

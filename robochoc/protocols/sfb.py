@@ -266,6 +266,14 @@ class SFB(Protocol):
     # What is known so far
 
     @property
+    def heard(self) -> Best | None:
+        """The best solution that has come by here."""
+        if self.best is None:
+            return None
+        chosen = zip(self.order.names, self.domains, self.best.places, strict=True)
+        return Best(self.best.cost, {name: values[place] for name, values, place in chosen})
+
+    @property
     def findings(self) -> Findings:
         """The best solution that has come by here; the first robot's least bound of all that is not explored."""
         if not self.ceiling:
@@ -274,7 +282,4 @@ class SFB(Protocol):
         if self.previous is None:
             left = [int(batch.rows[:, BOUND].min()) for batch in self.batches if len(batch.rows)]
             bound = min([self.least, *left, *(least for _, least in self.under_way)])
-        if self.best is None:
-            return Findings(bound=bound)
-        chosen = zip(self.order.names, self.domains, self.best.places, strict=True)
-        return Findings(Best(self.best.cost, {name: values[place] for name, values, place in chosen}), bound)
+        return Findings(self.heard, bound)

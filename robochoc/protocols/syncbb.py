@@ -113,12 +113,16 @@ class SyncBB(Protocol):
                 assert_never(never)
 
     @property
-    def findings(self) -> Findings:
-        """The best path; of the first robot also what every path costs that is still to come."""
-        best = (
+    def heard(self) -> Best | None:
+        """The best path."""
+        return (
             Best(self.best.bound, dict(zip(self.order.names, self.best.values, strict=True))) if self._known else None
         )
-        return Findings(best=best, bound=self._least if self.rank == 0 else None)
+
+    @property
+    def findings(self) -> Findings:
+        """The best path; of the first robot also what every path costs that is still to come."""
+        return Findings(best=self.heard, bound=self._least if self.rank == 0 else None)
 
     def _extend(self, first: int) -> None:
         """Add the first value from place `first` on with which the path is cheaper than the best one; none: back."""
