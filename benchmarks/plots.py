@@ -12,6 +12,7 @@ from statistics import mean, median
 from typing import NamedTuple
 
 import dynamic
+import local_search
 import matplotlib as mpl
 import optimum
 import sweep
@@ -50,6 +51,14 @@ STYLES = {
     "awc": Style("#009e73", marker="D"),
     "disfc": Style(GREY, marker="s"),
     "sbt": Style(GREY, "--", "v"),
+}
+LOCAL_STYLES = {
+    "dsa A": Style("#56b4e9", marker="s"),
+    "dsa B": Style("#0072b2"),
+    "dsa C": Style("#0072b2", "--", "D"),
+    "mgm": Style("#000000", marker="^"),
+    "mgm2": Style("#e69f00", marker="s"),
+    "maxsum": Style("#d55e00", marker="D"),
 }
 SERIES_STYLES = (
     Style("#56b4e9"),
@@ -168,6 +177,29 @@ def _dots(axes: Axes, height: int, values: Sequence[float], ended: Sequence[bool
     axes.plot([median(values)] * 2, [height - 0.3, height + 0.3], color="#d55e00", linewidth=2)
 
 
+def draw_local_search() -> None:
+    """The cost over the cycles: one panel a degree."""
+    points = read_rows(local_search.DATA, local_search.Point)
+    figure, places = plt.subplots(1, len(local_search.DEGREES), figsize=(12, 5), sharey=True)
+    drawn = [[_over_cycles(label, degree, points) for label in LOCAL_STYLES] for degree in local_search.DEGREES]
+    for axes, degree, lines in zip(places, local_search.DEGREES, drawn, strict=True):
+        _lines(axes, lines)
+        ticks = [cycle for cycle in local_search.SHOWN if cycle in {1, 2, 3, 5, 10, 20, 50, 100}]
+        axes.set(xscale="log", xlabel="cycle", title=f"1,000 robots, 3 colours, average degree {degree}")
+        axes.set_xticks(ticks, [str(tick) for tick in ticks], minor=False)
+        axes.minorticks_off()
+    places[0].set_ylabel("conflicts, mean")
+    for axes, lines in zip(places, drawn, strict=True):
+        _name(axes, lines)
+    _save(figure, "local-search")
+
+
+def _over_cycles(label: str, degree: int, points: Iterable[local_search.Point]) -> Line:
+    mine = sorted((one.cycle, one.cost_mean) for one in points if (one.degree, one.label) == (degree, label))
+    cycles, costs = zip(*(one for one in mine if one[0]), strict=True)
+    return Line(label, LOCAL_STYLES[label], cycles, costs)
+
+
 # Lines with their labels
 
 
@@ -225,7 +257,12 @@ def _save(figure: Figure, name: str) -> None:
     plt.close(figure)
 
 
-DRAWN: dict[str, Callable[[], None]] = {"sweep": draw_sweep, "dynamic": draw_dynamic, "optimum": draw_optimum}
+DRAWN: dict[str, Callable[[], None]] = {
+    "sweep": draw_sweep,
+    "dynamic": draw_dynamic,
+    "optimum": draw_optimum,
+    "local_search": draw_local_search,
+}
 
 mpl.use("svg")
 mpl.rcParams.update({"svg.hashsalt": "robochoc", "svg.fonttype": "none", "path.simplify": True})

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import dynamic
 import flagship
+import local_search
 import optimum
 import peers
 import simulated
@@ -40,6 +41,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "variants": variants.measured,
     "dynamic": dynamic.measured,
     "optimum": optimum.measured,
+    "local_search": local_search.measured,
 }
 """Parts that take longer than all others together: only when they are named."""
 ALL = {**PARTS, **LONG}

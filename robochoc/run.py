@@ -138,7 +138,7 @@ class _Run:
             epoch = Epoch(Verdict.NO_SOLUTION, journey.team.order, verified=sure, witness=alone, confirmed=sure)
             outcome = replace(self._told(epoch), reason=reason)
         if outcome.verdict is Verdict.UNKNOWN and outcome.reason is None:
-            outcome = replace(outcome, reason=self._limit(outcome.witness))
+            outcome = replace(outcome, reason=self._limit(outcome.witness, sum(outcome.metrics.messages.values())))
         if journey.regrets:
             outcome = replace(outcome, reason="; ".join([*filter(None, [outcome.reason]), *journey.regrets]))
         if outcome.verdict is Verdict.NO_SOLUTION and self._options.withdraw is not None:
@@ -146,15 +146,15 @@ class _Run:
             outcome = self._placed(outcome, journey, protocol_named(FEWEST) if fewest else FirstFit)
         return outcome
 
-    def _limit(self, witness: str | None) -> str:
-        """Why there is no verdict."""
+    def _limit(self, witness: str | None, sent: int) -> str:
+        """Why there is no verdict, after so many messages."""
         if witness is not None:
             return f"{witness} gave up, as its protocol has it"
         if self._left_s() == 0:
             return f"the time was over (--timeout {self._options.timeout:g})"
-        if self._options.messages is not None:
-            return f"so many messages have been sent (--messages {self._options.messages})"
-        return f"{self._options.protocol} proves nothing, and has found nothing that breaks no hard constraint"
+        if self._options.messages is None or sent < self._options.messages:
+            return f"{self._options.protocol} has come to its end, and all that it came by breaks a hard constraint"
+        return f"so many messages have been sent (--messages {self._options.messages})"
 
     def _play(
         self, journey: Journey, protocol: type[Protocol], domains: Mapping[str, CompiledDomain]
@@ -169,8 +169,8 @@ class _Run:
 
     def _placed(self, outcome: Outcome, journey: Journey, protocol: type[Protocol]) -> Outcome:
         """Who finds a place among those that are left, as `protocol` has it; the others step aside."""
-        asked_for = protocol_named(self._options.protocol) is protocol
-        brief = Brief(self._options.seed, self._options.settings if asked_for else {})
+        asked_for = protocol is protocol_named(self._options.protocol)
+        brief = self._brief if asked_for else Brief(self._options.seed)
         if protocol.traits.costs:
             brief = brief._replace(aside=aside_cost(self._team))
         while True:
@@ -187,7 +187,7 @@ class _Run:
         spent = replace(outcome.metrics + result.metrics, compile_s=self._compile_s)
         outcome = placed(replace(_without(outcome, journey), metrics=spent), journey.team, result, domains, brief.aside)
         if outcome.verdict is Verdict.UNKNOWN:
-            return replace(outcome, reason=self._limit(None))
+            return replace(outcome, reason=self._limit(None, sum(spent.messages.values())))
         if outcome.verdict is not Verdict.OPTIMAL or brief.aside is None:
             return outcome
         total = total_cost(journey.team, outcome.assignment, brief.aside)

@@ -41,9 +41,12 @@ def fixed_teams(protocol: str) -> dict[str, Team]:
 
 
 def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
-    """The journal of the fixed run; the wall-clock time, which is not fixed, is left out."""
+    """The journal of the fixed run, of a few cycles; the wall-clock time, which is not fixed, is left out."""
     withdraw = None if team.dynamic else Withdrawal.MAXIMAL
-    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, schedule=schedule, withdraw=withdraw)
+    settings = {"cycles": "3"} if hasattr(protocol_named(protocol).settings, "cycles") else {}
+    options = Options(
+        protocol=protocol, runtime=Runtime.SIMULATOR, schedule=schedule, withdraw=withdraw, settings=settings
+    )
     recorder = Recorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=0))
     solve(team, options, observer=recorder)
     return recorder.content()

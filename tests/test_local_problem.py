@@ -72,6 +72,44 @@ def test_conflicts_are_those_of_the_files(batch: int) -> None:
     assert min(seen[0], seen[1], seen[2]) > 50
 
 
+def test_burdens_are_broken_constraints_and_what_the_others_charge() -> None:
+    soft = Relation("S", 2, Semantics.SOFT, ((1, 1), (2, 1)), (3, 5), 0)
+    prices = Relation("P", 1, Semantics.SOFT, ((1,), (2,)), (7, 0))
+    constraints = [
+        Constraint("C", EQUAL, ("A", "C"), ("A", "C")),
+        Constraint("C", soft, ("B", "C"), ("B", "C")),
+        Constraint("P", prices, ("C",), ("C",)),
+    ]
+    problem = LocalProblem(parts(team_of(dict.fromkeys("ABC", (1, 2)), constraints))["RC"])
+    assert problem.burdens({}) == [(0, 7), (0, 0)]
+    assert problem.checks == 0
+    assert problem.burdens({"RA": (1,), "RB": (1,)}) == [(0, 10), (1, 0)]
+    assert problem.checks == 4
+    assert problem.burdens({"RA": (2,), "RB": (2,)}) == [(1, 12), (0, 0)]
+
+
+@pytest.mark.parametrize("batch", range(2))
+def test_burdens_are_costs_where_nothing_is_broken(batch: int) -> None:
+    """They take as many checks; of what is broken `violated` says as much."""
+    chance = Random(f"burdens {batch}")
+    seen = Counter[bool]()
+    for _ in range(40):
+        team = random_cost_team(chance)
+        given = {name: chance.choice(sorted(v.domain)) for name, v in team.variables.items()}
+        for part in parts(team, everywhere=True).values():
+            problem = LocalProblem(part)
+            view = {name: value for name, value in _view(team, given).items() if chance.random() < 0.8}
+            costs = problem.costs(view)
+            checks = problem.checks
+            burdens = problem.burdens(view)
+            assert problem.checks == 2 * checks
+            for index, (broken, cost) in enumerate(burdens):
+                assert broken == problem.violated(index, view)
+                assert (costs[index] == cost) if broken == 0 else (costs[index] == INFINITE > cost)
+                seen[broken > 0] += 1
+    assert min(seen[True], seen[False]) > 50
+
+
 @pytest.mark.parametrize("batch", range(2))
 def test_the_first_conflict_is_the_one_that_is_explained(batch: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whether conflicts are looked up one by one or for all values at once."""

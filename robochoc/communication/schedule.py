@@ -62,7 +62,9 @@ class Concurrent(Schedule):
         self._last_arrival[edge] = arrival
         inbox = self._inboxes.setdefault(envelope.receiver, [])
         first = not inbox or arrival < inbox[0][0]
-        heapq.heappush(inbox, (arrival, next(self._count), envelope._replace(clock=arrival)))
+        if arrival > envelope.clock:
+            envelope = envelope._replace(clock=arrival)
+        heapq.heappush(inbox, (arrival, next(self._count), envelope))
         if first:
             self._note(envelope.receiver)
 

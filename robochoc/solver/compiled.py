@@ -18,7 +18,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from robochoc.message import Value
-from robochoc.problem import Model
+from robochoc.problem import INFINITE, Model
 from robochoc.solver.domain import compiled_domain
 from robochoc.solver.explanation import Known, held, held_below
 from robochoc.solver.filters import Filters
@@ -28,6 +28,10 @@ from robochoc.solver.shared import Conflict, Others, OwnValues, SharedConstraint
 if TYPE_CHECKING:
     from robochoc.solver.conflict_table import ConflictTable
     from robochoc.solver.cost_table import CostTable
+
+Burden = tuple[int, float]
+"""How many constraints a value breaks, and what all others charge for it. Pairs compare as tuples do: a broken
+constraint weighs more than any cost, and differences are never `inf - inf`."""
 
 LARGE = 64
 """From so many values on, conflicts are looked up for all of them at once, in numpy."""
@@ -156,6 +160,14 @@ class LocalProblem:
         known = [constraint.prices(others) for constraint, others in self._known(view, len(self.values))]
         return [sum(prices) for prices in zip(self.charges, *known, strict=True)]
 
+    def burdens(self, view: Mapping[str, Value]) -> list[Burden]:
+        """Like `costs`, for those who compare costs of assignments that break something."""
+        costs = self.costs(view)
+        if INFINITE not in costs:
+            return [(0, cost) for cost in costs]
+        known = [constraint.prices(others) for constraint, others in self._known(view, 0)]
+        return [_burden(prices) for prices in zip(self.charges, *known, strict=True)]
+
     def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], float]]:
         """Of each constraint whose other robots are all among `robots`: who these are, and the most that it charges.
 
@@ -258,6 +270,11 @@ class LocalProblem:
 def _summed(size: int, rows: Sequence[Sequence[float]]) -> list[float]:
     """The sum of `rows`, each of `size` values."""
     return [sum(prices) for prices in zip(*rows, strict=True)] if rows else [0] * size
+
+
+def _burden(prices: Sequence[float]) -> Burden:
+    """What `prices` come to."""
+    return prices.count(INFINITE), sum([price for price in prices if price < INFINITE])
 
 
 def _by_robot(constraints: Iterable[SharedConstraint]) -> dict[str, list[SharedConstraint]]:

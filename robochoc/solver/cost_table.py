@@ -1,11 +1,13 @@
 """What a constraint charges for every combination of values, as an array: for protocols that compute with tables.
 
-Costs are floats, as a broken hard constraint costs `inf`; integers up to 2^53 are exact in them.
+Costs are floats, as a broken hard constraint costs `inf`; integers up to 2^53 are exact in them. A table has at most
+as many entries as a constraint may have tuples of values to be tried on (`MOST_TUPLES`).
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -13,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.message import Value
+from robochoc.solver.encoding import MOST_TUPLES, Unsupported
 from robochoc.solver.shared import Others, SharedConstraint
 
 Array = NDArray[np.float64]
@@ -32,8 +35,17 @@ class CostTable(NamedTuple):
 def cost_table(
     constraint: SharedConstraint, domains: Mapping[str, Sequence[Value]], size: int
 ) -> tuple[int, CostTable]:
-    """How many checks it takes, and the table of `constraint` over `domains` and the `size` own values."""
+    """How many checks it takes, and the table of `constraint` over `domains` and the `size` own values.
+
+    Raises `Unsupported` when that is too large.
+    """
     columns = [domains[agent] for agent in constraint.agents]
+    entries = math.prod(map(len, columns)) * size
+    if entries > MOST_TUPLES:
+        raise Unsupported(
+            f"the table of constraint {constraint.key} has {entries:,} entries, more than {MOST_TUPLES:,}; split the"
+            " constraint, or choose a protocol that computes without tables"
+        )
     charges = np.zeros([*map(len, columns), size], np.float64)
     seen: set[Others] = set()
     for place in itertools.product(*(range(len(column)) for column in columns)):

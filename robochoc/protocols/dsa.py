@@ -1,0 +1,91 @@
+"""The Distributed Stochastic Algorithm (DSA), variants A, B and C.
+
+Fitzpatrick, Meertens: "An experimental assessment of a stochastic, anytime, decentralized, soft colourer for sparse
+graphs", SAGA 2001; Zhang, Wang, Xing, Wittenburg: "Distributed stochastic search and distributed breakout: properties,
+comparison and applications to constraint optimization problems in sensor networks", AIJ 161, 2005, Section 3. Its
+Algorithm 1, line by line:
+
+    randomly choose a value                                        `begin`
+    while no termination condition is met: send the value, if      `_tell_value`
+      it is new, collect neighbours' new values
+    select and assign the next value (Table 1)                     `_choose`
+
+Incomplete, synchronous, anytime, for costs. In each cycle a robot looks for the value that is best against what its
+neighbours had in the cycle before, and takes it with a probability, so that not all neighbours move at once. Let the
+gain be what it would save. Variant A moves only if it gains; B also if it gains nothing and is in conflict; C also if
+it gains nothing at all. B is the default: of the three Zhang and others found it the best on colouring problems, as
+sideways moves take it out of plateaus, and it comes to rest where there is no conflict.
+
+What the paper leaves open, or is settled otherwise here: the value is told in each cycle, also if it is the old one,
+for how else would neighbours know that the cycle is over; a robot is in conflict when a shared constraint is broken
+or charges anything; constraints may be n-ary, and each robot of a scope weighs what the constraint charges for
+itself; fewer broken hard constraints are always better; of several best values one is drawn by lot.
+
+>>> from robochoc.communication.schedule import Concurrent
+>>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(4), DSA, Concurrent(seed=0)).search()
+>>> result.metrics.messages
+{'Value': 15200}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+from robochoc.message import Message
+from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, CycleSettings, Value, gain, said
+from robochoc.protocols.traits import Traits
+
+
+class DSASettings(CycleSettings, frozen=True):
+    """`variant`: A, B or C. `probability` (p): with which a robot moves. `cycles`: after so many all robots stop."""
+
+    variant: Literal["A", "B", "C"] = "B"
+    probability: float = 0.7
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 < self.probability <= 1:
+            raise ValueError(f"probability is {self.probability:g}; it must be more than 0 and at most 1")
+
+
+class DSA(CycleProtocol):
+    """One agent of DSA. A cycle has one phase: all tell their values."""
+
+    messages = Value
+    settings: DSASettings = DSASettings()
+    traits = Traits(
+        paper="Fitzpatrick & Meertens 2001; Zhang, Wang, Xing, Wittenburg 2005",
+        complete=False,
+        costs=True,
+        everywhere=True,
+        privacy="constraints among others",
+    )
+
+    def begin(self) -> None:
+        """Take any value."""
+        self.take(self.any_value())
+        self._tell_value()
+
+    def _tell_value(self) -> None:
+        self.tell(self.problem.neighbours, Value(self.problem.values[self.present]))
+        self.listen(self.problem.neighbours, self._choose)
+
+    def _choose(self, heard: Mapping[str, Message]) -> None:
+        """All neighbours' values are known: move, or stay."""
+        burdens = self.problem.burdens(said(heard))
+        now, least = burdens[self.present], min(burdens)
+        index = self.present
+        if gain(now, least) > NO_GAIN or self._moves_sideways(now != (0, self.problem.charges[index])):
+            best = [place for place, burden in enumerate(burdens) if burden == least and place != index]
+            if best and self.chance() < self.settings.probability:
+                index = self.any_of(best)
+        self.take(index)
+        if not self.over:
+            self._tell_value()
+
+    def _moves_sideways(self, conflict: bool) -> bool:  # noqa: FBT001 - the variants' only question
+        """Whether a robot that gains nothing may move all the same."""
+        return self.settings.variant == "C" or (self.settings.variant == "B" and conflict)

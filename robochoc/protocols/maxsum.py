@@ -1,0 +1,191 @@
+"""Max-Sum.
+
+Farinelli, Rogers, Petcu, Jennings: "Decentralised coordination of low-power embedded devices using the max-sum
+algorithm", AAMAS 2008, Section 4, whose equations the methods bear:
+
+    Q, from variable to function (1)   `_q`
+    R, from function to variable (2)   `Function.r`
+    Z, and the value (3)               `_z`, `_decide`
+    preferences gamma                  `preferences`
+
+Damping: Cohen, Galiki, Zivan: "Governing convergence of Max-sum on DCOPs through damping and splitting", AIJ 279, 2020.
+
+Incomplete, synchronous, anytime, for costs (so it is the minimum of sums). Robots pass messages on the factor graph:
+each robot's variable is a node, and so is what constraints over the same robots charge together, a function. R says
+what each value of a variable costs at best by a function, by what the other variables in it told; Q says what each
+value costs by all other functions. A robot takes the value that costs least by all. On a graph without cycles that is
+an optimum, elsewhere an estimate that often is good, and need not settle.
+
+A function lives with the lowest robot of its scope, who alone knows the constraint; messages between nodes of one robot
+are not sent. In a cycle all functions say R, then all variables Q. What one robot has to say to another goes in one
+message: a row for each function that both are in. First of all, robots tell their domains to those who hold their
+functions.
+
+Ties: where values are alike, as colours are, all estimates would stay the same. So each value of each robot has a
+preference, a charge too small to matter otherwise, drawn by lot: the paper's gamma.
+
+What the paper leaves open, or is settled otherwise here: Q is damped; it is normalised so that its smallest entry is 0
+(the paper: so that they sum to 0), as entries may be infinite: a value that breaks a hard constraint whatever others do
+costs `inf`, and nothing is ever subtracted from that. It stays out, for what makes it so is never taken back; a robot
+all of whose values are out has proven that there is no solution. Constraints may be n-ary, up to a size of their
+tables.
+
+>>> from robochoc.communication.schedule import Concurrent
+>>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(2), MaxSum, Concurrent(seed=0)).search()
+>>> result.verdict.value, result.metrics.messages
+('no-solution', {'Domain': 6, 'R': 4})
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from operator import add, sub
+
+from robochoc import message as wire
+from robochoc.outcome import Verdict
+from robochoc.problem import INFINITE
+from robochoc.protocols.cycles import CycleProtocol, CycleSettings, Domain
+from robochoc.protocols.factor import Factor, Row
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.traits import Traits
+from robochoc.solver.compiled import LocalProblem
+
+
+class R(wire.Message, frozen=True):
+    """What each value of the receiver costs by each of the sender's functions that it is in."""
+
+    rows: list[Row]
+
+
+class Q(wire.Message, frozen=True):
+    """What each value of the sender costs by all but one function: for each of the receiver's, in the order of R."""
+
+    rows: list[Row]
+
+
+class MaxSumSettings(CycleSettings, frozen=True):
+    """`damping`: the share of the last Q in a new one. `preference`: of a value, at most. `cycles`: how many."""
+
+    damping: float = 0.5
+    preference: float = 0.01
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 <= self.damping < 1:
+            raise ValueError(f"damping is {self.damping:g}; it must be from 0 to below 1")
+        if not 0 <= self.preference < INFINITE:
+            raise ValueError(f"preference is {self.preference:g}; it must be a number, 0 or more")
+
+
+class MaxSum(CycleProtocol):
+    """One agent of Max-Sum: its variable, and the functions of which it is the lowest robot.
+
+    Those `above` hear R from this robot and say Q to it, those `below` say R and hear Q. `factors` are the own
+    functions, `edges` the last Q to each function: to the own ones first, then those of each robot below.
+    """
+
+    messages = Domain | R | Q
+    settings: MaxSumSettings = MaxSumSettings()
+    traits = Traits(
+        paper="Farinelli, Rogers, Petcu, Jennings 2008",
+        complete=False,
+        costs=True,
+        privacy="constraints among others",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        place = order.rank[problem.agent]
+        self.above = tuple(name for name in problem.neighbours if order.rank[name] < place)
+        self.below = tuple(name for name in problem.neighbours if order.rank[name] > place)
+        self.factors: list[Factor] = []
+        self.preferred: Row = []
+        self.edges: list[Row] = []
+        self._own: list[Row] = []
+
+    def begin(self) -> None:
+        """Take the value that is best by itself, and tell all values to those who hold the own functions."""
+        preference = self.settings.preference
+        self.preferred = [cost + preference * self.chance() for cost in self.problem.costs({})]
+        self.take(_cheapest(self.preferred))
+        self.tell(self.below, Domain(list(self.problem.values)))
+        self.listen(self.above, self._build)
+
+    def _build(self, heard: Mapping[str, wire.Message]) -> None:
+        """The domains of all in the own functions are known. All Q are 0 at first."""
+        domains = {name: told.values for name, told in heard.items() if isinstance(told, Domain)}
+        self.factors = Factor.joined(self.problem.tables(domains))
+        self.edges = [[0.0] * len(self.preferred) for _ in self.factors]
+        zeros = {name: [[0.0] * len(values)] * len(self._with(name)) for name, values in domains.items()}
+        self._tell_r(zeros)
+
+    def _hear_q(self, heard: Mapping[str, wire.Message]) -> None:
+        """All Q have come."""
+        self._tell_r({name: told.rows for name, told in heard.items() if isinstance(told, Q)})
+
+    def _tell_r(self, heard: Mapping[str, Sequence[Row]]) -> None:
+        """What the own functions say to their variables; to the own one without a message."""
+        rows = {name: iter(told) for name, told in heard.items()}
+        said: dict[str, list[Row]] = {name: [] for name in self.above}
+        self._own = []
+        for factor, own in zip(self.factors, self.edges, strict=False):
+            *others, last = factor.r([*(next(rows[name]) for name in factor.agents), own])
+            self._own.append(last)
+            for name, row in zip(factor.agents, others, strict=True):
+                said[name].append(row)
+        for name in self.above:
+            self.send(name, R(said[name]))
+        self.listen(self.below, self._decide)
+
+    def _decide(self, heard: Mapping[str, wire.Message]) -> None:
+        """All R have come: take the value that costs least, and say Q."""
+        told = {name: said.rows for name, said in heard.items() if isinstance(said, R)}
+        rows = [*self._own, *(row for rows in told.values() for row in rows)]
+        z = self._z(rows)
+        if min(z) == INFINITE:
+            self.conclude(Verdict.NO_SOLUTION)
+            return
+        self.take(_cheapest(z))
+        if self.over:
+            return
+        self.edges = self._q(rows, z)
+        done = len(self.factors)
+        for name, answered in told.items():
+            self.send(name, Q(self.edges[done : done + len(answered)]))
+            done += len(answered)
+        self.listen(self.above, self._hear_q)
+
+    def _z(self, rows: Sequence[Row]) -> Row:
+        """What each value costs by the preferences and all of `rows`."""
+        z = self.preferred
+        for row in rows:
+            z = list(map(add, z, row))  # not `sum`, which rounds as the version of Python has it
+        return z
+
+    def _q(self, rows: Sequence[Row], z: Row) -> list[Row]:
+        """What each value costs by all but one of `rows`, for each of them."""
+        if INFINITE in z:
+            fresh = [self._z([*rows[:place], *rows[place + 1 :]]) for place in range(len(rows))]
+        else:
+            fresh = [list(map(sub, z, row)) for row in rows]
+        normal = []
+        for row in fresh:
+            least = min(row)
+            normal.append([entry - least for entry in row])
+        damping = self.settings.damping
+        if self.cycle == 1 or not damping:
+            return normal
+        return [
+            [damping * old + (1 - damping) * new for old, new in zip(*pair, strict=True)]
+            for pair in zip(self.edges, normal, strict=True)
+        ]
+
+    def _with(self, name: str) -> list[Factor]:
+        return [factor for factor in self.factors if name in factor.agents]
+
+
+def _cheapest(row: Row) -> int:
+    """The place of the least entry, the first of several."""
+    return row.index(min(row))

@@ -1,0 +1,107 @@
+"""Maximum Gain Message (MGM).
+
+Maheswaran, Pearce, Tambe: "Distributed algorithms for DCOP: a graphical-game-based approach", PDCS 2004, Section 3;
+Pearce, "Local optimization in cooperative agent networks", PhD thesis, 2007. A modification of distributed breakout
+(Yokoo, Hirayama 1996) that has no weights. The paper's procedure (Algorithm MGM, `allNeighbors`, `currentContext`):
+
+    SendValueMessage, GetValueMessages   `_tell_value`, `_weigh`
+    BestUnilateralGain                   `_weigh`
+    SendGainMessage, GetGainMessages     `_weigh`, `_move`
+    if gain > max(neighbours' gains)     `_move`
+
+Incomplete, synchronous, anytime, for costs. All robots tell their values, then by how much each would gain if it alone
+moved; of neighbours only the one that gains most moves. So what a move saves its robot it saves the team: the cost
+never rises from one cycle to the next, and who cannot gain any more stays: a local optimum.
+
+What the paper leaves open: the first value is drawn by lot, and so is one of several best values; of neighbours that
+gain the same the one that comes first in the priority order moves; constraints may be n-ary, as all robots of a scope
+are neighbours; a gain is a pair, of broken hard constraints first, so the search also works on plain DisCSPs.
+
+>>> from robochoc.communication.schedule import Concurrent
+>>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(4), MGM, Concurrent(seed=0)).search()
+>>> result.metrics.messages
+{'Gain': 15200, 'Value': 15200}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from robochoc import message as wire
+from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, Value, gain, said
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.traits import Traits
+from robochoc.solver.compiled import Burden, LocalProblem
+
+
+class Gain(wire.Message, frozen=True):
+    """What the sender's move would save: broken hard constraints, and costs (`gain`)."""
+
+    broken: int
+    cost: int | float
+
+
+class Gainers(CycleProtocol):
+    """What MGM and MGM-2 have in common: cycles begin with values, and gains decide who of neighbours moves.
+
+    `target` is the value that this robot would move to, and `gain` what that would save.
+    """
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.target = 0
+        self.gain: Burden = NO_GAIN
+
+    def best_unilateral(self, view: Mapping[str, wire.Value]) -> None:
+        """The best move of this robot alone, which may be to stay (BestUnilateralGain)."""
+        burdens = self.problem.burdens(view)
+        least = min(burdens)
+        self.gain = gain(burdens[self.present], least)
+        self.target = self.present
+        if self.gain > NO_GAIN:
+            self.target = self.any_of([place for place, burden in enumerate(burdens) if burden == least])
+
+    def wins(self, gains: Mapping[str, wire.Message]) -> bool:
+        """Whether this robot gains, and more than all in `gains`; of equals, who comes first in the order."""
+        rank = self.order.rank
+        return self.gain > NO_GAIN and all(
+            (self.gain, rank[name]) > ((told.broken, told.cost), rank[self.problem.agent])
+            for name, told in gains.items()
+            if isinstance(told, Gain)
+        )
+
+
+class MGM(Gainers):
+    """One agent of MGM. A cycle has two phases: all tell their values, then their gains."""
+
+    messages = Value | Gain
+    traits = Traits(
+        paper="Maheswaran, Pearce, Tambe 2004",
+        complete=False,
+        costs=True,
+        everywhere=True,
+        privacy="constraints among others",
+    )
+
+    def begin(self) -> None:
+        """Take any value."""
+        self.take(self.any_value())
+        self._tell_value()
+
+    def _tell_value(self) -> None:
+        self.tell(self.problem.neighbours, Value(self.problem.values[self.present]))
+        self.listen(self.problem.neighbours, self._weigh)
+
+    def _weigh(self, heard: Mapping[str, wire.Message]) -> None:
+        """All neighbours' values are known: say what the best own move would save."""
+        self.best_unilateral(said(heard))
+        self.tell(self.problem.neighbours, Gain(*self.gain))
+        self.listen(self.problem.neighbours, self._move)
+
+    def _move(self, heard: Mapping[str, wire.Message]) -> None:
+        """All neighbours' gains are known: move, or let others."""
+        self.take(self.target if self.wins(heard) else self.present)
+        if not self.over:
+            self._tell_value()

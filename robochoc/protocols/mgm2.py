@@ -1,0 +1,212 @@
+"""Coordinated Maximum Gain Message (MGM-2).
+
+Maheswaran, Pearce, Tambe: "Distributed algorithms for DCOP: a graphical-game-based approach", PDCS 2004, Section 3
+(SCA-2 and MGM-2); Pearce, "Local optimization in cooperative agent networks", PhD thesis, 2007. The phases of a cycle:
+
+    value messages                              `_tell_value`, `_offer`
+    offers (offerers), to one neighbour each    `_offer`, `_answer`
+    accept, reject                              `_answer`, `_hear_answer`
+    gain messages                               `_tell_gain`, `_decide`
+    go, no go (of two that are committed)       `_decide`, `_go`
+
+Incomplete, synchronous, anytime, for costs. MGM in which two neighbours may also move together. In each cycle a robot
+is an offerer with probability `threshold` (the paper's q), and makes one of its neighbours, drawn by lot, an offer:
+what each pair of their values would save it. A receiver adds what constraints that the offerer has no part in would
+save, so those that both have part in count once. It accepts the best of all offers if that saves anything; then both
+are committed, and their gain is the pair's. As in MGM, who gains most among its neighbours moves; of a pair both have
+to, each among its neighbours other than the partner. The cost never rises from one cycle to the next.
+
+What the paper leaves open, or is settled otherwise here: an offer names all pairs of values, also those by which the
+offerer alone does not gain. Left out, as in the paper, moves are missed that save the team something though each of
+the two saves less than nothing while what they share is laid at its own door; with them, who comes to rest is at a
+2-optimum. Robots that are no offerers, or have no offer for a neighbour, say so, for how else would it know that all
+offers have come. Values, the first ones and those that are equally good, and equal gains are settled as in `mgm`;
+constraints may be n-ary.
+
+>>> from robochoc.communication.schedule import Concurrent
+>>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(2), MGM2, Concurrent(seed=0)).search()
+>>> result.metrics.messages
+{'Accept': 3, 'Domain': 12, 'Gain': 1200, 'Go': 6, 'Offer': 1200, 'Reject': 208, 'Value': 1200}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from robochoc import message as wire
+from robochoc.protocols.cycles import NO_GAIN, CycleSettings, Domain, Value, gain, said
+from robochoc.protocols.mgm import Gain, Gainers
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.traits import Traits
+from robochoc.solver.compiled import Burden, LocalProblem
+
+Gains = list[list[tuple[int, int | float]]]
+
+
+class Offer(wire.Message, frozen=True):
+    """What it would save the sender: a row for each of the receiver's values, and in it a pair for each of its own.
+
+    Broken hard constraints, and costs. None: no offer (`offer`).
+    """
+
+    gains: Gains | None
+
+
+class Accept(wire.Message, frozen=True):
+    """The receiver is to take its value at `place`, which would save so much in all (`accept`)."""
+
+    place: int
+    broken: int
+    cost: int | float
+
+
+class Reject(wire.Message, frozen=True):
+    """Your offer is not taken (`reject`)."""
+
+
+class Go(wire.Message, frozen=True):
+    """Whether the sender, who is committed to the receiver, gains most among its neighbours (`go`, `no go`)."""
+
+    go: bool
+
+
+class Move(NamedTuple):
+    """A joint move: what it saves, and with whom; the own value's place, and the partner's."""
+
+    gain: Burden
+    partner: str
+    own: int
+    place: int
+
+
+class MGM2Settings(CycleSettings, frozen=True):
+    """`threshold` (q): the probability of being an offerer. `cycles`: after so many all robots stop."""
+
+    threshold: float = 0.5
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 <= self.threshold <= 1:
+            raise ValueError(f"threshold is {self.threshold:g}; it must be from 0 to 1")
+
+
+class MGM2(Gainers):
+    """One agent of MGM-2. State: neighbours' `domains`, the `view`, and the `partner` that it is committed to."""
+
+    messages = Domain | Value | Offer | Accept | Reject | Gain | Go
+    settings: MGM2Settings = MGM2Settings()
+    traits = Traits(
+        paper="Maheswaran, Pearce, Tambe 2004",
+        complete=False,
+        costs=True,
+        everywhere=True,
+        privacy="constraints among others",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.domains: dict[str, list[wire.Value]] = {}
+        self.view: dict[str, wire.Value] = {}
+        self.partner: str | None = None
+        self._wins = False
+
+    def begin(self) -> None:
+        """Take any value; tell all of them."""
+        self.take(self.any_value())
+        self.tell(self.problem.neighbours, Domain(list(self.problem.values)))
+        self.listen(self.problem.neighbours, self._meet)
+
+    def _meet(self, heard: Mapping[str, wire.Message]) -> None:
+        """All neighbours' domains are known: the first cycle begins."""
+        self.domains = {name: told.values for name, told in heard.items() if isinstance(told, Domain)}
+        self._tell_value()
+
+    def _tell_value(self) -> None:
+        self.tell(self.problem.neighbours, Value(self.problem.values[self.present]))
+        self.listen(self.problem.neighbours, self._offer)
+
+    def _offer(self, heard: Mapping[str, wire.Message]) -> None:
+        """All neighbours' values are known: be an offerer, or not."""
+        self.view = said(heard)
+        self.partner = None
+        if self.chance() < self.settings.threshold:
+            neighbours = self.problem.neighbours
+            self.partner = neighbours[int(self.chance() * len(neighbours))]
+        for name in self.problem.neighbours:
+            self.send(name, Offer(self._gains(name) if name == self.partner else None))
+        self.listen(self.problem.neighbours, self._answer)
+
+    def _gains(self, partner: str) -> Gains:
+        """What would be saved if the partner took each of its values, and this robot each of its own."""
+        rows = [self.problem.burdens({**self.view, partner: value}) for value in self.domains[partner]]
+        now = rows[self.domains[partner].index(self.view[partner])][self.present]
+        return [[gain(now, burden) for burden in row] for row in rows]
+
+    def _answer(self, heard: Mapping[str, wire.Message]) -> None:
+        """All offers have come: an offerer takes none; others take the best, if it saves anything."""
+        offers = {name: told.gains for name, told in heard.items() if isinstance(told, Offer) and told.gains}
+        if self.partner is not None:
+            self.tell(offers, Reject())
+            self.listen((self.partner,), self._hear_answer)
+        else:
+            self.partner = self._commit(offers)
+            self.tell([name for name in offers if name != self.partner], Reject())
+            self._tell_gain()
+
+    def _commit(self, offers: Mapping[str, Gains]) -> str | None:
+        """Accept the best of all offers, if what it saves in all is anything; whose it is."""
+        moves = [move for name, gains in offers.items() for move in self._joint(name, gains)]
+        self.gain = max((move.gain for move in moves), default=NO_GAIN)
+        if self.gain <= NO_GAIN:
+            return None
+        move = self.any_of([move for move in moves if move.gain == self.gain])
+        self.target = move.own
+        self.send(move.partner, Accept(move.place, *move.gain))
+        return move.partner
+
+    def _joint(self, offerer: str, gains: Gains) -> Iterator[Move]:
+        """All moves that are offered, with what they save both: to the offerer's share comes what it has no part in."""
+        burdens = self.problem.burdens({name: value for name, value in self.view.items() if name != offerer})
+        now = burdens[self.present]
+        for own, (burden, row) in enumerate(zip(burdens, gains, strict=True)):
+            broken, cost = gain(now, burden)
+            for place, offered in enumerate(row):
+                yield Move((broken + offered[0], cost + offered[1]), offerer, own, place)
+
+    def _hear_answer(self, heard: Mapping[str, wire.Message]) -> None:
+        """The offer was taken, or this robot stands alone."""
+        (answer,) = heard.values()
+        if isinstance(answer, Accept):
+            self.target, self.gain = answer.place, (answer.broken, answer.cost)
+        else:
+            self.partner = None
+        self._tell_gain()
+
+    def _tell_gain(self) -> None:
+        if self.partner is None:
+            self.best_unilateral(self.view)
+        self.tell(self.problem.neighbours, Gain(*self.gain))
+        self.listen(self.problem.neighbours, self._decide)
+
+    def _decide(self, heard: Mapping[str, wire.Message]) -> None:
+        """All neighbours' gains are known: move alone, or tell the partner whether to move together."""
+        wins = self.wins({name: told for name, told in heard.items() if name != self.partner})
+        if self.partner is None:
+            self._end_cycle(move=wins)
+        else:
+            self.send(self.partner, Go(wins))
+            self._wins = wins
+            self.listen((self.partner,), self._go)
+
+    def _go(self, heard: Mapping[str, wire.Message]) -> None:
+        """Both move, or neither."""
+        (told,) = heard.values()
+        self._end_cycle(move=self._wins and isinstance(told, Go) and told.go)
+
+    def _end_cycle(self, *, move: bool) -> None:
+        self.take(self.target if move else self.present)
+        if not self.over:
+            self._tell_value()
