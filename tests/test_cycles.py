@@ -16,6 +16,7 @@ from robochoc.communication.host import BadSettings, settings_of
 from robochoc.communication.schedule import Concurrent
 from robochoc.communication.simulator import Simulation
 from robochoc.observers.checker import objections
+from robochoc.observers.objective import aside_cost
 from robochoc.outcome import Verdict
 from robochoc.problem import Assignment, Constraint, Relation, Semantics, Team
 from robochoc.protocols.cycles import CycleProtocol, Value
