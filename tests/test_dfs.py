@@ -43,7 +43,7 @@ class Greeter(TreeProtocol):
         super().__init__(problem, order)
         self.begun = 0
         self.decided = 0
-        self.heard: list[str] = []
+        self.greeted: list[str] = []
         self.early = 0
         self.made[problem.agent] = self
 
@@ -53,7 +53,7 @@ class Greeter(TreeProtocol):
 
     def begin(self) -> None:
         assert self.placed
-        assert not self.heard
+        assert not self.greeted
         self.begun += 1
         self.value = 0
         for name in (*self.ancestors, *self.descendants):
@@ -62,7 +62,7 @@ class Greeter(TreeProtocol):
     def hear(self, sender: str, message: Message) -> None:
         assert self.begun
         assert message == Hello()
-        self.heard.append(sender)
+        self.greeted.append(sender)
 
     def decide(self) -> None:
         assert self.begun
@@ -188,7 +188,7 @@ def test_each_begins_once_and_what_comes_early_is_kept_for_then() -> None:
         for name, robot in robots.items():
             assert robot.begun == 1
             assert robot.decided
-            assert sorted(robot.heard) == sorted(met[name])
+            assert sorted(robot.greeted) == sorted(met[name])
             early += robot.early
     assert early > 100
 
@@ -301,5 +301,5 @@ def test_a_robot_begins_when_all_below_it_have_their_places() -> None:
     said = told(greeter, ("RE", Back(["RB", "RD", "RC", "RE"])))
     assert said[0] == ("RB", Back(["RB", "RD", "RC", "RE"]))
     assert [receiver for receiver, message in said if message == Hello()] == ["RB", "RC", "RE"]
-    assert greeter.heard == ["RC"]
+    assert greeter.greeted == ["RC"]
     assert greeter.decided == 1
