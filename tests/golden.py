@@ -9,11 +9,12 @@ from problems import team_of
 from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.observers.journal import Header, Recorder
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.problem import Constraint, Kind, Relation, Semantics, Team
 from robochoc.registry import protocol_named, protocol_names
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 
 FOLDER = Path(__file__).parent / "golden"
+PATROL = Path(__file__).parents[1] / "docs" / "examples" / "patrol"
 RESCUE = Path(__file__).parents[1] / "docs" / "examples" / "rescue"
 
 
@@ -33,16 +34,18 @@ def odd_team(*, n_ary: bool = True) -> Team:
 def fixed_teams(protocol: str) -> dict[str, Team]:
     """Three small teams, by name; without the ternary constraint for a protocol that cannot take it.
 
-    A protocol that goes on when the problem changes also has one that does.
+    A protocol that goes on when the problem changes also has one that does; one that minimises, one with costs.
     """
     traits = protocol_named(protocol).traits
     teams = {"queens3d-2": queens3d(2), "queens3d-3-full": queens3d(3, "full"), "odd": odd_team(n_ary=traits.n_ary)}
+    if traits.costs:
+        teams["patrol"] = read_team(PATROL)
     return {**teams, "rescue": read_team(RESCUE)} if traits.dynamic else teams
 
 
 def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
     """The journal of the fixed run, of a few cycles; the wall-clock time, which is not fixed, is left out."""
-    withdraw = None if team.dynamic else Withdrawal.MAXIMAL
+    withdraw = None if team.dynamic or team.kind is Kind.DISWCSP else Withdrawal.MAXIMAL
     settings = {"cycles": "3"} if hasattr(protocol_named(protocol).settings, "cycles") else {}
     options = Options(
         protocol=protocol, runtime=Runtime.SIMULATOR, schedule=schedule, withdraw=withdraw, settings=settings
