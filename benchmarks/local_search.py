@@ -25,7 +25,7 @@ READING = Path(__file__).with_name("local_search.md")
 
 AGENTS = 1000
 DEGREES = (4, 5)
-"""Average degrees: colourings without conflict are frequent at 4, and at 5 there is none."""
+"""Average degrees: up to about 4.7 most of such graphs have a colouring without conflict."""
 SEEDS = range(3)
 CYCLES = 100
 SHOWN = (0, 1, 2, 3, 5, 7, 10, 15, 20, 30, 50, 70, 100)

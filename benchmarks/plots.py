@@ -153,7 +153,7 @@ def _over_rates(
 def draw_optimum() -> None:
     """What each protocol that minimises needs: a dot a problem, a bar the median; a row of panels a density."""
     runs = read_rows(optimum.DATA, optimum.Run)
-    titles = {"messages": "messages", "ncccs": "NCCCs", "bytes": "bytes", "wall_s": "seconds in the simulator"}
+    titles = {"messages": "messages", "ncccs": "NCCCs", "bytes": "bytes", "cpu_s": "CPU seconds, simulator"}
     names = optimum.PROTOCOLS[::-1]
     figure, places = plt.subplots(len(optimum.DENSITIES), len(titles), figsize=(13, 5.4), sharex="col", sharey=True)
     for row, density in zip(places, optimum.DENSITIES, strict=True):

@@ -30,7 +30,7 @@ def answered(epoch: Epoch, team: Team, result: RunResult, traits: Traits, domain
     ended = result.verdict is Verdict.SOLUTION
     if result.lost or result.verdict is Verdict.NO_SOLUTION or not (ended or traits.costs):
         return epoch
-    if ended and traits.complete:
+    if ended and (traits.complete or not traits.costs):
         return _with(epoch, team, joined(result.assignments), _best_verdict(team))
     found = best_of(team, result, domains)
     epoch = replace(epoch, bound=bound_of(result.findings))
