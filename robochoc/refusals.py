@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from robochoc.change import changed_by
 from robochoc.communication.host import BadSettings, settings_of
+from robochoc.observers.objective import aside_cost
 from robochoc.options import Options, Withdrawal
 from robochoc.problem import Kind, Model, Team
 from robochoc.protocols.first_fit import FirstFit
@@ -15,6 +16,8 @@ from robochoc.registry import offers
 from robochoc.solver.encoding import Unsupported
 
 PAIR = 2
+LARGEST = 2**62
+"""Costs that add up to more are refused: a message holds integers of 64 bits."""
 
 
 def refuse_unfit(team: Team, options: Options, protocol: type[Protocol]) -> None:
@@ -26,15 +29,19 @@ def refuse_unfit(team: Team, options: Options, protocol: type[Protocol]) -> None
         raise Unsupported(f"--set: {wrong} (protocol {options.protocol})") from None
     if options.withdraw is not None:
         refuse_scenario(team, "--withdraw")
+    if traits.costs or options.withdraw is Withdrawal.FEWEST:
+        _refuse_dear(team, aside=options.withdraw is not None)
     if options.withdraw is Withdrawal.FEWEST:
         _refuse_fewest(team, options, traits)
     else:
         for events in range(len(team.scenario) + 1):
             refuse(changed_by(team, events), options.protocol, traits)
     if options.withdraw is Withdrawal.MAXIMAL:
+        if team.kind is Kind.DISWCSP:
+            raise Unsupported(f"{team.name} is a DisWCSP; --withdraw maximal knows no costs, --withdraw fewest does")
         refuse(team, "--withdraw maximal", FirstFit.traits)
     if options.spares:
-        refuse(team, "--spare", Traits())
+        refuse(team, "--spare", Traits(costs=True))
 
 
 def refuse_central(team: Team, options: Options) -> None:
@@ -76,12 +83,12 @@ def refuse(team: Team, name: str, traits: Traits) -> None:
             if constraint.model is Model.PKC and not traits.partially_known:
                 raise Unsupported(
                     f"{robot.name} shares a partially known constraint (PKC, {constraint.name}), which {name}"
-                    f" does not support; {_who_takes(lambda other: other.partially_known)}"
+                    f" does not support{_instead_of(name, lambda other: other.partially_known)}"
                 )
             if not traits.n_ary and len({team.owner[variable] for variable in constraint.variables}) > PAIR:
                 raise Unsupported(
                     f"{robot.name} holds a constraint over more than two robots ({constraint.name}), which {name}"
-                    f" does not support; {_who_takes(lambda other: other.n_ary)}"
+                    f" does not support{_instead_of(name, lambda other: other.n_ary)}"
                 )
 
 
@@ -104,11 +111,23 @@ def _refuse_fewest(team: Team, options: Options, traits: Traits) -> None:
     if traits.costs and not traits.complete:
         raise Unsupported(
             f"--withdraw fewest has to be proven, and {options.protocol} proves nothing;"
-            f" {_who_takes(lambda other: other.costs and other.complete)}, or --withdraw maximal"
+            f" {_who_takes(lambda other: other.costs and other.complete)}"
         )
     if team.kind is Kind.DISCSP:
         refuse(team, options.protocol, traits)
     refuse(team, "--withdraw fewest", Traits(costs=True, n_ary=traits.n_ary or not traits.costs))
+
+
+def _refuse_dear(team: Team, *, aside: bool) -> None:
+    """Costs, and what stepping aside costs, must fit into messages, however they add up."""
+    most = aside_cost(team) * (sum(robot.weight for robot in team.robots) + 1 if aside else 1)
+    if most >= LARGEST:
+        raise Unsupported(f"{team.name}'s costs could add up to {most:,}, more than {LARGEST:,}; scale them down")
+
+
+def _instead_of(name: str, fits: Callable[[Traits], bool]) -> str:
+    """Who could do it instead of the protocol called `name`; an option has no such stand-in."""
+    return "" if name.startswith("--") else f"; {_who_takes(fits)}"
 
 
 def _who_takes(fits: Callable[[Traits], bool]) -> str:

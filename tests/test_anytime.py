@@ -117,6 +117,14 @@ def test_who_steps_aside_in_the_best_has_no_values_in_it() -> None:
     assert found == ({"A": 2}, 11)
 
 
+def test_who_has_nothing_to_show_and_no_value_steps_aside_in_the_best() -> None:
+    """Its value is (), as that of one without neighbours that stays is."""
+    forbids = Relation("R", 1, Semantics.CONFLICTS, ((1,),))
+    team = team_of({"A": (1,), "B": (1,)}, [Constraint("C", forbids, ("A",), ("A",))])
+    findings = {"RB": Findings(best=Best(1, {"RA": (), "RB": ()}))}
+    assert best_of(team, result({"RA": {}, "RB": {}}, findings), domains(team), 1) == ({"B": 1}, 1)
+
+
 def test_the_best_cycle_is_found_and_unfinished_cycles_do_not_count() -> None:
     findings = {
         "RA": Findings(trail=Trail([(0, 1), (1, 0), (3, 1)], 4)),  # 2, then 1 in cycles 1 and 2, then 2

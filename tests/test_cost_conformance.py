@@ -12,10 +12,11 @@ from problems import random_team
 from test_conformance import ENOUGH, random_schedule
 
 from robochoc.outcome import Outcome, Verdict
-from robochoc.problem import INFINITE, Team
+from robochoc.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.registry import protocol_named, protocol_names
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.ace import AceProcess
+from robochoc.solver.encoding import Unsupported
 
 MINIMISING = [name for name in protocol_names() if protocol_named(name).traits.costs]
 COMPLETE = [name for name in MINIMISING if protocol_named(name).traits.complete]
@@ -112,3 +113,15 @@ def test_as_few_as_possible_step_aside(protocol: str) -> None:
         assert outcome.verified
         aside += bool(outcome.withdrawn)
     assert 20 < aside < 60
+
+
+def test_costs_that_do_not_fit_into_messages_are_refused() -> None:
+    chance = Random("huge")
+    team = random_cost_team(chance)
+    dear = Relation("R", 1, Semantics.SOFT, (), (), 2**62)
+    first, *others = team.robots
+    own = Constraint("D", dear, (first.variables[0].name,), (first.variables[0].name,), model=None)
+    team = replace(team, robots=(replace(first, private=(*first.private, own)), *others))
+    for protocol in MINIMISING:
+        with pytest.raises(Unsupported, match="scale them down"):
+            solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))

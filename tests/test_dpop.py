@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import itertools
+import math
 import re
 import tracemalloc
 from collections.abc import Iterable, Sequence
@@ -355,6 +356,21 @@ def test_who_has_no_room_does_not_proceed() -> None:
     told(robot, ("RA", domain()), ("RC", dimensions({"RB": 3, **{f"R{number}": 10**9 for number in range(9)}})))
     with pytest.raises(ValueError, match="no room"):
         told(robot, ("RA", Proceed(["RA", *(f"R{number}" for number in range(9))])))
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        dimensions({f"R{number}": 2 for number in range(100_000)}),
+        dimensions({"RA": 3}, width=-5),
+        dimensions({"RA": 3}, most=Need(math.nan, "RC")),
+        dimensions({"RA": 3}, most=Need(-1, "RC")),
+    ],
+)
+def test_dimensions_that_cannot_be_are_refused(said: Dimensions) -> None:
+    robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
+    with pytest.raises(ValueError, match="cannot be"):
+        told(robot, ("RC", said))
 
 
 def test_axes_that_are_not_the_separator_s_are_refused() -> None:

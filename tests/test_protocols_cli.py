@@ -163,7 +163,7 @@ def test_a_protocol_is_explained_by_its_docstring() -> None:
     done = run("abt")
     head, _, doc = done.stdout.partition("\n\n")
     what, place = head.splitlines()
-    assert what.startswith("abt: satisfaction; complete; asynchronous; ")
+    assert what.startswith("abt: satisfaction; complete; robots act at the same time; ")
     assert place == f"robochoc.protocols.abt:ABT, from the package robochoc {__version__}"
     assert abt.__doc__ is not None
     assert doc.splitlines() == abt.__doc__.strip().splitlines()

@@ -23,6 +23,7 @@ from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.sfb import SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
 from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.encoding import TooMuch
 from robochoc.solver.part import parts
 
 Costs = Mapping[str, Sequence[float]]
@@ -329,6 +330,45 @@ def test_all_robots_hold_an_optimal_solution_in_the_end() -> None:
             assert bests[0] is not None
             shown = bests[0].values[name]
             assert shown == tuple(own.values()) or not problem[name].interface
+
+
+# What nobody says
+
+
+@pytest.mark.parametrize(
+    ("sender", "message"),
+    [
+        ("RA", cpas(row(0))),
+        ("RC", cpas(row(0))),
+        ("RA", CPAs(0, b"", 9, 10)),
+        ("RA", CPAs(-1, cpas(row(0)).rows, 9, 10)),
+        ("RA", CPAs(10**12, b"", 9, 10)),
+        ("RA", CPAs(1, cpas(row(0)).rows, 9, 2**62)),
+        ("RA", CPAs(1, cpas(row(0)).rows, -1, 10)),
+        ("RA", cpas([0, 0, 99, 0, 0, 0, 0], ceiling=10)),
+        ("RA", Above([[(1,)]])),
+        ("RC", Below([[(1,)]], [[0]], 1)),
+        ("RC", Explored()),
+        ("RC", Solution(3, [0, 0])),
+        ("RC", Solution(3, [0, 9, 0])),
+        ("RA", Solution(3, [0, 0, 0])),
+    ],
+)
+def test_what_no_robot_says_is_refused(sender: str, message: Message) -> None:
+    robots, _ = introduced(team(CHAIN))
+    stranger = agents(team(CHAIN))["RB"]
+    if message == cpas(row(0)) and sender == "RA":  # in order, but before anybody's values are known
+        with pytest.raises(ValueError, match="cannot say"):
+            stranger.receive(sender, message)
+        return
+    with pytest.raises(ValueError, match=r"cannot say|are not|there are not"):
+        told(robots["RB"], (sender, message))
+
+
+def test_costs_that_floats_do_not_hold_exactly_are_refused() -> None:
+    huge = 2**53
+    with pytest.raises(TooMuch, match="2\\^53"):
+        introduced(team({"AB": (huge, huge, huge, huge - 1)}))
 
 
 # What is known so far

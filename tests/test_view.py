@@ -204,7 +204,7 @@ def test_withdrawn_drones_line_up_on_the_ground_outside_the_box() -> None:
     assert len(set(asides)) == 6
     assert {aside[1] for aside in asides} == {scene.axes[1].low - 2}
     assert {aside[2] for aside in asides} == {scene.ground}
-    assert scene.title == "a team: 10 fly, no larger team could"
+    assert scene.title == "a team: 10 fly, no better team could"
 
 
 def test_the_caption_says_what_happened() -> None:

@@ -87,7 +87,7 @@ def _in_a_line(traits: Traits) -> str:
     words = [
         "minimises costs" if traits.costs else "satisfaction",
         "complete" if traits.complete else "incomplete",
-        "synchronous" if traits.synchronous else "asynchronous",
+        "one robot acts at a time" if traits.synchronous else "robots act at the same time",
         "constraints between any number of robots" if traits.n_ary else "constraints between two robots",
         *(["partially known ones too"] if traits.partially_known else []),
         *(["goes on when the problem changes"] if traits.dynamic else []),

@@ -23,7 +23,8 @@ def report(team: Team, outcome: Outcome) -> str:
         lines += _board(team, outcome.assignment) or _list(team, outcome.assignment)
     if outcome.aside:
         flying, aside = len(team.robots) - len(outcome.withdrawn), len(outcome.aside)
-        lines.append(f"  {flying} {'flies' if flying == 1 else 'fly'}, {aside} step{'s' * (aside == 1)} aside:")
+        fly, step = "flies" if flying == 1 else "fly", "steps" if aside == 1 else "step"
+        lines.append(f"  {flying} {fly}, {aside} {step} aside{_weight(team, outcome)}:")
         lines += _wrapped(outcome.aside)
     if outcome.lost:
         lost = sorted(outcome.lost, key=natural)
@@ -66,7 +67,7 @@ def _place(team: Team, outcome: Outcome) -> str:
 
 
 def _verdict(team: Team, outcome: Outcome) -> str:
-    why = outcome.witness and f"{outcome.witness} has derived the empty nogood"
+    why = outcome.witness and f"{outcome.witness} {_proof(outcome)}"
     if outcome.reason and not outcome.epochs:
         why = outcome.reason
     confirmed = ", confirmed centrally" * outcome.confirmed
@@ -84,7 +85,8 @@ def _verdict(team: Team, outcome: Outcome) -> str:
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             who = "some step" if outcome.assignment else "all step"
             if outcome.verdict is Verdict.OPTIMAL:
-                who = "as few as possible (proven) step"
+                by_weight = ", by weight" if _weight(team, outcome) else ""
+                who = f"as few as possible{by_weight} (proven) step"
             whole = left or " for the whole team"
             because = f" ({why})" if why else ""
             return f"no solution{whole}{because}; {who} aside, checked against every constraint{confirmed}"
@@ -95,19 +97,42 @@ def _proven(team: Team, outcome: Outcome) -> str:
     if team.kind is Kind.DISCSP:
         return outcome.verdict
     least = "" if outcome.verdict is Verdict.OPTIMAL else ", which may not be the least"
-    return f"{outcome.verdict}, cost {outcome.cost:,.0f}{least}"
+    return f"{outcome.verdict}, cost {_number(outcome.cost)}{least}"
+
+
+def _proof(outcome: Outcome) -> str:
+    """What the robot has done that ended the search alone."""
+    from robochoc.registry import UnknownProtocol, protocol_named
+
+    try:
+        minimises = protocol_named(outcome.protocol).traits.costs
+    except UnknownProtocol:
+        return "has found that out"
+    return "has found everything to be impossible" if minimises else "has derived the empty nogood"
+
+
+def _weight(team: Team, outcome: Outcome) -> str:
+    """What those weigh that step aside, where robots are not all of weight 1."""
+    if all(robot.weight == 1 for robot in team.robots):
+        return ""
+    return f" (weight {sum(team[name].weight for name in outcome.aside)})"
+
+
+def _number(cost: float | None) -> str:
+    """Costs are integers, and may be larger than floats are exact."""
+    return "unknown" if cost is None else f"{int(cost):,}"
 
 
 def _so_far(team: Team, outcome: Outcome) -> str:
     """The best that is known when a limit is reached, and what it could come to at best."""
     bound = outcome.bound
     if outcome.aside:
-        least = f"; at least {bound:,.0f} have to" if bound else ""
-        return f"; in the best answer so far {len(outcome.aside)} step aside{least}"
+        least = f"; at least {_number(bound)} have to" if bound else ""
+        return f"; in the best answer so far {len(outcome.aside)} step aside{_weight(team, outcome)}{least}"
     if team.kind is Kind.DISCSP:
         return ""
-    known = [f"the best so far costs {outcome.cost:,.0f}"] if outcome.assignment else []
-    known += [f"nothing costs less than {bound:,.0f}"] if bound else []
+    known = [f"the best so far costs {_number(outcome.cost)}"] if outcome.assignment else []
+    known += [f"nothing costs less than {_number(bound)}"] if bound else []
     return "; " + ", and ".join(known) if known else ""
 
 

@@ -91,9 +91,7 @@ def _check_central(settings: dict[str, Any]) -> None:
     """There are no robots, and no second opinion."""
     if settings["verify"]:
         raise click.UsageError("--verify asks ACE, which is --protocol central itself")
-    asked = {name: settings[name] for name in ("withdraw", "messages", "on_loss", "spares")}
-    if asked["withdraw"] == "fewest":
-        del asked["withdraw"]
+    asked = {name: settings[name] for name in ("messages", "on_loss", "spares")}
     asked["order"] = settings["order"] != GIVEN
     asked["set"] = settings["settings_given"]
     for name, value in asked.items():

@@ -75,6 +75,8 @@ from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooMuch
 
 GIB = 1 << 30
+MOST_AXES = 1_000
+"""Long before that no table fits anywhere."""
 Scope = tuple[str, ...]
 T = TypeVar("T")
 Size = Annotated[int, msgspec.Meta(ge=2)]
@@ -181,6 +183,7 @@ class DPOP(TreeProtocol):
                 _keep(sender, values, self.domains, self.ancestors)
                 self._measure()
             case Dimensions() as dimensions:
+                self._check(sender, dimensions)
                 _keep(sender, dimensions, self.dimensions, self.children)
                 self._measure()
             case Proceed(separator):
@@ -215,6 +218,11 @@ class DPOP(TreeProtocol):
             self._proceed([])
         else:
             self.send(self.parent, Dimensions(self._sizes, self._dearest, width, most))
+
+    def _check(self, child: str, told: Dimensions) -> None:
+        """Raise `ValueError` unless `told` may be true."""
+        if not (len(told.separator) <= MOST_AXES and told.induced_width >= 0 and told.most.bytes >= 0):
+            raise ValueError(f"{child} tells dimensions that cannot be")
 
     def _refuse(self, most: Need, width: int) -> None:
         """The root knows what the tables of the whole tree need. Raises `TooMuch`."""

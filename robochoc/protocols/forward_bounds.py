@@ -53,6 +53,7 @@ class ForwardBounds:
         self.most = 0
         self.ceiling = 0
         self._own = len(domains[self.rank])
+        self._above = [len(domain) for domain in domains[: self.rank]]
         self._largest = max(map(len, domains))
         self._sizes = [len(domain) for domain in domains[self.rank + 1 :]]
         self._starts = np.cumsum([0, *self._sizes])
@@ -84,8 +85,17 @@ class ForwardBounds:
         return self._cut(np.array([row], np.float64))
 
     def read(self, content: bytes, count: int) -> Rows:
-        """The `count` partial assignments, of all robots above, in `content`: what `tobytes` made of them there."""
-        return np.frombuffer(content, self._type).reshape(count, self._first + self._own + int(self._starts[-1]))
+        """The `count` partial assignments, of all robots above, in `content`: what `tobytes` made of them there.
+
+        Raises `ValueError` when they are no such thing.
+        """
+        columns = self._first + self._own + int(self._starts[-1])
+        if count < 1 or len(content) != count * columns * self._type.itemsize:
+            raise ValueError(f"{len(content)} bytes are not {count} partial assignments")
+        rows: Rows = np.frombuffer(content, self._type).reshape(count, columns)
+        if (rows[:, VALUES : self._first] >= self._above).any() or (rows < 0).any():
+            raise ValueError("a partial assignment has values that there are not")
+        return rows
 
     @property
     def width(self) -> int:

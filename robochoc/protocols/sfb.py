@@ -54,7 +54,10 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol, Settings
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.encoding import TooMuch
 
+EXACT = 2**53
+"""Below it, floats hold all integers."""
 MESSAGE_BYTES = 1 << 22
 """About how large messages become: as much is extended at once as fits, if everything can be extended."""
 
@@ -158,10 +161,12 @@ class SFB(Protocol):
             self._tell_below([])
             self.settle()
 
-    def receive(self, sender: str, message: Message) -> None:  # noqa: ARG002 - only neighbours in the order speak
-        """Dispatch on the message's type."""
+    def receive(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type. Raises `ValueError` for what no robot says here and now."""
         if self.verdict is not None:
             return
+        if not self._expects(sender, message):
+            raise ValueError(f"{sender} says {type(message).__name__}, which it cannot say now")
         match cast("Above | Below | CPAs | Explored | Solution", message):
             case Above(domains):
                 self._tell_below(domains)
@@ -176,6 +181,29 @@ class SFB(Protocol):
                 self._process_solution(solution)
             case never:
                 assert_never(never)
+
+    def _expects(self, sender: str, message: Message) -> bool:
+        """Whether `message` may come from `sender` at this point: from the robot before, or from the next one."""
+        match message:
+            case Above():
+                return sender == self.previous and not self.domains
+            case Below():
+                return sender == self.next and bool(self.domains) and not self._priced
+            case CPAs(_, _, least, ceiling):
+                return sender == self.previous and self._priced and least >= 0 and 0 < ceiling <= EXACT
+            case Explored():
+                return sender == self.next and bool(self.under_way)
+            case Solution(_, places):
+                sizes = [len(domain) for domain in self.domains]
+                fits = len(places) == len(sizes) and all(0 <= p < size for p, size in zip(places, sizes, strict=True))
+                return sender == self.next and fits
+            case _:
+                return False
+
+    @property
+    def _priced(self) -> bool:
+        """Whether everybody's values are known, and constraints with them priced."""
+        return hasattr(self, "bounds")
 
     def settle(self) -> None:
         """Extend what is there, as long as messages may be sent; say what has been explored."""
@@ -205,6 +233,8 @@ class SFB(Protocol):
         self.bounds = ForwardBounds(self.problem, self.order, self.domains)
         charges = [self.problem.costs({}), *below.charges]
         most = below.most + self.bounds.most + dearest(charges[0])
+        if most >= EXACT:
+            raise TooMuch("costs could add up to 2^53 or more, which tables do not hold exactly")
         if self.previous is not None:
             self.send(self.previous, Below([own, *below.domains], charges, most))
         else:

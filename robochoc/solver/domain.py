@@ -59,8 +59,8 @@ class CompiledDomain:
         return {} if index == len(self.values) else dict(zip(self.variables, self.solutions[index], strict=True))
 
     def behind(self, value: Value) -> dict[str, int]:
-        """The same for `value`, as neighbours see it. Raises `ValueError` when the robot has no such value."""
-        return self.solution(len(self.values) if None in value else self.values.index(value))
+        """The same for `value`, as neighbours see it: one that the robot does not have is to step aside."""
+        return self.solution(self.values.index(value) if value in self.values else len(self.values))
 
 
 @dataclass

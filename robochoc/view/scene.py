@@ -43,7 +43,7 @@ def scene_of(outcome: Outcome, team: Team | None = None) -> Scene:
 
 def _ending(outcome: Outcome, flying: int, aside: int) -> str:
     if outcome.aside and flying:
-        others = "no larger team could" if outcome.verdict is Verdict.OPTIMAL else f"{aside} withdrew"
+        others = "no better team could" if outcome.verdict is Verdict.OPTIMAL else f"{aside} withdrew"
         return f"{flying} fly, {others}"
     left = " for those that are left" if outcome.lost else ""
     match outcome.verdict:
