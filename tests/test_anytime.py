@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from random import Random
+from typing import Any
 
 import pytest
 from cost_problems import cost_of, random_complex_cost_team, random_cost_team, with_costs
@@ -12,6 +13,7 @@ from problems import team_of
 
 from robochoc.anytime import best_of, bound_of, course, tree_of
 from robochoc.cli.explain import explained
+from robochoc.cli.report import report
 from robochoc.communication.run_result import RunResult
 from robochoc.expression import Type, parse
 from robochoc.observers.events import AnyEvent, Decided, Heard, Improved
@@ -172,6 +174,37 @@ def test_what_a_robot_has_heard_of_is_an_improvement_too() -> None:
     told = [event for event in improvements(events, Objective(PAIR, 2)) if isinstance(event, Improved)]
     assert [(event.t, event.cost) for event in told] == [(1, 4), (3, 3), (4, 2)]
     assert [event.assignment for event in told] == [{"A": 1, "B": 1}, {"A": 1, "B": 2}, {"A": 1}]
+
+
+# In words
+
+
+def aside(verdict: Verdict, *weights: int, **known: Any) -> str:  # noqa: ANN401 - fields of an outcome
+    """What is told when RB of a hard team has stepped aside."""
+    hard = team_of({"A": (1,), "B": (1,)}, [])
+    robots = tuple(replace(robot, weight=weight) for robot, weight in zip(hard.robots, weights, strict=True))
+    outcome = Outcome("t", "sfb", "simulator", 0, verdict, {"A": 1}, 0, ("RB",), verified=True, **known)
+    return report(replace(hard, robots=robots), outcome)
+
+
+def test_weights_are_told_where_they_are_not_all_one() -> None:
+    assert "as few as possible (proven) step aside" in aside(Verdict.OPTIMAL, 1, 1)
+    assert "weight" not in aside(Verdict.OPTIMAL, 1, 1)
+    told = aside(Verdict.OPTIMAL, 5, 2)
+    assert "as few as possible, by weight (proven) step aside" in told
+    assert "1 flies, 1 steps aside (weight 2)" in told
+
+
+def test_a_limit_is_told_with_the_best_so_far_and_the_bound() -> None:
+    told = aside(Verdict.UNKNOWN, 1, 3, reason="the time was over", bound=2)
+    assert "unknown: the time was over; in the best answer so far 1 steps aside (weight 3); at least 2 have to" in told
+    outcome = Outcome("t", "afb", "simulator", 0, Verdict.UNKNOWN, {"A": 1, "B": 2}, 2**60 + 1, reason="so", bound=3)
+    assert f"so; the best so far costs {2**60 + 1:,}, and nothing costs less than 3" in report(PAIR, outcome)
+
+
+def test_what_is_not_proven_says_so() -> None:
+    outcome = Outcome("t", "dsa", "simulator", 0, Verdict.SOLUTION, {"A": 1, "B": 2}, 3, verified=True)
+    assert "solution, cost 3, which may not be the least, checked" in report(PAIR, outcome)
 
 
 # Trees, explained

@@ -34,7 +34,8 @@ def cli() -> None:
     """Teams of robots that solve constraint problems together.
 
     Each robot knows only its own XML file, runs as its own OS process, and talks to its neighbours by messages of
-    a distributed protocol until the team has a solution, or a proof that there is none.
+    a distributed protocol until the team has a solution, the cheapest one where there are costs, or a
+    proof that there is none.
 
     \b
     robochoc generate queens3d --n 4

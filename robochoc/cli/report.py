@@ -128,7 +128,8 @@ def _so_far(team: Team, outcome: Outcome) -> str:
     bound = outcome.bound
     if outcome.aside:
         least = f"; at least {_number(bound)} have to" if bound else ""
-        return f"; in the best answer so far {len(outcome.aside)} step aside{_weight(team, outcome)}{least}"
+        step = "steps" if len(outcome.aside) == 1 else "step"
+        return f"; in the best answer so far {len(outcome.aside)} {step} aside{_weight(team, outcome)}{least}"
     if team.kind is Kind.DISCSP:
         return ""
     known = [f"the best so far costs {_number(outcome.cost)}"] if outcome.assignment else []
