@@ -164,7 +164,7 @@ def test_that_all_was_in_vain_is_said() -> None:
     team = team_of(dict.fromkeys("AB", (1,)), [Constraint("C", DIFFERENT, ("A", "B"), ("A", "B"))])
     outcome = solve(team, Options(protocol="dsa", runtime=Runtime.SIMULATOR, settings={"cycles": "3"}))
     assert outcome.verdict is Verdict.UNKNOWN
-    assert outcome.reason == "the search is over, and all that it came by breaks a hard constraint"
+    assert outcome.reason == "dsa has come to its end, and all that it came by breaks a hard constraint"
 
 
 @ALL
