@@ -1,0 +1,1 @@
+"""The Services Management unit: the Directory Facilitator, who knows which robot offers what."""
