@@ -206,11 +206,10 @@ def _over_cycles(label: str, degree: int, points: Iterable[local_search.Point]) 
 def _lines(axes: Axes, lines: Sequence[Line]) -> None:
     """Draw `lines`."""
     for line in lines:
-        style = line.style
-        look = {"color": style.colour, "marker": style.marker, "markersize": 4, "linewidth": style.width}
-        axes.plot(line.x, line.y, linestyle=style.dashes, **look)
+        colour, dashes, marker, width = line.style
+        axes.plot(line.x, line.y, linestyle=dashes, color=colour, marker=marker, markersize=4, linewidth=width)
         xs, ys = ([values[place] for place in line.open_at] for values in (line.x, line.y))
-        axes.plot(xs, ys, color="white", markeredgecolor=style.colour, marker="^", markersize=9, linestyle="")
+        axes.plot(xs, ys, color="white", markeredgecolor=colour, marker="^", markersize=9, linestyle="")
     axes.set_yscale("log")
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", color="#e6e6e6", linewidth=0.7)

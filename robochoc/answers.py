@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from robochoc.anytime import best_of, bound_of, joined, tree_of
+from robochoc.anytime import absent, best_of, bound_of, joined, tree_of
 from robochoc.communication.run_result import RunResult
 from robochoc.observers.checker import cost, could_join, objections
 from robochoc.outcome import Epoch, Outcome, Verdict
@@ -55,7 +55,7 @@ def placed(outcome: Outcome, team: Team, result: RunResult, domains: Domains, as
         assignment = found.assignment if found else None
     if assignment is None:
         return outcome
-    out = tuple(robot.name for robot in team.robots if robot.variables[0].name not in assignment)
+    out = absent(team, assignment)
     check(team, assignment, out, maximal=ended)
     if ended:
         proven = aside is not None and (out or team.kind is Kind.DISWCSP)

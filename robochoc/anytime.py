@@ -69,6 +69,11 @@ def joined(own: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
     return {name: value for values in own.values() for name, value in values.items()}
 
 
+def absent(team: Team, assignment: Mapping[str, int]) -> tuple[str, ...]:
+    """The robots that have no values: they step aside."""
+    return tuple(robot.name for robot in team.robots if robot.variables[0].name not in assignment)
+
+
 _Own = dict[str, dict[str, int]]
 
 

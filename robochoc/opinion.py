@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from robochoc.anytime import absent
 from robochoc.observers.checker import cost
 from robochoc.options import Options, Withdrawal
 from robochoc.outcome import Epoch, Verdict
@@ -48,11 +49,6 @@ def contradiction(opinion: Judgement, total: float) -> str | None:
 def total_cost(team: Team, assignment: Mapping[str, int], aside: float | None) -> float:
     """What `assignment` costs, and those who have stepped aside, one of weight 1 at the price `aside`."""
     return cost(team, assignment) + (aside or 0) * sum(team[name].weight for name in absent(team, assignment))
-
-
-def absent(team: Team, assignment: Mapping[str, int]) -> tuple[str, ...]:
-    """The robots that have no values."""
-    return tuple(robot.name for robot in team.robots if robot.variables[0].name not in assignment)
 
 
 def _told(judgement: Judgement, team: Team, aside: int | None) -> Epoch:

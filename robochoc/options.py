@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from robochoc.defaults import SATISFIES
 from robochoc.orders import Order
 from robochoc.solver.compile import Limits
 
@@ -57,7 +58,7 @@ class Options:
     `on_loss` set to withdraw, robots whose processes end leave the problem; up to `spares` of them come back.
     """
 
-    protocol: str = "abt"
+    protocol: str = SATISFIES
     runtime: Runtime = Runtime.PROCESSES
     seed: int = 0
     timeout: float | None = None

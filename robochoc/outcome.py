@@ -116,10 +116,18 @@ class Outcome:
     epochs: tuple[Epoch, ...] = ()
     """What happened in each epoch; empty where there was but one, as nothing changed."""
 
+    placed_by: str | None = None
+    """The protocol that said who steps aside, where that is another than the one that was asked for."""
+
     @property
     def events(self) -> int:
         """How many events of the scenario have happened: they, and losses, open epochs."""
         return sum(not epoch.lost for epoch in self.epochs[:-1])
+
+    @property
+    def protocols(self) -> str:
+        """The protocol that was asked for, and the one that said who steps aside, if that is another."""
+        return f"{self.protocol}, then {self.placed_by}" if self.placed_by else self.protocol
 
     @property
     def aside(self) -> tuple[str, ...]:

@@ -8,17 +8,19 @@ from dataclasses import replace
 from typing import Any, TypedDict, assert_never
 
 from robochoc.answers import Refuted, answered, check, placed
+from robochoc.anytime import absent
 from robochoc.change import changed_by, described
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress
 from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.session import Session
 from robochoc.communication.simulator import Simulation
+from robochoc.defaults import MINIMISES
 from robochoc.epochs import Journey, Played
 from robochoc.observers.checker import has_local_solution
 from robochoc.observers.events import Began, Observer
 from robochoc.observers.objective import aside_cost
-from robochoc.opinion import absent, contradiction, decided, total_cost
+from robochoc.opinion import contradiction, decided, total_cost
 from robochoc.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.orders import CannotTurn, Order, in_order, order_of
 from robochoc.outcome import Epoch, Metrics, Outcome, Verdict
@@ -38,8 +40,8 @@ from robochoc.solver.part import Brief
 
 __all__ = ["CENTRAL", "OnLoss", "Options", "Refuted", "Runtime", "ScheduleName", "Withdrawal", "solve"]
 
-FEWEST = "sfb"
-"""The complete protocol that says who steps aside, when the one that was asked for cannot."""
+FIRST_FIT = "first-fit"
+"""What an outcome calls the protocol of `--withdraw maximal`, which nobody can ask for."""
 
 
 def solve(
@@ -143,7 +145,8 @@ class _Run:
             outcome = replace(outcome, reason="; ".join([*filter(None, [outcome.reason]), *journey.regrets]))
         if outcome.verdict is Verdict.NO_SOLUTION and self._options.withdraw is not None:
             fewest = self._options.withdraw is Withdrawal.FEWEST
-            outcome = self._placed(outcome, journey, protocol_named(FEWEST) if fewest else FirstFit)
+            outcome = replace(outcome, placed_by=MINIMISES if fewest else FIRST_FIT)
+            outcome = self._placed(outcome, journey, protocol_named(MINIMISES) if fewest else FirstFit)
         return outcome
 
     def _limit(self, witness: str | None, sent: int) -> str:
@@ -168,13 +171,17 @@ class _Run:
         return lost
 
     def _placed(self, outcome: Outcome, journey: Journey, protocol: type[Protocol]) -> Outcome:
-        """Who finds a place among those that are left, as `protocol` has it; the others step aside."""
-        asked_for = protocol is protocol_named(self._options.protocol)
-        brief = self._brief if asked_for else Brief(self._options.seed)
+        """Who finds a place among those that are left, as `protocol` has it; the others step aside.
+
+        One that was not asked for (`placed_by`) gets no settings, and to be fast an order of its own if it has costs.
+        """
+        brief = Brief(self._options.seed) if outcome.placed_by else self._brief
         if protocol.traits.costs:
             brief = brief._replace(aside=aside_cost(self._team))
         while True:
-            team = self._favourable(journey.arranged(), protocol)
+            team = journey.arranged()
+            if outcome.placed_by == MINIMISES and self._options.order is None:
+                team = _favourable(team)
             self._announce(protocol)
             domains = self._domains(team)
             with self._session(protocol, team, domains, brief) as session:
@@ -192,16 +199,6 @@ class _Run:
             return outcome
         total = total_cost(journey.team, outcome.assignment, brief.aside)
         return replace(outcome, confirmed=self._confirmed(journey.team, total=total, aside=int(brief.aside)))
-
-    def _favourable(self, team: Team, protocol: type[Protocol]) -> Team:
-        """`team` in an order that soon shows who has to step aside, where neither order nor protocol was asked for."""
-        asked = self._options.order is not None or protocol is protocol_named(self._options.protocol)
-        if asked or not protocol.traits.costs:
-            return team
-        try:
-            return in_order(team, Order.DOM_DEG)
-        except CannotTurn:
-            return team
 
     # Epochs
 
@@ -364,6 +361,14 @@ def _without(outcome: Outcome, journey: Journey) -> Outcome:
     """`outcome`, without the robots that were lost on the way."""
     lost = tuple(journey.withdrawn)
     return replace(outcome, withdrawn=lost, lost=lost)
+
+
+def _favourable(team: Team) -> Team:
+    """`team` in an order that soon shows who has to step aside, if it can be turned around."""
+    try:
+        return in_order(team, Order.DOM_DEG)
+    except CannotTurn:
+        return team
 
 
 def _schedule(options: Options) -> Schedule:

@@ -1,33 +1,20 @@
-"""One test per rule of ADOPT (Modi et al., Artificial Intelligence 161, 2005, Section 3), named for it."""
+"""One test per rule of ADOPT (Modi et al., Artificial Intelligence 161, 2005, Section 3); see `test_bounding`."""
 
 from __future__ import annotations
 
 import doctest
-from random import Random
 
-import pytest
 from agents import told, value
-from cost_problems import least_cost, random_cost_team
-from trees import placed, priced, unplaced
+from trees import context, placed, priced, root, to
 
 import robochoc.protocols.adopt
-from robochoc.anytime import bound_of
-from robochoc.communication.schedule import Concurrent, RandomChannels
-from robochoc.communication.simulator import Simulation
-from robochoc.message import Message
-from robochoc.outcome import Place, Verdict
+from robochoc.outcome import Verdict
 from robochoc.problem import INFINITE
 from robochoc.protocols.adopt import ADOPT, Cost, Threshold, Value
-from robochoc.protocols.bounding import Context, Terminate
+from robochoc.protocols.bounding import Terminate
 
 TEAM = priced("ZABCD", {"ZA": [0] * 4, "ZB": [0, 1, 2, 0], "AB": [0, 3, 1, 0], "BC": [0] * 4, "BD": [0] * 4})
 """B stands below A and, further up, Z; C and D are its children."""
-
-
-def context(**values: int | tuple[int, int]) -> Context:
-    """Values of robots, for the first time or with their counters."""
-    pairs = {name: entry if isinstance(entry, tuple) else (entry, 1) for name, entry in values.items()}
-    return {f"R{name}": ((number,), counter) for name, (number, counter) in pairs.items()}
 
 
 def middle() -> ADOPT:
@@ -42,18 +29,6 @@ def informed(z: int = 1, a: int = 1) -> ADOPT:
     adopt = middle()
     told(adopt, ("RZ", Value((z,), 1)), ("RA", Value((a,), 1)))
     return adopt
-
-
-def root() -> ADOPT:
-    """B as the root of a tree of three."""
-    team = priced("BCD", {"B": [0, 2], "BC": [0] * 4, "BD": [0] * 4})
-    adopt = placed(ADOPT, team, "RB", children=["RC", "RD"])
-    adopt.outbox.clear()
-    return adopt
-
-
-def to(receiver: str, said: list[tuple[str, Message]]) -> list[Message]:
-    return [message for name, message in said if name == receiver]
 
 
 def test_initialize_takes_the_value_with_the_least_lower_bound_and_tells_all_around() -> None:
@@ -75,17 +50,6 @@ def test_a_value_is_added_to_the_context_and_what_it_costs_to_the_bounds() -> No
     assert to("RA", said) == [Cost(context(A=2), 0, INFINITE)]
 
 
-def test_nothing_is_known_of_ub_before_all_neighbours_above_have_told_their_values() -> None:
-    adopt = placed(ADOPT, TEAM, "RB", "RA", pseudo_parents=["RZ"])
-    assert to("RA", told(adopt, ("RA", Value((2,), 1)))) == [Cost({}, 0, INFINITE), Cost(context(A=2), 0, INFINITE)]
-    assert to("RA", told(adopt, ("RZ", Value((1,), 1)))) == [Cost(context(A=2, Z=1), 1, 1)]
-
-
-def test_one_decision_is_taken_for_all_that_has_come() -> None:
-    said = told(middle(), ("RA", Value((2,), 1)), ("RA", Value((1,), 2)), ("RZ", Value((2,), 1)))
-    assert to("RA", said) == [Cost(context(A=(1, 2), Z=2), 2, INFINITE)]
-
-
 def test_a_cost_bounds_the_child_s_subtree_for_the_value_in_its_context() -> None:
     adopt = informed()
     told(adopt, ("RC", Cost(context(B=2, A=1), 4, 7)))
@@ -98,13 +62,6 @@ def test_a_cost_in_an_obsolete_context_is_no_bound() -> None:
     told(adopt, ("RA", Value((2,), 2)), ("RC", Cost(context(B=1, A=1), 4, 7)))
     assert (adopt.bounds["RC"].lb, adopt.bounds["RC"].ub) == ([0, 0], [INFINITE, INFINITE])
     assert adopt.context == context(A=(2, 2), Z=1)
-
-
-def test_a_cost_that_does_not_know_the_own_value_only_tells_of_others() -> None:
-    adopt = informed()
-    told(adopt, ("RC", Cost(context(X=2), 4, 7)))
-    assert adopt.bounds["RC"].lb == [0, 0]
-    assert adopt.context == context(A=1, Z=1, X=2)
 
 
 def test_a_cost_tells_values_of_robots_further_up_and_newer_ones_of_neighbours() -> None:
@@ -137,12 +94,6 @@ def test_the_same_value_again_voids_nothing_but_is_told_with_its_new_counter() -
     said = told(adopt, ("RA", Value((2,), 2)), ("RA", Value((1,), 3)), ("RC", Cost(context(B=1, A=1), 4, 7)))
     assert adopt.bounds["RC"].lb == [4, 0]
     assert to("RA", said) == [Cost(context(A=(1, 3), Z=1), 4, INFINITE)]
-
-
-def test_of_two_bounds_in_one_context_the_better_one_is_kept() -> None:
-    adopt = informed()
-    told(adopt, ("RC", Cost(context(B=1), 4, 6)), ("RC", Cost(context(B=1), 3, 7)))
-    assert (adopt.bounds["RC"].lb[0], adopt.bounds["RC"].ub[0]) == (4, 6)
 
 
 def test_a_value_is_left_once_its_lower_bound_is_above_the_threshold() -> None:
@@ -193,7 +144,7 @@ def test_the_threshold_is_split_among_the_children_within_their_bounds() -> None
 
 
 def test_a_child_s_threshold_is_never_below_what_it_costs_at_least() -> None:
-    adopt = root()
+    adopt = root(ADOPT)
     said = told(adopt, ("RD", Cost(context(B=1), 1, 9)))
     assert said == [("RD", Threshold(1, {}))]
     assert adopt.t == {"RC": [0, 0], "RD": [1, 0]}
@@ -202,16 +153,6 @@ def test_a_child_s_threshold_is_never_below_what_it_costs_at_least() -> None:
 def test_nothing_is_told_twice() -> None:
     adopt = informed()
     assert told(adopt, ("RA", Value((1,), 1)), ("RC", Cost(context(B=1), 0, INFINITE)), ("RA", Threshold(0, {}))) == []
-
-
-def test_a_root_whose_bounds_meet_ends_and_says_so() -> None:
-    adopt = root()
-    told(adopt, ("RC", Cost(context(B=1), 1, 1)))
-    assert adopt.findings.bound == 1
-    assert not adopt.terminated
-    said = told(adopt, ("RD", Cost(context(B=1), 0, 0)))
-    assert said == [("RC", Terminate(context(B=1))), ("RD", Terminate(context(B=1)))]
-    assert told(adopt, ("RC", Cost(context(B=1), 7, 7))) == []
 
 
 def test_another_robot_ends_only_after_its_parent_with_the_last_values_above() -> None:
@@ -235,7 +176,7 @@ def test_a_robot_goes_on_after_its_parent_s_end_until_its_bounds_meet_and_tells_
 
 
 def test_a_root_that_finds_all_values_infinite_ends_the_search_of_all() -> None:
-    adopt = root()
+    adopt = root(ADOPT)
     told(adopt, ("RC", Cost(context(B=1), INFINITE, INFINITE)))
     assert value(adopt) == (2,)
     assert told(adopt, ("RC", Cost(context(B=(2, 2)), INFINITE, INFINITE))) == []
@@ -250,59 +191,11 @@ def test_another_robot_that_finds_all_values_infinite_says_so() -> None:
     assert to("RA", said) == [Cost(context(A=(2, 2), Z=1), INFINITE, INFINITE)]
 
 
-def test_an_n_ary_constraint_is_paid_by_its_lowest_robot_once_it_knows_the_others() -> None:
-    team = priced("ABC", {"ABC": range(8)})
-    top = placed(ADOPT, team, "RA", children=["RB"], pseudo_children=["RC"])
-    assert list(top.lower) == [0, 0]
-    adopt = placed(ADOPT, team, "RC", "RB", pseudo_parents=["RA"])
-    told(adopt, ("RB", Value((2,), 1)))
-    assert list(adopt.lower) == [0, 0]
-    assert adopt.problem.checks == 0
-    assert told(adopt, ("RA", Value((2,), 1))) == [("RB", Cost(context(A=2, B=2), 6, 6))]
-
-
 def test_what_is_paid_is_looked_up_only_when_a_neighbour_above_has_another_value() -> None:
     adopt = informed()
     checks = adopt.problem.checks
     told(adopt, ("RC", Cost(context(B=1, X=1), 4, 7)), ("RA", Value((1,), 2)), ("RA", Threshold(3, {})))
     assert adopt.problem.checks == checks
-
-
-def test_a_robot_alone_takes_its_cheapest_value_in_silence() -> None:
-    adopt = unplaced(ADOPT, priced("AB", {"A": [3, 1]}), "RA")
-    adopt.start()
-    assert adopt.assignment == {"A": 2}
-    assert adopt.outbox == []
-    assert (adopt.findings.place, adopt.findings.bound) == (Place(None), 1)
-
-
-def test_a_robot_alone_with_no_value_that_is_allowed_ends_the_search() -> None:
-    adopt = unplaced(ADOPT, priced("AB", {"A": [INFINITE, INFINITE], "B": [0, 0]}), "RA")
-    adopt.start()
-    assert adopt.verdict is Verdict.NO_SOLUTION
-
-
-@pytest.mark.parametrize("longest", [0, 50, None])
-def test_when_nobody_speaks_all_have_ended_and_the_roots_bounds_are_the_least_cost(longest: int | None) -> None:
-    chance = Random(f"quiet {longest}")
-    for seed in range(30):
-        team = random_cost_team(chance)
-        ends: list[ADOPT] = []
-
-        class Noted(ADOPT):
-            def begin(self, ends: list[ADOPT] = ends) -> None:
-                ends.append(self)
-                super().begin()
-
-        result = Simulation(
-            team, Noted, RandomChannels(seed) if longest is None else Concurrent(seed, longest)
-        ).search()
-        if least_cost(team) == INFINITE:
-            assert result.verdict is Verdict.NO_SOLUTION
-        else:
-            assert all(adopt.terminated for adopt in ends)
-            assert len(ends) == len(team.robots)
-            assert bound_of(result.findings) == least_cost(team)
 
 
 def test_the_docstring_shows_what_happens() -> None:

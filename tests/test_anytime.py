@@ -202,6 +202,11 @@ def test_a_limit_is_told_with_the_best_so_far_and_the_bound() -> None:
     assert f"so; the best so far costs {2**60 + 1:,}, and nothing costs less than 3" in report(PAIR, outcome)
 
 
+def test_who_placed_the_robots_is_told_where_that_was_not_asked_for() -> None:
+    assert "\n  sfb, simulator, seed 0: " in aside(Verdict.OPTIMAL, 1, 1)
+    assert "\n  sfb, then first-fit, simulator, seed 0: " in aside(Verdict.SOLUTION, 1, 1, placed_by="first-fit")
+
+
 def test_what_is_not_proven_says_so() -> None:
     outcome = Outcome("t", "dsa", "simulator", 0, Verdict.SOLUTION, {"A": 1, "B": 2}, 3, verified=True)
     assert "solution, cost 3, which may not be the least, checked" in report(PAIR, outcome)

@@ -1,35 +1,23 @@
-"""One test per rule of BnB-ADOPT+ (Yeoh et al., JAIR 38, 2010; Gutierrez, Meseguer, AAAI 2010), named for it."""
+"""One test per rule of BnB-ADOPT+ (Yeoh et al., JAIR 38, 2010; Gutierrez, Meseguer, AAAI 2010); see `test_bounding`."""
 
 from __future__ import annotations
 
 import doctest
-from random import Random
 
-import pytest
 from agents import told, value
-from cost_problems import least_cost, random_cost_team
-from trees import placed, priced, unplaced
+from trees import context, placed, priced, root, to
 
 import robochoc.protocols.bnb_adopt
-from robochoc.anytime import bound_of
-from robochoc.communication.schedule import Concurrent, RandomChannels
-from robochoc.communication.simulator import Simulation
 from robochoc.message import Message
-from robochoc.outcome import Place, Verdict
+from robochoc.outcome import Verdict
 from robochoc.problem import INFINITE
 from robochoc.protocols.bnb_adopt import BnBADOPT, Cost, Value
-from robochoc.protocols.bounding import Context, Terminate
+from robochoc.protocols.bounding import Terminate
 
 TEAM = priced(
     "ZABCDE", {"ZA": [0] * 4, "ZB": [0, 1, 2, 0], "AB": [0, 3, 1, 0], "BC": [0] * 4, "BD": [0] * 4, "BE": [0] * 4}
 )
 """B stands below A and, further up, Z; C and D are its children, and E is a pseudo-child."""
-
-
-def context(**values: int | tuple[int, int]) -> Context:
-    """Values of robots, for the first time or with their IDs."""
-    pairs = {name: entry if isinstance(entry, tuple) else (entry, 1) for name, entry in values.items()}
-    return {f"R{name}": ((number,), counter) for name, (number, counter) in pairs.items()}
 
 
 def middle() -> BnBADOPT:
@@ -46,18 +34,6 @@ def informed(threshold: float = INFINITE) -> BnBADOPT:
     return adopt
 
 
-def root() -> BnBADOPT:
-    """B as the root of a tree of three."""
-    team = priced("BCD", {"B": [0, 2], "BC": [0] * 4, "BD": [0] * 4})
-    adopt = placed(BnBADOPT, team, "RB", children=["RC", "RD"])
-    adopt.outbox.clear()
-    return adopt
-
-
-def to(receiver: str, said: list[tuple[str, Message]]) -> list[Message]:
-    return [message for name, message in said if name == receiver]
-
-
 def both(*costs: Cost) -> list[tuple[str, Message]]:
     """The same from both children."""
     return [(child, cost) for cost in costs for child in ("RC", "RD")]
@@ -69,17 +45,6 @@ def test_start_takes_the_value_with_the_least_lower_bound_and_tells_all_around()
     assert adopt.outbox == [("RC", Value((2,), 1)), ("RD", Value((2,), 1)), ("RA", Cost({}, 1, INFINITE))]
 
 
-def test_nothing_is_known_of_ub_before_all_neighbours_above_have_told_their_values() -> None:
-    adopt = placed(BnBADOPT, TEAM, "RB", "RA", pseudo_parents=["RZ"])
-    assert to("RA", told(adopt, ("RA", Value((2,), 1)))) == [Cost({}, 0, INFINITE), Cost(context(A=2), 0, INFINITE)]
-    assert to("RA", told(adopt, ("RZ", Value((1,), 1)))) == [Cost(context(A=2, Z=1), 1, 1)]
-
-
-def test_one_decision_is_taken_for_all_that_has_come() -> None:
-    said = told(middle(), ("RA", Value((2,), 1)), ("RA", Value((1,), 2)), ("RZ", Value((2,), 1)))
-    assert to("RA", said) == [Cost(context(A=(1, 2), Z=2), 2, INFINITE)]
-
-
 def test_priority_merge_keeps_the_larger_id_whoever_tells() -> None:
     adopt = informed()
     told(adopt, ("RC", Cost(context(B=1, X=(1, 2), A=(2, 2)), 4, 7)))
@@ -87,19 +52,6 @@ def test_priority_merge_keeps_the_larger_id_whoever_tells() -> None:
     assert adopt.context == context(A=(2, 2), Z=1, X=(1, 2))
     assert adopt.bounds["RC"].lb == [4, 0]
     assert adopt.bounds["RD"].lb == [0, 0]
-
-
-def test_bounds_in_a_compatible_context_only_get_better() -> None:
-    adopt = informed()
-    told(adopt, ("RC", Cost(context(B=1), 4, 6)), ("RC", Cost(context(B=1), 3, 7)))
-    assert (adopt.bounds["RC"].lb, adopt.bounds["RC"].ub) == ([4, 0], [6, INFINITE])
-
-
-def test_a_cost_that_does_not_know_the_own_value_only_tells_of_others() -> None:
-    adopt = informed()
-    told(adopt, ("RC", Cost(context(X=2), 4, 7)))
-    assert adopt.bounds["RC"].lb == [0, 0]
-    assert adopt.context == context(A=1, Z=1, X=2)
 
 
 def test_a_changed_value_voids_the_bounds_of_children_that_depend_on_it_and_the_threshold() -> None:
@@ -146,7 +98,7 @@ def test_a_value_is_kept_until_it_is_dearer_than_the_threshold() -> None:
 
 
 def test_when_the_bounds_meet_the_value_is_the_one_that_is_known_to_cost_that() -> None:
-    adopt = root()
+    adopt = root(BnBADOPT)
     told(adopt, *both(Cost(context(B=1), 1, INFINITE)))
     said = told(adopt, *both(Cost(context(B=2), 0, 0)))
     assert list(adopt.lower) == [2, 2]
@@ -155,7 +107,7 @@ def test_when_the_bounds_meet_the_value_is_the_one_that_is_known_to_cost_that() 
 
 
 def test_a_child_s_threshold_is_what_is_left_when_the_others_cost_the_least() -> None:
-    adopt = root()
+    adopt = root(BnBADOPT)
     said = told(adopt, ("RC", Cost(context(B=1), 4, 7)), ("RD", Cost(context(B=1), 1, 2)))
     assert adopt.ub == 9
     assert said == []  # lower thresholds alone are not worth a message
@@ -210,15 +162,6 @@ def test_the_same_value_with_a_new_id_voids_nothing_and_the_cost_is_told_again()
     assert said == [("RA", Cost(context(A=(1, 3), Z=1), 4, INFINITE))]
 
 
-def test_a_root_whose_bounds_meet_ends_and_says_so() -> None:
-    adopt = root()
-    told(adopt, ("RC", Cost(context(B=1), 1, 1)))
-    assert adopt.findings.bound == 1
-    said = told(adopt, ("RD", Cost(context(B=1), 0, 0)))
-    assert said == [("RC", Terminate(context(B=1))), ("RD", Terminate(context(B=1)))]
-    assert told(adopt, ("RC", Cost(context(B=1), 7, 7))) == []
-
-
 def test_the_last_value_goes_to_all_neighbours_below() -> None:
     team = priced("BCD", {"B": [0, 2], "BC": [0] * 4, "BD": [0] * 4})
     adopt = placed(BnBADOPT, team, "RB", children=["RC"], pseudo_children=["RD"])
@@ -248,7 +191,7 @@ def test_a_robot_goes_on_after_its_parent_s_end_until_its_bounds_meet_and_tells_
 
 
 def test_a_root_that_finds_all_values_infinite_ends_the_search_of_all() -> None:
-    adopt = root()
+    adopt = root(BnBADOPT)
     told(adopt, ("RC", Cost(context(B=2), INFINITE, INFINITE)))
     assert told(adopt, ("RC", Cost(context(B=1), INFINITE, INFINITE))) == []
     assert adopt.verdict is Verdict.NO_SOLUTION
@@ -259,47 +202,6 @@ def test_another_robot_that_finds_all_values_infinite_says_so() -> None:
     said = told(adopt, *both(*(Cost(context(B=number), INFINITE, INFINITE, True) for number in (1, 2))))
     assert to("RA", said) == [Cost(context(A=1, Z=1), INFINITE, INFINITE)]
     assert to("RC", said) == [Value((1,), 1, 0)]
-
-
-def test_an_n_ary_constraint_is_paid_by_its_lowest_robot_once_it_knows_the_others() -> None:
-    team = priced("ABC", {"ABC": range(8)})
-    top = placed(BnBADOPT, team, "RA", children=["RB"], pseudo_children=["RC"])
-    assert list(top.lower) == [0, 0]
-    adopt = placed(BnBADOPT, team, "RC", "RB", pseudo_parents=["RA"])
-    told(adopt, ("RB", Value((2,), 1)))
-    assert list(adopt.lower) == [0, 0]
-    assert told(adopt, ("RA", Value((2,), 1))) == [("RB", Cost(context(A=2, B=2), 6, 6))]
-
-
-def test_a_robot_alone_takes_its_cheapest_value_in_silence() -> None:
-    adopt = unplaced(BnBADOPT, priced("AB", {"A": [3, 1]}), "RA")
-    adopt.start()
-    assert adopt.assignment == {"A": 2}
-    assert adopt.outbox == []
-    assert (adopt.findings.place, adopt.findings.bound) == (Place(None), 1)
-
-
-@pytest.mark.parametrize("longest", [0, 50, None])
-def test_when_nobody_speaks_all_have_ended_and_the_roots_bounds_are_the_least_cost(longest: int | None) -> None:
-    chance = Random(f"quiet {longest}")
-    for seed in range(30):
-        team = random_cost_team(chance)
-        ends: list[BnBADOPT] = []
-
-        class Noted(BnBADOPT):
-            def begin(self, ends: list[BnBADOPT] = ends) -> None:
-                ends.append(self)
-                super().begin()
-
-        result = Simulation(
-            team, Noted, RandomChannels(seed) if longest is None else Concurrent(seed, longest)
-        ).search()
-        if least_cost(team) == INFINITE:
-            assert result.verdict is Verdict.NO_SOLUTION
-        else:
-            assert all(adopt.terminated for adopt in ends)
-            assert len(ends) == len(team.robots)
-            assert bound_of(result.findings) == least_cost(team)
 
 
 def test_the_docstring_shows_what_happens() -> None:

@@ -24,6 +24,7 @@ from pkc_problems import random_pkc_team, with_constraints
 from problems import random_team, team_of
 from program import robochoc
 
+from robochoc.anytime import absent
 from robochoc.formats import PREDEFINED, write_team
 from robochoc.generators.coloring import coloring
 from robochoc.generators.queens3d import queens3d
@@ -31,7 +32,7 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.message import Message
 from robochoc.observers.checker import cost, objections
 from robochoc.observers.objective import aside_cost
-from robochoc.opinion import absent, contradiction
+from robochoc.opinion import contradiction
 from robochoc.outcome import Outcome, Verdict
 from robochoc.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
 from robochoc.protocols.protocol import Protocol

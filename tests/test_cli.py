@@ -144,19 +144,22 @@ def test_solve_json_is_the_contract(runtime: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "verdict"),
+    ("words", "verdict", "placed_by"),
     [
-        (["--withdraw"], "optimal"),
-        (["--withdraw", "fewest"], "optimal"),
-        (["--withdraw", "maximal"], "solution"),
-        (["--withdraw=maximal"], "solution"),
+        (["--withdraw"], "optimal", "sfb"),
+        (["--withdraw", "fewest"], "optimal", "sfb"),
+        (["--withdraw", "maximal"], "solution", "first-fit"),
+        (["--withdraw=maximal"], "solution", "first-fit"),
     ],
 )
-def test_withdraw_may_stand_alone_even_before_the_path(four: Path, words: list[str], verdict: str) -> None:
+def test_withdraw_may_stand_alone_even_before_the_path(
+    four: Path, words: list[str], verdict: str, placed_by: str
+) -> None:
     done = robochoc("solve", *words, four, "--json", "--runtime", "simulator")
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert (result["verdict"], result["verified"]) == (verdict, True)
+    assert (result["protocol"], result["placed_by"]) == ("abt", placed_by)
     assert len(result["withdrawn"]) == {"optimal": 6, "solution": 7}[verdict]
     assert len(result["assignment"]) == 16 - len(result["withdrawn"])
 
@@ -167,6 +170,7 @@ def test_solve_tells_people_what_happened(four: Path) -> None:
     assert "has derived the empty nogood" in words
     assert "as few as possible (proven) step aside" in words
     assert "10 fly, 6 step aside" in words
+    assert "abt, then sfb, simulator, seed 0: " in words
     assert re.search(r"row\\column +1 +2 +3 +4", words)
 
 

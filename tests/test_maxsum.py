@@ -18,10 +18,10 @@ from robochoc.communication.host import BadSettings, settings_of
 from robochoc.communication.schedule import Concurrent
 from robochoc.outcome import Verdict
 from robochoc.problem import INFINITE, Constraint, Relation, Semantics, Team
-from robochoc.protocols import factor
+from robochoc.protocols import maxsum_factor
 from robochoc.protocols.cycles import Domain
-from robochoc.protocols.factor import Factor
 from robochoc.protocols.maxsum import MaxSum, MaxSumSettings, Q, R
+from robochoc.protocols.maxsum_factor import Factor
 from robochoc.solver import cost_table
 from robochoc.solver.encoding import Unsupported
 
@@ -218,7 +218,7 @@ def test_tables_in_lists_and_in_numpy_say_the_same(arity: int, monkeypatch: pyte
     charges[0] = INFINITE
     rows = [random.integers(0, 9, size).astype(float).tolist() for size in shape]
     said = Factor([f"R{axis}" for axis in range(arity - 1)], charges).r(rows)
-    monkeypatch.setattr(factor, "SMALL", 0)
+    monkeypatch.setattr(maxsum_factor, "SMALL", 0)
     assert Factor([f"R{axis}" for axis in range(arity - 1)], charges).r(rows) == said
     for axis, row in enumerate(said):
         for place, least in enumerate(row):

@@ -111,6 +111,7 @@ def test_of_four_it_is_proven_how_many_can_fly(protocol: str, model: str, most: 
     outcome = solve(queens3d(4, model), options)
     assert outcome.verdict is Verdict.OPTIMAL
     assert outcome.verified
+    assert outcome.placed_by == (None if protocol == "sfb" else "sfb")
     assert len(outcome.assignment) == most
 
 

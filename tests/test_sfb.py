@@ -1,16 +1,16 @@
-"""One test per rule of forward bounding by the holder, many partial assignments at a time; named for it."""
+"""One test per rule of forward bounding by the holder, named for it; the bounds: `test_sfb_bounds`."""
 
 from __future__ import annotations
 
 import doctest
 import math
-from collections.abc import Mapping, Sequence
 from random import Random
 
 import pytest
 from agents import told, value
-from cost_problems import random_cost_team, with_costs
+from cost_problems import random_cost_team
 from problems import team_of
+from sfb_robots import CHAIN, agents, cpas, introduced, row, rows, team
 
 import robochoc.protocols.sfb
 from robochoc.communication.host import BadSettings, settings_of
@@ -18,75 +18,11 @@ from robochoc.communication.schedule import RandomChannels
 from robochoc.communication.simulator import Simulation
 from robochoc.message import Message
 from robochoc.outcome import Verdict
-from robochoc.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.problem import INFINITE
 from robochoc.protocols.findings import NOTHING
-from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.sfb import SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.cost_table import EXACT
 from robochoc.solver.encoding import TooMuch
-from robochoc.solver.part import parts
-
-Costs = Mapping[str, Sequence[float]]
-
-
-def soft(scope: str, costs: Sequence[float], *domains: Sequence[int]) -> Constraint:
-    """What the variables in `scope` pay for each combination of their values, 1 and 2 if not given."""
-    rows = [()]
-    for domain in domains or [(1, 2)] * len(scope):
-        rows = [(*row, one) for row in rows for one in domain]  # type: ignore[misc]
-    relation = Relation("R", len(scope), Semantics.SOFT, tuple(rows), tuple(costs), 0)
-    return Constraint("C", relation, tuple(scope), tuple(scope))
-
-
-def team(costs: Costs, domains: Mapping[str, Sequence[int]] | None = None) -> Team:
-    """Robots RA, RB, ...: for each scope in `costs` what its combinations of values cost."""
-    domains = domains or dict.fromkeys(sorted(set("".join(costs))), (1, 2))
-    found = [soft(scope, given, *(domains[name] for name in scope)) for scope, given in costs.items()]
-    return with_costs(team_of(domains, found))
-
-
-CHAIN: Costs = {"AB": (3, 1, 0, 2), "BC": (0, 4, 2, 1), "A": (0, 1)}
-"""RA and RB, RB and RC; the cheapest is RA 2, RB 1, RC 1, for 1."""
-
-
-def agents(problem: Team, settings: SFBSettings | None = None) -> dict[str, SFB]:
-    """The protocol objects of all robots, not started."""
-    order = PriorityOrder(problem.order)
-    found = {name: SFB(LocalProblem(part), order) for name, part in parts(problem, everywhere=True).items()}
-    for robot in found.values():
-        robot.settings = settings or robot.settings
-    return found
-
-
-def introduced(problem: Team, settings: SFBSettings | None = None) -> tuple[dict[str, SFB], list[CPAs]]:
-    """All robots know each other's values; and what the first one says then."""
-    robots = agents(problem, settings)
-    said: list[CPAs] = []
-    todo = []
-    for robot in robots.values():
-        robot.start()
-        todo += [(robot.problem.agent, *one) for one in robot.outbox]
-        robot.outbox.clear()
-    while todo:
-        sender, receiver, message = todo.pop(0)
-        if isinstance(message, CPAs):
-            said.append(message)
-        else:
-            todo += [(receiver, *one) for one in told(robots[receiver], (sender, message))]
-    return robots, said
-
-
-def rows(message: Message) -> list[list[int]]:
-    """What `message` holds, as numbers of one byte each."""
-    assert isinstance(message, CPAs)
-    width = len(message.rows) // message.count
-    return [list(message.rows[place : place + width]) for place in range(0, len(message.rows), width)]
-
-
-def cpas(*partial: Sequence[int], least: int = 11, ceiling: int = 11) -> CPAs:
-    """A message of CPAs in problems whose costs fit into a byte."""
-    return CPAs(len(partial), bytes([number for row in partial for number in row]), least, ceiling)
-
 
 # Before the search
 
@@ -134,83 +70,7 @@ def test_a_robot_alone_solves_its_problem_in_silence() -> None:
     assert robot.outbox == []
 
 
-# The bound
-
-
-def test_a_cpa_tells_its_bound_its_cost_its_values_and_what_values_below_would_cost() -> None:
-    """RA 1 costs RB 3 or 1, and RA 2, for which RA is charged 1, costs it 0 or 2."""
-    _, said = introduced(team(CHAIN))
-    assert sorted(rows(said[0])) == [[1, 0, 0, 3, 1, 0, 0], [1, 1, 1, 0, 2, 0, 0]]
-
-
-def test_of_equal_bounds_those_that_leave_others_the_most_go_first() -> None:
-    _, said = introduced(team({"AB": (2, 1, 1, 1)}))
-    assert [row[2] for row in rows(said[0])] == [1, 0]
-
-
-def test_lower_bounds_go_first() -> None:
-    _, said = introduced(team({"AB": (2, 2, 1, 1)}))
-    assert [row[:3] for row in rows(said[0])] == [[1, 0, 1], [2, 0, 0]]
-
-
-def test_the_bound_adds_the_least_of_each_robot_below() -> None:
-    _, said = introduced(team({"AB": (2, 3, 9, 9), "AC": (9, 4, 9, 9), "D": (1, 2)}, dict.fromkeys("ABCD", (1, 2))))
-    assert rows(said[0])[0][:3] == [2 + 4 + 1, 0, 0]
-
-
-def test_what_cannot_become_cheaper_than_the_best_known_is_not_sent() -> None:
-    robots, _ = introduced(team(CHAIN))
-    said = told(robots["RB"], ("RA", cpas([1, 1, 1, 0, 2, 0, 0], least=3, ceiling=10)))
-    assert [row[:4] for row in rows(said[0][1])] == [[1, 1, 1, 0]]  # RB 2 would have paid 2, and RC 1
-
-
-def test_where_nothing_is_left_to_send_the_robot_goes_back_at_once() -> None:
-    robots, _ = introduced(team(CHAIN))
-    assert told(robots["RB"], ("RA", cpas([1, 1, 1, 0, 2, 0, 0], least=1, ceiling=10))) == [("RA", Explored())]
-
-
-def test_a_broken_hard_constraint_reaches_the_ceiling() -> None:
-    _, said = introduced(team({"AB": (math.inf, math.inf, 1, math.inf)}))
-    assert rows(said[0]) == [[1, 0, 1, 1, 2]]
-
-
-@pytest.mark.parametrize("dear", [1, 100, 30_000, 1 << 20, 1 << 40])
-def test_numbers_are_as_small_as_the_costs_allow_and_exact(dear: int) -> None:
-    problem = team({"AB": (dear, dear + 1, dear + 1, dear + 1), "BC": (dear + 2, dear, dear, dear), "C": (1, 0)})
-    result = Simulation(problem, SFB, RandomChannels(0)).run(60)
-    assert {name: next(iter(own.values())) for name, own in result.assignments.items()} == {"RA": 1, "RB": 1, "RC": 2}
-    best = result.findings["RA"].best
-    assert best is not None
-    assert best.cost == 2 * dear
-
-
-def test_of_an_n_ary_constraint_the_last_but_one_adds_what_the_last_will_pay() -> None:
-    """The first robot of the scope adds nothing."""
-    robots, said = introduced(team({"ABC": (1, 2, 3, 4, 5, 6, 7, 8)}))
-    assert [row[3:] for row in rows(said[0])] == [[0, 0, 0, 0]] * 2
-    said_next = told(robots["RB"], ("RA", cpas([0, 0, 1, 0, 0, 0, 0], ceiling=9)))
-    assert rows(said_next[0][1]) == [[5, 0, 1, 0, 5, 6], [7, 0, 1, 1, 7, 8]]
-
-
-def test_domains_may_be_of_different_sizes() -> None:
-    domains = {"A": (1, 2), "B": (1, 2, 3), "C": (1,)}
-    _, said = introduced(team({"AB": (5, 4, 3, 9, 9, 9), "AC": (2, 7)}, domains))
-    assert rows(said[0])[0] == [3 + 2, 0, 0, 5, 4, 3, 2]
-
-
-def test_all_constraint_checks_are_done_before_the_search() -> None:
-    robots, said = introduced(team(CHAIN))
-    checks = [robot.problem.checks for robot in robots.values()]
-    assert told(robots["RB"], ("RA", said[0]))
-    assert [robot.problem.checks for robot in robots.values()] == checks
-
-
 # Many at a time
-
-
-def row(bound: int) -> list[int]:
-    """A CPA for RB in CHAIN, with that bound."""
-    return [bound, bound, 1, 0, 0, 0, 0]
 
 
 def test_the_first_cpa_goes_alone_and_each_bundle_is_twice_as_large() -> None:
@@ -366,7 +226,7 @@ def test_what_no_robot_says_is_refused(sender: str, message: Message) -> None:
 
 
 def test_costs_that_floats_do_not_hold_exactly_are_refused() -> None:
-    huge = 2**53
+    huge = EXACT
     with pytest.raises(TooMuch, match="2\\^53"):
         introduced(team({"AB": (huge, huge, huge, huge - 1)}))
 

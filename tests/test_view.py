@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -213,6 +214,8 @@ def test_the_caption_says_what_happened() -> None:
         "protocol": "abt",
         "messages": "1,234",
     }
+    placed = replace(outcome({"A": 1}, Verdict.OPTIMAL, "RB"), placed_by="sfb")
+    assert ("protocol", "abt, then sfb") in scene_of(placed).facts
 
 
 # How they fly

@@ -9,7 +9,9 @@ from typing import TypeVar
 from cost_problems import with_costs
 from problems import team_of
 
+from robochoc.message import Message
 from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.protocols.bounding import Context
 from robochoc.protocols.dfs import TreeProtocol
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.compiled import LocalProblem
@@ -18,15 +20,20 @@ from robochoc.solver.part import parts
 P = TypeVar("P", bound=TreeProtocol)
 
 
-def priced(names: str, costs: Mapping[str, Sequence[float]], values: int = 2) -> Team:
-    """A robot for each letter, with the values from 1 on; `costs` of each combination of a scope, in lexical order."""
+Costs = Mapping[str, Sequence[float]]
+"""What each combination of values of a scope costs, in lexical order; a scope is the letters of its robots."""
+
+
+def priced(names: str, costs: Costs, values: Mapping[str, int] = {}) -> Team:
+    """A robot for each letter, with the values from 1 to 2, or to its entry in `values`."""
+    domains = {name: range(1, values.get(name, 2) + 1) for name in names}
 
     def constraint(scope: str) -> Constraint:
-        rows = tuple(itertools.product(range(1, values + 1), repeat=len(scope)))
+        rows = tuple(itertools.product(*(domains[name] for name in scope)))
         relation = Relation("R", len(scope), Semantics.SOFT, rows, tuple(costs[scope]))
         return Constraint("C", relation, tuple(scope), tuple(scope))
 
-    return with_costs(team_of({name: range(1, values + 1) for name in names}, map(constraint, costs)))
+    return with_costs(team_of(domains, map(constraint, costs)))
 
 
 def unplaced(protocol: type[P], team: Team, name: str) -> P:
@@ -52,3 +59,22 @@ def placed(
     robot.begin()
     robot.settle()
     return robot
+
+
+def root(protocol: type[P]) -> P:
+    """B as the root of a tree of three, when it has begun."""
+    team = priced("BCD", {"B": [0, 2], "BC": [0] * 4, "BD": [0] * 4})
+    robot = placed(protocol, team, "RB", children=["RC", "RD"])
+    robot.outbox.clear()
+    return robot
+
+
+def context(**values: int | tuple[int, int]) -> Context:
+    """Values of robots, for the first time or with their counters."""
+    pairs = {name: entry if isinstance(entry, tuple) else (entry, 1) for name, entry in values.items()}
+    return {f"R{name}": ((number,), counter) for name, (number, counter) in pairs.items()}
+
+
+def to(receiver: str, said: Sequence[tuple[str, Message]]) -> list[Message]:
+    """What was said to one robot."""
+    return [message for name, message in said if name == receiver]

@@ -30,7 +30,7 @@ def report(team: Team, outcome: Outcome) -> str:
         lost = sorted(outcome.lost, key=natural)
         lines += [f"  {len(lost)} {'was' if len(lost) == 1 else 'were'} lost:", *_wrapped(lost)]
     order = f", order {outcome.order}" if outcome.order else ""
-    lines.append(f"  {outcome.protocol}{order}, {_place(team, outcome)}: {_metrics(outcome)}")
+    lines.append(f"  {outcome.protocols}{order}, {_place(team, outcome)}: {_metrics(outcome)}")
     return "\n".join(lines)
 
 

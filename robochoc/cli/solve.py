@@ -15,8 +15,6 @@ from robochoc.cli.local import limits, local_options
 from robochoc.cli.order import GIVEN, OrderName, order_for
 from robochoc.cli.paths import InputPath, OutputFile
 from robochoc.cli.solve_settings import (
-    MINIMISES,
-    SATISFIES,
     WITHDRAWALS,
     Products,
     SolveCommand,
@@ -24,6 +22,7 @@ from robochoc.cli.solve_settings import (
     check_settings,
     protocol_settings,
 )
+from robochoc.defaults import MINIMISES, SATISFIES
 
 if TYPE_CHECKING:
     from robochoc.observers.journal import Recorder

@@ -12,9 +12,6 @@ import click
 from robochoc.cli.order import GIVEN
 
 WITHDRAWALS = ("fewest", "maximal")
-SATISFIES = "abt"
-MINIMISES = "sfb"
-"""What solves a team without costs, and one with costs, unless something else is asked for."""
 
 
 class SolveCommand(click.Command):

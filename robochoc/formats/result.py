@@ -55,6 +55,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     lost: list[str] = []
     order: str | None = None
     bound: float | int | None = None
+    placed_by: str | None = None
     tree: dict[str, Place] = {}
     confirmed: bool = False
 
@@ -89,6 +90,7 @@ def result_json(outcome: Outcome) -> bytes:
         lost=list(outcome.lost),
         order=outcome.order,
         bound=outcome.bound,
+        placed_by=outcome.placed_by,
         tree=outcome.tree,
         confirmed=outcome.confirmed,
     )
@@ -153,6 +155,7 @@ def read_result(content: bytes) -> Outcome:
         lost=tuple(form.lost),
         order=form.order,
         bound=form.bound,
+        placed_by=form.placed_by,
         tree=form.tree,
         confirmed=form.confirmed,
         epochs=tuple(map(_epoch_of, form.epochs)),

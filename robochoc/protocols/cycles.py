@@ -109,6 +109,11 @@ class CycleProtocol(Protocol):
         for name in names:
             self.send(name, message)
 
+    def tell_value(self, then: Then) -> None:
+        """Say the own value to all neighbours, and `then` go on with theirs."""
+        self.tell(self.problem.neighbours, Value(self.problem.values[self.present]))
+        self.listen(self.problem.neighbours, then)
+
     def take(self, index: int) -> None:
         """The own value of the next cycle, which may be the present one."""
         self.cycle += 1

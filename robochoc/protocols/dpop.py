@@ -54,7 +54,6 @@ from robochoc.message import Message, Value
 from robochoc.outcome import Verdict
 from robochoc.protocols.dfs import TreeMessage, TreeProtocol
 from robochoc.protocols.dpop_tables import (
-    EXACT,
     Arriving,
     Codes,
     Extent,
@@ -72,6 +71,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Settings
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.cost_table import EXACT, refuse_inexact
 from robochoc.solver.encoding import TooMuch
 
 GIB = 1 << 30
@@ -226,8 +226,7 @@ class DPOP(TreeProtocol):
 
     def _refuse(self, most: Need, width: int) -> None:
         """The root knows what the tables of the whole tree need. Raises `TooMuch`."""
-        if self._dearest >= EXACT:
-            raise TooMuch("costs could add up to 2^53 or more, which tables do not hold exactly")
+        refuse_inexact(self._dearest)
         if most.bytes > self.settings.memory:
             raise TooMuch(
                 f"{most.robot} needs {_told(most.bytes)} for its tables, more than {self.settings.memory:,}: the"

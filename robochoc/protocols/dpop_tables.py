@@ -1,8 +1,8 @@
 """Tables of costs as DPOP joins, projects, keeps and sends them (see `dpop`).
 
 An axis stands for a robot, a place on it for one of the robot's values. Costs are integers, or `inf` where something
-hard is broken; they are added up in float64, which is exact below 2^53 (`EXACT`). Tables that stay, or travel, are
-of unsigned integers, as narrow as the costs allow; the largest of them stands for `inf`. How much memory an operation
+hard is broken; they are added up in float64, which is exact below 2^53. Tables that stay, or travel, are of
+unsigned integers, as narrow as the costs allow; the largest of them stands for `inf`. How much memory an operation
 takes can be told before: `bytes_of`.
 """
 
@@ -21,7 +21,6 @@ Table = Array | Codes
 Width = Literal[1, 2, 4, 8]
 """Bytes that a cost takes."""
 
-EXACT = 1 << 53
 BLOCK = 1 << 17
 """Cells of a join that are made at a time: they stay near the processor."""
 TEMPORARY = 32

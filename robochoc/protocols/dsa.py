@@ -6,7 +6,7 @@ comparison and applications to constraint optimization problems in sensor networ
 Algorithm 1, line by line:
 
     randomly choose a value                                        `begin`
-    while no termination condition is met: send the value, if      `_tell_value`
+    while no termination condition is met: send the value, if      `tell_value`
       it is new, collect neighbours' new values
     select and assign the next value (Table 1)                     `_choose`
 
@@ -67,11 +67,7 @@ class DSA(CycleProtocol):
     def begin(self) -> None:
         """Take any value."""
         self.take(self.any_value())
-        self._tell_value()
-
-    def _tell_value(self) -> None:
-        self.tell(self.problem.neighbours, Value(self.problem.values[self.present]))
-        self.listen(self.problem.neighbours, self._choose)
+        self.tell_value(self._choose)
 
     def _choose(self, heard: Mapping[str, Message]) -> None:
         """All neighbours' values are known: move, or stay."""
@@ -84,7 +80,7 @@ class DSA(CycleProtocol):
                 index = self.any_of(best)
         self.take(index)
         if not self.over:
-            self._tell_value()
+            self.tell_value(self._choose)
 
     def _moves_sideways(self, conflict: bool) -> bool:  # noqa: FBT001 - the variants' only question
         """Whether a robot that gains nothing may move all the same."""

@@ -47,7 +47,7 @@ from robochoc import message as wire
 from robochoc.outcome import Verdict
 from robochoc.problem import INFINITE
 from robochoc.protocols.cycles import CycleProtocol, CycleSettings, Domain
-from robochoc.protocols.factor import Factor, Row
+from robochoc.protocols.maxsum_factor import Factor, Row
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem

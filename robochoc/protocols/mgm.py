@@ -4,7 +4,7 @@ Maheswaran, Pearce, Tambe: "Distributed algorithms for DCOP: a graphical-game-ba
 Pearce, "Local optimization in cooperative agent networks", PhD thesis, 2007. A modification of distributed breakout
 (Yokoo, Hirayama 1996) that has no weights. The paper's procedure (Algorithm MGM, `allNeighbors`, `currentContext`):
 
-    SendValueMessage, GetValueMessages   `_tell_value`, `_weigh`
+    SendValueMessage, GetValueMessages   `tell_value`, `_weigh`
     BestUnilateralGain                   `_weigh`
     SendGainMessage, GetGainMessages     `_weigh`, `_move`
     if gain > max(neighbours' gains)     `_move`
@@ -88,11 +88,7 @@ class MGM(Gainers):
     def begin(self) -> None:
         """Take any value."""
         self.take(self.any_value())
-        self._tell_value()
-
-    def _tell_value(self) -> None:
-        self.tell(self.problem.neighbours, Value(self.problem.values[self.present]))
-        self.listen(self.problem.neighbours, self._weigh)
+        self.tell_value(self._weigh)
 
     def _weigh(self, heard: Mapping[str, wire.Message]) -> None:
         """All neighbours' values are known: say what the best own move would save."""
@@ -104,4 +100,4 @@ class MGM(Gainers):
         """All neighbours' gains are known: move, or let others."""
         self.take(self.target if self.wins(heard) else self.present)
         if not self.over:
-            self._tell_value()
+            self.tell_value(self._weigh)

@@ -3,7 +3,7 @@
 Maheswaran, Pearce, Tambe: "Distributed algorithms for DCOP: a graphical-game-based approach", PDCS 2004, Section 3
 (SCA-2 and MGM-2); Pearce, "Local optimization in cooperative agent networks", PhD thesis, 2007. The phases of a cycle:
 
-    value messages                              `_tell_value`, `_offer`
+    value messages                              `tell_value`, `_offer`
     offers (offerers), to one neighbour each    `_offer`, `_answer`
     accept, reject                              `_answer`, `_hear_answer`
     gain messages                               `_tell_gain`, `_decide`
@@ -122,11 +122,7 @@ class MGM2(Gainers):
     def _meet(self, heard: Mapping[str, wire.Message]) -> None:
         """All neighbours' domains are known: the first cycle begins."""
         self.domains = {name: told.values for name, told in heard.items() if isinstance(told, Domain)}
-        self._tell_value()
-
-    def _tell_value(self) -> None:
-        self.tell(self.problem.neighbours, Value(self.problem.values[self.present]))
-        self.listen(self.problem.neighbours, self._offer)
+        self.tell_value(self._offer)
 
     def _offer(self, heard: Mapping[str, wire.Message]) -> None:
         """All neighbours' values are known: be an offerer, or not."""
@@ -209,4 +205,4 @@ class MGM2(Gainers):
     def _end_cycle(self, *, move: bool) -> None:
         self.take(self.target if move else self.present)
         if not self.over:
-            self._tell_value()
+            self.tell_value(self._offer)

@@ -49,15 +49,13 @@ from typing import assert_never, cast
 from robochoc.message import Message, Value
 from robochoc.outcome import Verdict
 from robochoc.protocols.findings import NOTHING, Best, Findings
-from robochoc.protocols.forward_bounds import BOUND, ForwardBounds, Rows, dearest
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol, Settings
+from robochoc.protocols.sfb_bounds import BOUND, ForwardBounds, Rows, dearest
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.encoding import TooMuch
+from robochoc.solver.cost_table import EXACT, refuse_inexact
 
-EXACT = 2**53
-"""Below it, floats hold all integers."""
 MESSAGE_BYTES = 1 << 22
 """About how large messages become: as much is extended at once as fits, if everything can be extended."""
 
@@ -80,7 +78,7 @@ class Below(Message, frozen=True):
 
 
 class CPAs(Message, frozen=True):
-    """`count` partial assignments of all robots above the receiver (see `forward_bounds`) that may cost below `least`.
+    """`count` partial assignments of all robots above the receiver (see `sfb_bounds`) that may cost below `least`.
 
     `least` is what the cheapest known solution costs, or the `ceiling`, which no cost reaches.
     """
@@ -233,8 +231,7 @@ class SFB(Protocol):
         self.bounds = ForwardBounds(self.problem, self.order, self.domains)
         charges = [self.problem.costs({}), *below.charges]
         most = below.most + self.bounds.most + dearest(charges[0])
-        if most >= EXACT:
-            raise TooMuch("costs could add up to 2^53 or more, which tables do not hold exactly")
+        refuse_inexact(most)
         if self.previous is not None:
             self.send(self.previous, Below([own, *below.domains], charges, most))
         else:

@@ -62,7 +62,7 @@ def _facts(outcome: Outcome, flying: int, aside: int) -> tuple[tuple[str, str], 
     verdict = f"{outcome.verdict}{checked}"
     if outcome.aside:
         verdict = f"no solution for all {flying + aside}; {flying} placed{checked}"
-    facts = [("verdict", verdict), ("protocol", outcome.protocol)]
+    facts = [("verdict", verdict), ("protocol", outcome.protocols)]
     if outcome.lost:
         facts.append(("lost", ", ".join(outcome.lost)))
     if outcome.cost:
