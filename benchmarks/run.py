@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import channels
 import dynamic
 import flagship
 import local_search
@@ -42,6 +43,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "dynamic": dynamic.measured,
     "optimum": optimum.measured,
     "local_search": local_search.measured,
+    "channels": channels.measured,
 }
 """Parts that take longer than all others together: only when they are named."""
 ALL = {**PARTS, **LONG}

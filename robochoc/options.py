@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from robochoc.communication.channel import ChannelModel
 from robochoc.defaults import SATISFIES
 from robochoc.orders import Order
 from robochoc.solver.compile import Limits
@@ -50,12 +51,13 @@ class Options:
     """How to run.
 
     `timeout` is in seconds of wall-clock time, `messages` a limit on their number. `seed`, `schedule` and `delay`
-    are the simulator's; `delay` is the longest a message takes, in constraint checks. `order` is the robots' total
-    priority order, by name or as the list of them (None: the files'); `seed` is `Order.RANDOM`'s too. `local`
-    limits the compilation of each robot's domain; `cache` says whether solutions of local problems are kept in the
-    user's cache folder. `count` is for the central judge: the number of all solutions. `verify` asks for a second
-    opinion on a `no-solution`. `settings` are the protocol's, as text; its chance is drawn from `seed` too. With
-    `on_loss` set to withdraw, robots whose processes end leave the problem; up to `spares` of them come back.
+    are the simulator's; `delay` is the longest a message takes, in constraint checks. A `channel`, instead of these
+    two, has the simulator count seconds of computing and radio. `order` is the robots' total priority order, by name
+    or as the list of them (None: the files'); `seed` is `Order.RANDOM`'s too. `local` limits the compilation of each
+    robot's domain; `cache` says whether solutions of local problems are kept in the user's cache folder. `count` is
+    for the central judge: the number of all solutions. `verify` asks for a second opinion on a `no-solution`.
+    `settings` are the protocol's, as text; its chance is drawn from `seed` too. With `on_loss` set to withdraw, robots
+    whose processes end leave the problem; up to `spares` of them come back.
     """
 
     protocol: str = SATISFIES
@@ -73,4 +75,5 @@ class Options:
     messages: int | None = None
     on_loss: OnLoss = OnLoss.FAIL
     spares: int = 0
+    channel: ChannelModel | None = None
     settings: Mapping[str, str] = field(default_factory=dict)

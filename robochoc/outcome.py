@@ -22,7 +22,8 @@ class Metrics:
     `messages`: protocol messages sent, by type; `bytes`: of their encoded contents; `ncccs`: non-concurrent
     constraint checks; `checks`: constraint checks of all robots; `wall_s`: seconds of wall-clock time;
     `compile_s`: seconds before that, in which local domains were compiled; `memory`: bytes that the largest robot's
-    process had to itself at the end (0 where robots have no processes).
+    process had to itself at the end (0 where robots have no processes); `simulated_s`: seconds of simulated time, by a
+    channel model (0 where there was none).
     """
 
     messages: dict[str, int] = field(default_factory=dict)
@@ -32,6 +33,7 @@ class Metrics:
     wall_s: float = 0.0
     compile_s: float = 0.0
     memory: int = 0
+    simulated_s: float = 0.0
 
     def __add__(self, other: Metrics) -> Metrics:
         """The cost of two runs, one after the other."""
@@ -44,6 +46,7 @@ class Metrics:
             wall_s=self.wall_s + other.wall_s,
             compile_s=self.compile_s + other.compile_s,
             memory=max(self.memory, other.memory),
+            simulated_s=self.simulated_s + other.simulated_s,
         )
 
 
@@ -115,6 +118,8 @@ class Outcome:
     """Whether the central judge, who was asked, comes to the same `no-solution` or the same least cost."""
     epochs: tuple[Epoch, ...] = ()
     """What happened in each epoch; empty where there was but one, as nothing changed."""
+    channel: str | None = None
+    """The name of the channel model by which time was simulated, if it was."""
 
     placed_by: str | None = None
     """The protocol that said who steps aside, where that is another than the one that was asked for."""

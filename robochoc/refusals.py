@@ -7,7 +7,7 @@ from collections.abc import Callable
 from robochoc.change import changed_by
 from robochoc.communication.host import BadSettings, settings_of
 from robochoc.observers.objective import aside_cost
-from robochoc.options import Options, Withdrawal
+from robochoc.options import Options, Runtime, ScheduleName, Withdrawal
 from robochoc.problem import Kind, Model, Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
@@ -23,6 +23,7 @@ LARGEST = 2**62
 def refuse_unfit(team: Team, options: Options, protocol: type[Protocol]) -> None:
     """Raise `Unsupported` for what the options ask for and the protocol, or this version, cannot do."""
     traits = protocol.traits
+    _refuse_channel(options)
     try:
         settings_of(protocol, options.settings)
     except BadSettings as wrong:
@@ -104,6 +105,14 @@ def instead(team: Team, name: str) -> str:
 
     names = [offer.name for offer in offers() if offer.protocol and fits(offer.name, offer.protocol.traits)]
     return f"; these would do: {', '.join(names)} (--protocol)" if names else ""
+
+
+def _refuse_channel(options: Options) -> None:
+    """A channel model is another schedule of the simulator."""
+    if options.channel and options.runtime is not Runtime.SIMULATOR:
+        raise Unsupported("a channel model (--channel) is the simulator's; add --runtime simulator")
+    if options.channel and (options.delay or options.schedule is not ScheduleName.CONCURRENT):
+        raise Unsupported("a channel model (--channel) says how long messages take; drop --delay and --schedule")
 
 
 def _refuse_fewest(team: Team, options: Options, traits: Traits) -> None:

@@ -15,6 +15,7 @@ from robochoc.communication.run_result import Progress
 from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.session import Session
 from robochoc.communication.simulator import Simulation
+from robochoc.communication.timed import Timed
 from robochoc.defaults import MINIMISES
 from robochoc.epochs import Journey, Played
 from robochoc.observers.checker import has_local_solution
@@ -98,6 +99,7 @@ class _Run:
             seed=options.seed,
             verdict=Verdict.UNKNOWN,
             order="listed" if isinstance(options.order, tuple) else options.order,
+            channel=options.channel.name if options.channel else None,
         )
 
     def distributed(self) -> Outcome:
@@ -372,6 +374,8 @@ def _favourable(team: Team) -> Team:
 
 
 def _schedule(options: Options) -> Schedule:
+    if options.channel:
+        return Timed(options.seed, options.channel)
     match options.schedule:
         case ScheduleName.CONCURRENT:
             return Concurrent(options.seed, options.delay)

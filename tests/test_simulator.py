@@ -120,5 +120,5 @@ def taken(schedule: Schedule) -> list[Envelope]:
     packet = list(schedule.get())
     assert len({envelope.receiver for envelope in packet}) <= 1
     if packet:
-        schedule.done(packet[0].receiver, max(envelope.clock for envelope in packet))
+        schedule.done(packet[0].receiver, max(envelope.clock for envelope in packet), 0)
     return packet

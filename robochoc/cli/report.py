@@ -30,7 +30,7 @@ def report(team: Team, outcome: Outcome) -> str:
         lost = sorted(outcome.lost, key=natural)
         lines += [f"  {len(lost)} {'was' if len(lost) == 1 else 'were'} lost:", *_wrapped(lost)]
     order = f", order {outcome.order}" if outcome.order else ""
-    lines.append(f"  {outcome.protocols}{order}, {_place(team, outcome)}: {_metrics(outcome)}")
+    lines.append(f"  {outcome.protocols}{order}, {_place(team, outcome)}: {_metrics(outcome)}{_simulated(outcome)}")
     return "\n".join(lines)
 
 
@@ -156,6 +156,14 @@ def _local(spent: Metrics) -> str:
         return ""
     memory = f", {spent.memory / 2**20:.1f} MiB in the largest process" if spent.memory else ""
     return f" after {spent.compile_s:.2f} s of compiling{memory}"
+
+
+def _simulated(outcome: Outcome) -> str:
+    """What it would have taken by radio, where a channel model was asked for."""
+    if outcome.channel is None:
+        return ""
+    seconds = outcome.metrics.simulated_s
+    return f"; {f'{seconds:,.2f} s' if seconds >= 1 else f'{seconds * 1000:,.2f} ms'} simulated ({outcome.channel})"
 
 
 def _board(team: Team, assignment: Mapping[str, int]) -> list[str]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from robochoc.cli.channel import ChannelName, channel_for
 from robochoc.cli.failure import INVALID, LIMIT, Failure, failures_told, worst
 from robochoc.cli.local import limits, local_options
 from robochoc.cli.order import GIVEN, OrderName, order_for
@@ -87,6 +88,15 @@ if TYPE_CHECKING:
     default=0,
     show_default=True,
     help="Simulator, concurrent schedule only: the longest delay of a message, in constraint checks.",
+)
+@click.option(
+    "--channel",
+    type=ChannelName(),
+    metavar="NAME|FILE",
+    help=(
+        "Simulator only, instead of --delay: simulate time in seconds, computing and radio, by a channel model: wlan,"
+        " wpan, wman, wwan, or a TOML file (docs/channels.md)."
+    ),
 )
 @click.option(
     "--timeout",
@@ -177,6 +187,8 @@ def solve(
     protocol = settings.pop("protocol")
     on_loss = settings.pop("on_loss") or ("withdraw" if settings["spares"] else "fail")
     order = settings.pop("order")
+    with failures_told("--channel"):
+        channel = channel_for(settings.pop("channel"))
     options = Options(
         local=limits(settings.pop("local_solutions"), settings.pop("local_timeout")),
         cache=not settings.pop("no_cache"),
@@ -185,6 +197,7 @@ def solve(
         schedule=ScheduleName(settings.pop("schedule")),
         withdraw=Withdrawal(withdraw) if withdraw else None,
         on_loss=OnLoss(on_loss),
+        channel=channel,
         **settings,
     )
     folders, statuses = _teams(paths)
@@ -269,6 +282,7 @@ def _journal(team: Team, options: Options, path: Path | None) -> Iterator[Record
             runtime=options.runtime,
             seed=options.seed,
             order=options.order or UNSET,
+            channel=options.channel.name if options.channel else UNSET,
         ),
         _objective(team, options),
     )

@@ -66,6 +66,10 @@ def protocol_settings(given: Iterable[str]) -> dict[str, str]:
 
 def check_settings(settings: dict[str, Any]) -> None:
     """Options that would be ignored are wrong usage."""
+    if settings["channel"] and settings["runtime"] != "simulator":
+        raise click.UsageError("--channel is the simulator's; add --runtime simulator")
+    if settings["channel"] and (settings["delay"] or settings["schedule"] != "concurrent"):
+        raise click.UsageError("--channel says how long messages take; drop --delay and --schedule random")
     if settings["runtime"] != "simulator" and (settings["delay"] or settings["schedule"] != "concurrent"):
         raise click.UsageError("--delay and --schedule are the simulator's; add --runtime simulator")
     if settings["timeout"] is not None and not settings["timeout"] > 0:
@@ -88,7 +92,7 @@ def _check_central(settings: dict[str, Any]) -> None:
     """There are no robots, and no second opinion."""
     if settings["verify"]:
         raise click.UsageError("--verify asks ACE, which is --protocol central itself")
-    asked = {name: settings[name] for name in ("messages", "on_loss", "spares")}
+    asked = {name: settings[name] for name in ("messages", "on_loss", "spares", "channel")}
     asked["order"] = settings["order"] != GIVEN
     asked["set"] = settings["settings_given"]
     for name, value in asked.items():

@@ -74,6 +74,11 @@ class Host:
         self._observer = observer
         self._now = now
 
+    @property
+    def checks(self) -> int:
+        """Constraint checks so far."""
+        return self.protocol.problem.checks
+
     def start(self, *, quiet: bool = True) -> list[Envelope]:
         """Begin the search, or go on with it after a change; returns what the robot says first.
 
@@ -114,7 +119,7 @@ class Host:
 
     def metrics(self) -> Metrics:
         """What this robot has sent and checked so far; `ncccs` is its own clock."""
-        return Metrics(dict(self.sent), self.bytes, self.clock, self.protocol.problem.checks)
+        return Metrics(dict(self.sent), self.bytes, self.clock, self.checks)
 
     def _equip(self, brief: Brief) -> None:
         """Give the protocol what it cannot have of itself: what was set, and chance."""

@@ -33,8 +33,20 @@ class Schedule(ABC):
     def clear(self) -> None:
         """Lose all that is under way; all clocks begin again."""
 
-    def done(self, robot: str, clock: int) -> None:  # noqa: B027 - not every schedule has to know
-        """`robot` has finished with its packet (or its start), and its NCCC clock stands at `clock`."""
+    def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: B027 - not every schedule has to know
+        """`robot` has finished with its packet (or its start), all it said being put: its NCCC clock stands at `clock`.
+
+        `checks` is the number of constraint checks that this took.
+        """
+
+    def time(self, checks: int) -> float:  # noqa: ARG002 - not every schedule has to know
+        """The time of events, so many checks after a robot has begun with its packet."""
+        return float(self.now)
+
+    @property
+    def elapsed_s(self) -> float:
+        """Simulated seconds until the last robot had finished; 0 where time is not counted in seconds."""
+        return 0.0
 
 
 class Concurrent(Schedule):
@@ -90,7 +102,7 @@ class Concurrent(Schedule):
         for state in (self._busy_until, self._inboxes, self._last_arrival, self._agenda):
             state.clear()
 
-    def done(self, robot: str, clock: int) -> None:
+    def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: ARG002 - they are in the clock
         """The robot is free from `clock` on, for what has come or will come."""
         self._busy_until[robot] = clock
         if self._inboxes.get(robot):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 
 from robochoc.communication.host import Host
@@ -49,6 +50,7 @@ class Simulation(Session):
         self._observer = observer
         self._progress = progress
         self._quiet = True
+        self._checks = 0
         self._verdict: Verdict | None = None
         self._witness: str | None = None
         self._hosts = {
@@ -60,7 +62,8 @@ class Simulation(Session):
         began = time.monotonic()
         if self._verdict is None:
             self._play(began, timeout, messages)
-            self._schedule.clear()
+        simulated_s = self._schedule.elapsed_s
+        self._schedule.clear()
         result = RunResult.of(
             self._verdict or Verdict.UNKNOWN,
             self._witness,
@@ -68,7 +71,9 @@ class Simulation(Session):
             [host.metrics() for host in self._hosts.values()],
             time.monotonic() - began,
         )
-        return replace(result, findings={name: host.protocol.findings for name, host in self._hosts.items()})
+        metrics = replace(result.metrics, simulated_s=simulated_s)
+        findings = {name: host.protocol.findings for name, host in self._hosts.items()}
+        return replace(result, metrics=metrics, findings=findings)
 
     def change(self, epoch: Epoch) -> None:
         """See `Session.change`."""
@@ -89,14 +94,14 @@ class Simulation(Session):
     def _host(self, part: Part) -> Host:
         host = Host.of(self._protocol, part)
         if self._observer:
-            host.observe(self._observer, lambda: float(self._schedule.now))
+            host.observe(self._observer, lambda: self._schedule.time(host.checks - self._checks))
         return host
 
     def _play(self, began: float, timeout: float | None, messages: int | None) -> None:
         """Every robot starts before any message arrives; then packet by packet."""
         quiet, self._quiet = self._quiet, False
         for host in self._hosts.values():
-            self._pass_on(host, host.start(quiet=quiet))
+            self._step(host, partial(host.start, quiet=quiet))
         packets = 0
         while self._verdict is None:
             elapsed_s = time.monotonic() - began
@@ -111,13 +116,15 @@ class Simulation(Session):
                 self._verdict, self._quiet = Verdict.SOLUTION, True
                 return
             host = self._hosts[packet[0].receiver]
-            self._pass_on(host, host.handle(packet))
+            self._step(host, partial(host.handle, packet))
             packets += 1
 
-    def _pass_on(self, host: Host, said: Sequence[Envelope]) -> None:
-        for envelope in said:
+    def _step(self, host: Host, act: Callable[[], Sequence[Envelope]]) -> None:
+        """Let `host` act, and send what it says on its way."""
+        self._checks = host.checks
+        for envelope in act():
             self._schedule.put(envelope)
-        self._schedule.done(host.name, host.clock)
+        self._schedule.done(host.name, host.clock, host.checks - self._checks)
         self._note_verdict(host)
 
     def _note_verdict(self, host: Host) -> None:

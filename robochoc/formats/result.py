@@ -20,6 +20,7 @@ class _MetricsForm(msgspec.Struct):
     messages_by_type: dict[str, int] = {}
     compile_s: float = 0.0
     memory: int = 0
+    simulated_s: float = 0.0
 
 
 class _EpochForm(msgspec.Struct, omit_defaults=True):
@@ -36,6 +37,7 @@ class _EpochForm(msgspec.Struct, omit_defaults=True):
     verified: bool
     lost: list[str] = []
     confirmed: bool = False
+    simulated_s: float = 0.0
 
 
 class _Form(msgspec.Struct, omit_defaults=True):
@@ -58,6 +60,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     placed_by: str | None = None
     tree: dict[str, Place] = {}
     confirmed: bool = False
+    channel: str | None = None
 
 
 def result_json(outcome: Outcome) -> bytes:
@@ -72,6 +75,7 @@ def result_json(outcome: Outcome) -> bytes:
         messages_by_type=dict(sorted(spent.messages.items())),
         compile_s=round(spent.compile_s, 6),
         memory=spent.memory,
+        simulated_s=spent.simulated_s,
     )
     form = _Form(
         team=outcome.team,
@@ -93,6 +97,7 @@ def result_json(outcome: Outcome) -> bytes:
         placed_by=outcome.placed_by,
         tree=outcome.tree,
         confirmed=outcome.confirmed,
+        channel=outcome.channel,
     )
     return msgspec.json.encode(form)
 
@@ -113,11 +118,13 @@ def _epoch(epoch: Epoch) -> _EpochForm:
         verified=epoch.verified,
         lost=list(epoch.lost),
         confirmed=epoch.confirmed,
+        simulated_s=spent.simulated_s,
     )
 
 
 def _epoch_of(form: _EpochForm) -> Epoch:
-    metrics = Metrics({"messages": form.messages}, form.bytes, form.ncccs, form.checks, form.wall_s)
+    counts = form.bytes, form.ncccs, form.checks, form.wall_s
+    metrics = Metrics({"messages": form.messages}, *counts, simulated_s=form.simulated_s)
     return Epoch(
         verdict=form.verdict,
         robots=tuple(form.robots),
@@ -139,6 +146,7 @@ def read_result(content: bytes) -> Outcome:
         raise BadResult(str(error)) from error
     spent = form.metrics
     messages = spent.messages_by_type or {"messages": spent.messages}
+    counts = spent.bytes, spent.ncccs, spent.checks, spent.wall_s, spent.compile_s, spent.memory, spent.simulated_s
     return Outcome(
         team=form.team,
         protocol=form.protocol,
@@ -148,7 +156,7 @@ def read_result(content: bytes) -> Outcome:
         assignment=form.assignment,
         cost=form.cost,
         withdrawn=tuple(form.withdrawn),
-        metrics=Metrics(messages, spent.bytes, spent.ncccs, spent.checks, spent.wall_s, spent.compile_s, spent.memory),
+        metrics=Metrics(messages, *counts),
         verified=form.verified,
         count=form.count,
         reason=form.reason,
@@ -158,5 +166,6 @@ def read_result(content: bytes) -> Outcome:
         placed_by=form.placed_by,
         tree=form.tree,
         confirmed=form.confirmed,
+        channel=form.channel,
         epochs=tuple(map(_epoch_of, form.epochs)),
     )

@@ -34,6 +34,8 @@ class Header(Event, frozen=True, kw_only=True, tag="Journal"):
     seed: int
     order: str | tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
     """The priority order, by name or as the list of robots; left out where it was the files'."""
+    channel: str | msgspec.UnsetType = msgspec.UNSET
+    """The channel model, where there was one: then the times of the search's events are in simulated seconds."""
     version: int = VERSION
 
 

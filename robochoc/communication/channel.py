@@ -1,0 +1,193 @@
+"""Channel models: how long a message takes by radio, and why.
+
+A message is cut into frames; each takes time on the air by its bytes, may be lost and is then sent again, and what is
+left is latency: queues, access to the medium, relays. Loss only delays: every message arrives, and none overtakes
+another of the same channel, as protocols require. Where the figures come from: docs/channels.md.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import tomllib
+from pathlib import Path
+from random import Random
+from types import MappingProxyType
+from typing import NamedTuple
+
+import msgspec
+
+from robochoc.formats.diagnostics import Diagnostic, InvalidInput, shortened, suggestion
+
+LARGEST_FILE = 2**16
+"""A channel's file has no more bytes."""
+NS_PER_MS, NS_PER_US, NS_PER_S = 10**6, 10**3, 10**9
+
+_MOST_MS = 60_000
+_RANGES = {
+    "latency_ms": (0, _MOST_MS),
+    "minimum_ms": (0, _MOST_MS),
+    "sigma": (0, 3),
+    "bandwidth_bps": (1, 10**12),
+    "payload_bytes": (8, 65_535),
+    "overhead_bytes": (0, 65_535),
+    "frame_us": (0, 10**6),
+    "loss": (0, 0.9),
+    "timeout_ms": (0, _MOST_MS),
+    "backoff": (1, 10),
+    "longest_timeout_ms": (0, _MOST_MS),
+    "check_ns": (0, NS_PER_S),
+}
+"""What is no mistake for certain; beyond that a run would not come to its end."""
+_NAME = re.compile(r"[\w.+-]{1,40}")
+
+
+class Crossing(NamedTuple):
+    """What one message needs to get across, in nanoseconds.
+
+    `air`: time on the air, of all its frames and of those that were sent again; `waiting`: until it was clear that
+    these were lost; `latency`: all the rest.
+    """
+
+    air: int
+    waiting: int
+    latency: int
+
+
+class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How messages travel between any two robots. All draws come from the caller's chance.
+
+    `latency_ms` is the median of a log-normal distribution that begins at `minimum_ms` and has the shape `sigma` (the
+    jitter): never negative, skewed, with a long tail, and two percentiles of a measurement are enough to fit it. A
+    frame carries up to `payload_bytes` of the message and `overhead_bytes` of headers, at `bandwidth_bps` bits a
+    second (None: bytes take no time), and `frame_us` besides (preamble, spaces between frames, acknowledgement). Each
+    transmission of a frame is lost with the probability `loss`; it is sent again after `timeout_ms`, which is
+    multiplied by `backoff` each time up to `longest_timeout_ms`. If the medium is `shared`, one robot is on the air at
+    a time; if not, each robot sends one message at a time, beside the others. `check_ns` is what one constraint check
+    takes a robot. Raises `ValueError` for what cannot be.
+    """
+
+    name: str
+    latency_ms: float
+    minimum_ms: float = 0.0
+    sigma: float = 0.0
+    bandwidth_bps: float | None = None
+    payload_bytes: int = 1448
+    overhead_bytes: int = 0
+    frame_us: float = 0.0
+    loss: float = 0.0
+    timeout_ms: float = 200.0
+    backoff: float = 2.0
+    longest_timeout_ms: float = 60_000.0
+    shared: bool = False
+    check_ns: int = 1000
+
+    def __post_init__(self) -> None:
+        """Refuse what is out of its range (so is what is no number), and fields that contradict each other."""
+        if not _NAME.fullmatch(self.name):
+            raise ValueError("name: expected up to 40 letters, digits and '.+-_'; write a line such as name = \"mesh\"")
+        for field, (least, most) in _RANGES.items():
+            value = getattr(self, field)
+            if value is not None and not least <= value <= most:
+                raise ValueError(f"{field}: expected a number from {least:,} to {most:,}, got {value:g}")
+        if self.minimum_ms > self.latency_ms:
+            raise ValueError(f"minimum_ms: expected at most latency_ms, the median, which is {self.latency_ms:g}")
+        if self.longest_timeout_ms < self.timeout_ms:
+            raise ValueError(f"longest_timeout_ms: expected at least timeout_ms, which is {self.timeout_ms:g}")
+
+    def crossing(self, size: int, chance: Random) -> Crossing:
+        """What a message of `size` bytes needs this time; an empty one has a frame, too."""
+        whole, rest = divmod(size, self.payload_bytes)
+        full, last = self._air(self.payload_bytes), self._air(rest)
+        frames = whole + 1 if rest or not whole else whole
+        air = whole * full + (frames - whole) * last
+        waiting = 0
+        for number in range(frames if self.loss else 0):
+            timeout_ms = self.timeout_ms
+            while chance.random() < self.loss:
+                air += full if number < whole else last
+                waiting += round(timeout_ms * NS_PER_MS)
+                timeout_ms = min(timeout_ms * self.backoff, self.longest_timeout_ms)
+        return Crossing(air, waiting, self._latency(chance))
+
+    def _air(self, payload: int) -> int:
+        bits = 8 * (payload + self.overhead_bytes)
+        bytes_ns = 0 if self.bandwidth_bps is None else math.ceil(bits * NS_PER_S / self.bandwidth_bps)
+        return bytes_ns + round(self.frame_us * NS_PER_US)
+
+    def _latency(self, chance: Random) -> int:
+        """A draw from the log-normal distribution. One each time, so that other fields do not shift the chance."""
+        minimum = round(self.minimum_ms * NS_PER_MS)
+        median = round(self.latency_ms * NS_PER_MS) - minimum
+        return minimum + round(median * chance.lognormvariate(0, self.sigma))
+
+
+_SHIPPED = (
+    # 802.11, OFDM at 24 Mbit/s, over an access point: each message is on the air twice, so half of that is left.
+    # Latency: measured, median 3 ms, 90th percentile 20 ms (Sui et al. 2016); the link's own retries are in it. What
+    # they leave is TCP's: its timeout begins at 200 ms (Linux) and doubles up to 60 s (RFC 6298).
+    ChannelModel(
+        name="wlan", latency_ms=3, minimum_ms=0.1, sigma=1.5, bandwidth_bps=12e6, payload_bytes=1448,
+        overhead_bytes=90, frame_us=196, loss=0.001, timeout_ms=200, shared=True,
+    ),
+    # 802.15.4 at 2.4 GHz, no beacons, from robot to robot, 6LoWPAN and UDP. All but the loss follows the standard.
+    ChannelModel(
+        name="wpan", latency_ms=1.44, minimum_ms=0.32, sigma=0.5, bandwidth_bps=250e3, payload_bytes=105,
+        overhead_bytes=28, frame_us=1184, loss=0.1, timeout_ms=2, longest_timeout_ms=10, shared=True,
+    ),
+    # 802.16, 3.5 MHz, TDD, 16-QAM 1/2, frames of 5 ms, over a base station: ask, be granted, send, be passed on.
+    ChannelModel(
+        name="wman", latency_ms=20, minimum_ms=10, sigma=0.4, bandwidth_bps=2.67e6, payload_bytes=1448,
+        overhead_bytes=62, loss=0.001, timeout_ms=200, shared=True,
+    ),
+    # LTE over a public network, to a robot in the same one; the uplink is the robot's own (Huang et al. 2012).
+    ChannelModel(
+        name="wwan", latency_ms=50, minimum_ms=20, sigma=0.5, bandwidth_bps=6e6, payload_bytes=1448,
+        overhead_bytes=58, loss=0.001, timeout_ms=200,
+    ),
+)  # fmt: skip
+CHANNELS = MappingProxyType({model.name: model for model in _SHIPPED})
+"""The models that are shipped, by name."""
+
+_PLACE = re.compile(r" - at `\$\.?(\w*)[^`]*`$")
+
+
+def read_channel(path: Path) -> ChannelModel:
+    """The model in the TOML file at `path`, named for the file unless it says otherwise. Raises `InvalidInput`."""
+    try:
+        fields = tomllib.loads(_text(path))
+    except (ValueError, RecursionError) as wrong:  # also text that is no UTF-8, and numbers of too many digits
+        what = "it is nested too deep" if isinstance(wrong, RecursionError) else shortened(str(wrong))
+        raise _invalid(path, f"is no TOML file: {what}") from None
+    known = ChannelModel.__struct_fields__
+    for field in fields:
+        if field not in known:
+            raise _invalid(path, f"{shortened(field)}: a channel has no such field", suggestion(field, known, "fields"))
+    fields.setdefault("name", path.stem)
+    if fields["name"] in (*CHANNELS,):
+        raise _invalid(path, f"name: {fields['name']} is the name of a shipped model", "name it otherwise")
+    try:
+        return msgspec.convert(fields, ChannelModel)
+    except msgspec.ValidationError as wrong:
+        said = str(wrong)
+        place = _PLACE.search(said)
+        field = f"{place[1]}: " if place and place[1] else ""
+        raise _invalid(path, field + _PLACE.sub("", said)) from None
+
+
+def _text(path: Path) -> str:
+    if not path.is_file():
+        raise _invalid(path, "is no file", f"name a file, or one of: {', '.join(CHANNELS)}")
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+    except OSError as error:
+        raise _invalid(path, f"cannot be read: {error.strerror}", "look at its permissions") from None
+    if len(content) > LARGEST_FILE:
+        raise _invalid(path, f"is too large for a channel's file, which has up to {LARGEST_FILE:,} bytes")
+    return content.decode()
+
+
+def _invalid(path: Path, message: str, hint: str = "docs/channels.md shows all fields") -> InvalidInput:
+    return InvalidInput([Diagnostic(os.fspath(path), 0, message, hint)])
