@@ -12,13 +12,13 @@ _NO_UNNAMED = {errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL}
 """How file systems and kernels say that they know no unnamed files."""
 
 
-def write_atomically(path: Path, content: bytes) -> None:
+def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
     """Write `content` to `path`; whoever looks sees the old file or the whole new one.
 
     It is written beside `path` and then renamed. Where Linux allows it the file has no name until it is complete, so
     that not even SIGKILL leaves a trace. Devices, pipes, and what standard output or error already go to (such as
-    `/dev/stdout`) are written to as they are; symbolic links are followed. Raises `OSError`; nothing is left behind
-    then.
+    `/dev/stdout`) are written to as they are; symbolic links are followed. The file has the permissions `mode`, less
+    the umask, from its first byte on: secrets take 0o600. Raises `OSError`; nothing is left behind then.
     """
     stream = _stream_to(path)
     if stream is not None:
@@ -29,7 +29,7 @@ def write_atomically(path: Path, content: bytes) -> None:
         path.write_bytes(content)
         return
     target = path.resolve()
-    complete = _written_unnamed(target, content) or _written_named(target, content)
+    complete = _written_unnamed(target, content, mode) or _written_named(target, content, mode)
     try:
         complete.replace(target)
     except BaseException:
@@ -46,12 +46,12 @@ def _stream_to(path: Path) -> int | None:
     return None
 
 
-def _written_unnamed(target: Path, content: bytes) -> Path | None:
+def _written_unnamed(target: Path, content: bytes, mode: int) -> Path | None:
     """The complete file beside `target`, named at the last moment; None where the system cannot do that."""
     if not hasattr(os, "O_TMPFILE"):
         return None
     try:
-        descriptor = os.open(target.parent, os.O_TMPFILE | os.O_WRONLY, 0o666)
+        descriptor = os.open(target.parent, os.O_TMPFILE | os.O_WRONLY, mode)
     except OSError as error:
         if error.errno in _NO_UNNAMED:
             return None
@@ -68,10 +68,10 @@ def _written_unnamed(target: Path, content: bytes) -> Path | None:
     return complete
 
 
-def _written_named(target: Path, content: bytes) -> Path:
+def _written_named(target: Path, content: bytes, mode: int) -> Path:
     complete = _beside(target)
     try:
-        with complete.open("xb") as file:
+        with os.fdopen(os.open(complete, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode), "wb") as file:
             file.write(content)
     except BaseException:
         complete.unlink(missing_ok=True)

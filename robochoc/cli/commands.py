@@ -8,6 +8,7 @@ import click
 
 from robochoc import __version__
 from robochoc.cli.animate import animate
+from robochoc.cli.authority import authority
 from robochoc.cli.cache import cache
 from robochoc.cli.compile import compile_team
 from robochoc.cli.export import export
@@ -44,7 +45,7 @@ def cli() -> None:
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
 
 
-for command in (solve, validate, generate, animate, compile_team, export, cache, protocols):
+for command in (solve, validate, generate, animate, compile_team, export, cache, protocols, authority):
     cli.add_command(command)
 
 

@@ -5,7 +5,7 @@ from robochoc.formats.diagnostics import Diagnostic, InvalidInput, encodable, on
 from robochoc.formats.folder import write_team
 from robochoc.formats.intension import PREDEFINED
 from robochoc.formats.robot import read_robot
-from robochoc.formats.team import find_teams, read_team
+from robochoc.formats.team import find_teams, read_team, robot_names
 from robochoc.formats.writer import robot_xml
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "on_one_line",
     "read_robot",
     "read_team",
+    "robot_names",
     "robot_xml",
     "write_atomically",
     "write_team",

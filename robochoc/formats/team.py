@@ -65,6 +65,18 @@ def read_team(folder: Path | str) -> Team:
     return team
 
 
+def robot_names(folder: Path | str) -> tuple[str, ...]:
+    """The names of the robots whose files are in `folder`, in natural order, from the files' names alone.
+
+    No file is opened: whoever only has to know who takes part need not see what each robot has to solve. Raises
+    `InvalidInput` when the folder cannot be read, or has no robot.
+    """
+    names = tuple(Path(name).stem for name in _xml_files(_listing(Path(folder))) if name != SCENARIO)
+    if not names:
+        raise _invalid(folder, "there is no robot here: no XML file", _NEXT_STEP)
+    return names
+
+
 def _whole(members: Members) -> Team:
     order = priority_order(members.agreed)
     return Team(encodable(members.folder.resolve().name), tuple(_informed(members, name) for name in order))

@@ -1,0 +1,329 @@
+"""The Authority: a small certification authority, and the registry of who may take part.
+
+A person enrols a name and carries the token to the robot; the robot makes a key of its own and shows the token once;
+the Authority signs a certificate that lives for a day and is renewed before. What is revoked is forgotten by nobody
+until it would have expired anyway. Whoever holds the folder's `ca.key` is the Authority.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from datetime import timedelta
+from pathlib import Path
+
+import msgspec
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509 import Certificate
+
+from robochoc.authority.certificates import (
+    LONGEST_NAME,
+    MASTER,
+    BadCertificate,
+    ca_certificate,
+    check_issued,
+    fingerprint,
+    key_pem,
+    leaf_certificate,
+    moment,
+    new_key,
+    pem,
+    read_certificate,
+    read_key,
+    read_request,
+)
+from robochoc.authority.events import AuthorityEvent, AuthorityObserver, Granted, Refused, unobserved
+from robochoc.authority.identity import Identity, private_folder, save
+from robochoc.authority.registry import (
+    PRIVATE,
+    BadAuthority,
+    Invitation,
+    Issued,
+    Member,
+    Registry,
+    Role,
+    locked,
+)
+from robochoc.authority.token import Token, digest
+from robochoc.files import write_atomically
+from robochoc.formats.constraints import is_name
+from robochoc.formats.diagnostics import on_one_line, shortened, suggestion
+
+TOKEN_LIFETIME = timedelta(hours=24)
+CERTIFICATE_LIFETIME = timedelta(hours=24)
+IN_FORCE_AT_MOST = 16
+"""So many certificates of one name may be in force: who asks for more is out of order, or hostile."""
+_KEY, _CERTIFICATE, _MASTER = "ca.key", "ca.pem", "master"
+_OTHERS = 0o077
+
+
+class BadName(ValueError):  # noqa: N818 - named for what was found
+    """A name that no robot can have, or that is reserved."""
+
+
+class UnknownName(LookupError):  # noqa: N818 - named for what was asked for
+    """Nobody of that name is enrolled."""
+
+
+class NotGranted(Exception):  # noqa: N818 - named for the answer
+    """The Authority refuses; the message says why, and may be told to whoever asked."""
+
+
+class Authority:
+    """The Authority in `folder`; `create` and `open` make one.
+
+    `observer` hears of what is granted and refused, `clock` gives Unix time, certificates live for `lifetime`.
+    Several threads and processes may use the same folder at once.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        key: ec.EllipticCurvePrivateKey,
+        certificate: Certificate,
+        *,
+        observer: AuthorityObserver = unobserved,
+        clock: Callable[[], float] = time.time,
+        lifetime: timedelta = CERTIFICATE_LIFETIME,
+    ) -> None:
+        self.folder = folder
+        self.certificate = certificate
+        self.observer = observer
+        self.clock = clock
+        self.lifetime = lifetime
+        self._key = key
+        self._registry = Registry(folder)
+
+    @classmethod
+    def create(
+        cls,
+        folder: Path | str,
+        *,
+        observer: AuthorityObserver = unobserved,
+        clock: Callable[[], float] = time.time,
+        lifetime: timedelta = CERTIFICATE_LIFETIME,
+    ) -> Authority:
+        """A new Authority in `folder`, which is closed to other users. Raises `BadAuthority` where one is already."""
+        folder = Path(folder)
+        private_folder(folder)
+        with locked(folder):
+            if (folder / _KEY).exists() or (folder / _CERTIFICATE).exists():
+                raise BadAuthority(f"there is an Authority in {folder} already; it has to stay, or all must enrol anew")
+            key = new_key()
+            certificate = ca_certificate(key, moment(clock()))
+            write_atomically(folder / _KEY, key_pem(key), PRIVATE)
+            write_atomically(folder / _CERTIFICATE, pem(certificate))
+        return cls(folder, key, certificate, observer=observer, clock=clock, lifetime=lifetime)
+
+    @classmethod
+    def open(
+        cls,
+        folder: Path | str,
+        *,
+        observer: AuthorityObserver = unobserved,
+        clock: Callable[[], float] = time.time,
+        lifetime: timedelta = CERTIFICATE_LIFETIME,
+    ) -> Authority:
+        """The Authority in `folder`. Raises `BadAuthority` where there is none that can be used."""
+        folder = Path(folder)
+        try:
+            content, mode = (folder / _KEY).read_bytes(), (folder / _KEY).stat().st_mode
+            key, certificate = read_key(content), read_certificate((folder / _CERTIFICATE).read_bytes())
+        except FileNotFoundError:
+            raise BadAuthority(f"there is no Authority in {folder}; say: robochoc authority init") from None
+        except OSError as error:
+            raise BadAuthority(f"the Authority in {folder} cannot be read: {error.strerror}") from error
+        except BadCertificate as error:
+            raise BadAuthority(f"the Authority in {folder} is damaged: {error}") from error
+        if mode & _OTHERS:
+            raise BadAuthority(
+                f"others can read the key of the Authority (mode {mode & 0o777:o}); say: chmod 600 {folder / _KEY}"
+            )
+        if certificate.public_key() != key.public_key():
+            raise BadAuthority(f"the Authority in {folder} is damaged: {_KEY} is not the key of {_CERTIFICATE}")
+        if not certificate.not_valid_before_utc <= moment(clock()) < certificate.not_valid_after_utc:
+            raise BadAuthority(f"the Authority in {folder} has expired, or the clock is wrong")
+        return cls(folder, key, certificate, observer=observer, clock=clock, lifetime=lifetime)
+
+    def enrol(self, name: str, role: Role = Role.ROBOT, ttl: timedelta = TOKEN_LIFETIME) -> Token:
+        """A token for `name`, which works once, within `ttl`. See `enrol_all`."""
+        return self.enrol_all([name], role, ttl)[name]
+
+    def enrol_all(
+        self, names: Iterable[str], role: Role = Role.ROBOT, ttl: timedelta = TOKEN_LIFETIME
+    ) -> dict[str, Token]:
+        """A token for each of `names`, or for none of them. Raises `BadName`.
+
+        A name that is enrolled gets a new token as well; when that is redeemed, its certificates so far are revoked:
+        a name has one key. One that was revoked is readmitted then.
+        """
+        names = list(names)
+        for name in names:
+            _check_name(name, role)
+        tokens = {name: Token.new(fingerprint(self.certificate)) for name in names}
+        with self._registry.change() as members:
+            for name, token in tokens.items():
+                invitation = Invitation(digest(token.secret), self.clock() + ttl.total_seconds())
+                member = members.get(name) or Member(name, role)
+                members[name] = msgspec.structs.replace(member, role=role, invitation=invitation)
+        return tokens
+
+    def redeem(self, secret: bytes, request: bytes, origin: str = "") -> bytes:
+        """The certificate (PEM) that `request` (PKCS 10, PEM) asks for, against the secret of a token.
+
+        `origin` says where the request came from, for the observer. Raises `NotGranted` when the secret is unknown,
+        used or expired, or the request is not in the token's name.
+        """
+        what = "redeem a token"
+        with self._answering(what, request, origin) as (name, holder), self._registry.change() as members:
+            now, known = self.clock(), digest(secret)
+            member = next((m for m in members.values() if m.invitation and m.invitation.digest == known), None)
+            if member is None or member.invitation is None:
+                raise NotGranted("the token is unknown here, or a newer one has replaced it")
+            if member.invitation.used:
+                raise NotGranted("the token has been used already")
+            if now >= member.invitation.expires:
+                raise NotGranted("the token has expired")
+            if member.name != name:
+                raise NotGranted("the token is not for this name")
+            certificate, issued = self._issue(holder, name)
+            members[name] = Member(
+                name,
+                member.role,
+                msgspec.structs.replace(member.invitation, used=True),
+                (issued,),
+                (*member.withdrawn, *member.certificates),
+            ).since(now)
+        self.report(Granted(t=now, who=name, what=what, origin=origin))
+        return certificate
+
+    def renew(self, request: bytes, current: Certificate, origin: str = "") -> bytes:
+        """A new certificate (PEM) for the holder of `current`, for the key in `request` (PKCS 10, PEM).
+
+        The caller has made sure that whoever asks holds the key of `current` (TLS does). That one stays in force
+        until it expires. Raises `NotGranted` when it is not in force, or the request is in another name.
+        """
+        what = "renew a certificate"
+        with self._answering(what, request, origin) as (name, holder), self._registry.change() as members:
+            now = self.clock()
+            try:
+                proven = check_issued(current, self.certificate, moment(now))
+            except BadCertificate as error:
+                raise NotGranted(str(error)) from error
+            if proven != name:
+                raise NotGranted("the request is in another name than the certificate")
+            if name == MASTER:
+                raise NotGranted(f"{MASTER} is certified where the Authority is, not from afar")
+            if self.is_revoked(current.serial_number):
+                raise NotGranted("the certificate has been revoked")
+            member = members[name].since(now)
+            if len(member.certificates) >= IN_FORCE_AT_MOST:
+                raise NotGranted(f"{IN_FORCE_AT_MOST} certificates of this name are in force, and no more may be")
+            certificate, issued = self._issue(holder, name)
+            members[name] = msgspec.structs.replace(member, certificates=(*member.certificates, issued))
+        self.report(Granted(t=now, who=name, what=what, origin=origin))
+        return certificate
+
+    def master_identity(self, hosts: Sequence[str], folder: Path | None = None) -> Identity:
+        """A new identity of the master, for servers that are reached at `hosts` (names or addresses).
+
+        It is written to `folder` (the Authority's own `master` if None) and needs no token: only who has the
+        Authority's key can make one. Raises `BadHost`.
+        """
+        key = new_key()
+        with self._registry.change() as members:
+            now = self.clock()
+            content, issued = self._issue(key.public_key(), MASTER, hosts)
+            member = (members.get(MASTER) or Member(MASTER, Role.MASTER)).since(now)
+            members[MASTER] = msgspec.structs.replace(member, certificates=(*member.certificates, issued))
+            place = folder or self.folder / _MASTER
+            save(place, key, read_certificate(content), self.certificate)
+            return Identity.load(place, now)
+
+    def revoke(self, name: str) -> None:
+        """From now on nothing that `name` was given is good: neither certificates nor an unused token.
+
+        Raises `UnknownName`, or `BadName` for the master: robots could not hear of it.
+        """
+        if name == MASTER:
+            raise BadName(f"{MASTER} cannot be revoked, for robots would not hear of it: make a new Authority")
+        with self._registry.change() as members:
+            member = members.get(name)
+            if member is None:
+                what = f"no '{on_one_line(shortened(name))}' is enrolled"
+                raise UnknownName(f"{what} ({suggestion(name, members, 'names')})")
+            withdrawn = (*member.withdrawn, *member.certificates)
+            members[name] = Member(name, member.role, None, (), withdrawn, revoked=True).since(self.clock())
+
+    def is_revoked(self, who: str | int) -> bool:
+        """Whether the name, or the certificate with the serial number, `who` is to be turned away.
+
+        It is when it was revoked, and when this Authority does not know it: what is not granted is denied.
+        """
+        members = self._registry.members()
+        if isinstance(who, str):
+            return who not in members or members[who].revoked
+        serial = f"{who:x}"
+        return not any(one.serial == serial for member in members.values() for one in member.certificates)
+
+    def names(self, role: Role | None = None) -> tuple[str, ...]:
+        """Who has a certificate in force now (in the role `role`), sorted."""
+        now = self.clock()
+        return tuple(
+            sorted(
+                member.name
+                for member in self.members()
+                if not member.revoked and role in (None, member.role) and member.since(now).certificates
+            )
+        )
+
+    def members(self) -> tuple[Member, ...]:
+        """All that were ever enrolled, sorted by name."""
+        return tuple(member for _, member in sorted(self._registry.members().items()))
+
+    def report(self, event: AuthorityEvent) -> None:
+        """Tell the observer."""
+        self.observer(event)
+
+    def _issue(
+        self, holder: ec.EllipticCurvePublicKey, name: str, hosts: Sequence[str] | None = None
+    ) -> tuple[bytes, Issued]:
+        now = self.clock()
+        times = (moment(now), moment(now + self.lifetime.total_seconds()))
+        certificate = leaf_certificate((self.certificate, self._key), holder, name, hosts, times)
+        issued = Issued(f"{certificate.serial_number:x}", certificate.not_valid_after_utc.timestamp())
+        return pem(certificate), issued
+
+    @contextmanager
+    def _answering(self, what: str, request: bytes, origin: str) -> Iterator[tuple[str, ec.EllipticCurvePublicKey]]:
+        """The name and the key in `request`; a refusal within is reported, whoever asks."""
+        who = "unknown"
+        try:
+            try:
+                name, holder = read_request(request)
+            except BadCertificate as error:
+                raise NotGranted(str(error)) from error
+            who = on_one_line(shortened(name))
+            yield name, holder
+        except NotGranted as refusal:
+            self.report(Refused(t=self.clock(), who=who, what=what, why=str(refusal), origin=origin))
+            raise
+
+
+def default_folder() -> Path:
+    """Where the Authority is if nothing else is said: in the user's data folder."""
+    from platformdirs import user_data_path  # noqa: PLC0415 - only who is given no folder needs it
+
+    return user_data_path("robochoc") / "authority"
+
+
+def _check_name(name: str, role: Role) -> None:
+    """Raises `BadName` if `name` cannot take part as `role`."""
+    shown = on_one_line(shortened(name))
+    if not is_name(name):
+        raise BadName(f"'{shown}' is no robot's name: a letter, then letters, digits, '_' and '.'")
+    if len(name) > LONGEST_NAME:
+        raise BadName(f"'{shown}' is too long: a certificate names at most {LONGEST_NAME} characters")
+    if name.upper() == MASTER or role is Role.MASTER:
+        raise BadName(f"the name {MASTER} is the master's own, which needs no token; choose another name, or role")

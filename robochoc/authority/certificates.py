@@ -1,0 +1,262 @@
+"""Keys and X.509 certificates (RFC 5280): how the Authority makes them, and how anybody checks them.
+
+All keys are on P-256. The Authority's own certificate signs leaves only (pathlen 0). A robot's certificate is for
+clients: its common name is the robot's name, which zenoh's access control looks at, and it bears no host name, so
+that no robot can pose as the machine that others connect to. The master's is for servers as well, with `MASTER` and
+the hosts it listens on as subject alternative names, which rustls (zenoh's TLS) looks at.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+
+from cryptography import x509
+from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+from cryptography.x509.verification import PolicyBuilder, Store, VerificationError
+
+from robochoc.formats.diagnostics import on_one_line, shortened
+
+MASTER = "MASTER"
+"""The master's name. No robot may have it, in whatever capitals: host names know no capitals."""
+SKEW = timedelta(minutes=5)
+"""So much may the clocks of two machines differ."""
+CA_LIFETIME = timedelta(days=3650)
+LONGEST_NAME = 64
+"""Characters of a common name (RFC 5280, ub-common-name)."""
+_DIGITAL_SIGNATURE = x509.KeyUsage(
+    digital_signature=True,
+    content_commitment=False,
+    key_encipherment=False,
+    data_encipherment=False,
+    key_agreement=False,
+    key_cert_sign=False,
+    crl_sign=False,
+    encipher_only=False,
+    decipher_only=False,
+)
+_SIGNING_CERTIFICATES = x509.KeyUsage(
+    digital_signature=False,
+    content_commitment=False,
+    key_encipherment=False,
+    data_encipherment=False,
+    key_agreement=False,
+    key_cert_sign=True,
+    crl_sign=True,
+    encipher_only=False,
+    decipher_only=False,
+)
+
+
+class BadCertificate(ValueError):  # noqa: N818 - named for what was found
+    """A certificate, a request for one, or a key that is malformed, or not what it would have to be."""
+
+
+class BadHost(ValueError):  # noqa: N818 - named for what was found
+    """No certificate can name this host."""
+
+
+def moment(t: float) -> datetime:
+    """Unix time as certificates have it: UTC, whole seconds."""
+    return datetime.fromtimestamp(int(t), UTC)
+
+
+def new_key() -> ec.EllipticCurvePrivateKey:
+    """A new private key."""
+    return ec.generate_private_key(ec.SECP256R1())
+
+
+def key_pem(key: ec.EllipticCurvePrivateKey) -> bytes:
+    """`key` as PKCS 8, not encrypted: the file's permissions protect it."""
+    pem, pkcs8 = serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8
+    return key.private_bytes(pem, pkcs8, serialization.NoEncryption())
+
+
+def pem(certificate: x509.Certificate) -> bytes:
+    """`certificate` as text."""
+    return certificate.public_bytes(serialization.Encoding.PEM)
+
+
+def fingerprint(certificate: x509.Certificate) -> bytes:
+    """SHA-256 of `certificate`: 32 bytes."""
+    return certificate.fingerprint(hashes.SHA256())
+
+
+def ca_certificate(key: ec.EllipticCurvePrivateKey, now: datetime) -> x509.Certificate:
+    """The Authority's own certificate, signed by itself."""
+    # The key's own identifier is a part of the name, so that no two Authorities are taken for each other.
+    own = x509.SubjectKeyIdentifier.from_public_key(key.public_key())
+    name = _named(f"robochoc authority {own.digest.hex()[:16]}")
+    return (
+        _builder(name, name, key.public_key(), (now - SKEW, now + CA_LIFETIME))
+        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        .add_extension(_SIGNING_CERTIFICATES, critical=True)
+        .add_extension(own, critical=False)
+        .sign(key, hashes.SHA256())
+    )
+
+
+def leaf_certificate(
+    ca: tuple[x509.Certificate, ec.EllipticCurvePrivateKey],
+    holder: ec.EllipticCurvePublicKey,
+    name: str,
+    hosts: Sequence[str] | None,
+    times: tuple[datetime, datetime],
+) -> x509.Certificate:
+    """A certificate that says that `holder` is the key of `name`, within `times`. Raises `BadHost`.
+
+    `hosts`: the names and addresses at which a server is to be believed; None: it is for a client only.
+    """
+    issuer, key = ca
+    usages = [ExtendedKeyUsageOID.CLIENT_AUTH]
+    if hosts is None:
+        names: list[x509.GeneralName] = [x509.UniformResourceIdentifier(f"robochoc:{name}")]
+    else:
+        usages.append(ExtendedKeyUsageOID.SERVER_AUTH)
+        names = [x509.DNSName(name), *map(_host, hosts)]
+    return (
+        _builder(_named(name), issuer.subject, holder, (times[0] - SKEW, min(times[1], issuer.not_valid_after_utc)))
+        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .add_extension(_DIGITAL_SIGNATURE, critical=True)
+        .add_extension(x509.ExtendedKeyUsage(usages), critical=False)
+        .add_extension(x509.SubjectAlternativeName(names), critical=False)
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(holder), critical=False)
+        .add_extension(x509.AuthorityKeyIdentifier.from_issuer_public_key(key.public_key()), critical=False)
+        .sign(key, hashes.SHA256())
+    )
+
+
+def signing_request(key: ec.EllipticCurvePrivateKey, name: str) -> bytes:
+    """A request (PKCS 10) for a certificate that says that `key` is the key of `name`, as PEM."""
+    request = x509.CertificateSigningRequestBuilder().subject_name(_named(name)).sign(key, hashes.SHA256())
+    return request.public_bytes(serialization.Encoding.PEM)
+
+
+def read_request(content: bytes) -> tuple[str, ec.EllipticCurvePublicKey]:
+    """Name and key of a request, whose maker has shown to hold the key. Raises `BadCertificate`."""
+    try:
+        request = x509.load_pem_x509_csr(content)
+        holder, genuine = request.public_key(), request.is_signature_valid
+        name = common_name(request.subject)
+    except (ValueError, TypeError, UnsupportedAlgorithm) as error:
+        raise BadCertificate("the request for a certificate is malformed") from error
+    if not genuine:
+        raise BadCertificate("the request for a certificate is not signed by the key that it names")
+    return name, _on_p256(holder)
+
+
+def read_certificate(content: bytes) -> x509.Certificate:
+    """The one certificate in `content`. Raises `BadCertificate`."""
+    try:
+        found = x509.load_pem_x509_certificates(content)
+    except (ValueError, TypeError) as error:
+        raise BadCertificate("that is no certificate") from error
+    if len(found) != 1:
+        raise BadCertificate(f"expected one certificate, found {len(found)}")
+    return found[0]
+
+
+def read_key(content: bytes) -> ec.EllipticCurvePrivateKey:
+    """The private key in `content`. Raises `BadCertificate`."""
+    try:
+        key = serialization.load_pem_private_key(content, None)
+    except (ValueError, TypeError, UnsupportedAlgorithm) as error:
+        raise BadCertificate("that is no private key") from error
+    if not isinstance(key, ec.EllipticCurvePrivateKey):
+        raise BadCertificate("the private key is not on P-256")
+    _on_p256(key.public_key())
+    return key
+
+
+def holder_of(certificate: x509.Certificate) -> ec.EllipticCurvePublicKey:
+    """The public key in `certificate`. Raises `BadCertificate`."""
+    try:
+        return _on_p256(certificate.public_key())
+    except (ValueError, UnsupportedAlgorithm) as error:
+        raise BadCertificate("the certificate's key is of a kind that robochoc does not use") from error
+
+
+def common_name(subject: x509.Name) -> str:
+    """The name in a subject that is nothing but a name. Raises `BadCertificate`."""
+    attributes = list(subject)
+    if len(attributes) != 1 or attributes[0].oid != NameOID.COMMON_NAME or not isinstance(attributes[0].value, str):
+        raise BadCertificate("its subject is not one common name")
+    return attributes[0].value
+
+
+def check_issued(certificate: x509.Certificate, ca: x509.Certificate, now: datetime) -> str:
+    """The name that `certificate` proves: `ca` has issued it, and it is valid `now`. Raises `BadCertificate`.
+
+    X.509 path validation as `cryptography` does it, for a client's certificate (the master's is one too).
+    """
+    try:
+        name = common_name(certificate.subject)
+        certificate.verify_directly_issued_by(ca)
+    except (ValueError, TypeError, InvalidSignature, UnsupportedAlgorithm) as error:
+        raise BadCertificate("this Authority has not issued the certificate") from error
+    if not certificate.not_valid_before_utc <= now <= certificate.not_valid_after_utc:
+        times = f"{certificate.not_valid_before_utc:%Y-%m-%d %H:%M} to {certificate.not_valid_after_utc:%Y-%m-%d %H:%M}"
+        who = on_one_line(shortened(name))
+        raise BadCertificate(f"the certificate of {who} is valid from {times} (UTC), not now; is the clock right?")
+    try:
+        PolicyBuilder().store(Store([ca])).time(now).build_client_verifier().verify(certificate, [])
+    except VerificationError as error:
+        raise BadCertificate("this Authority would not have issued such a certificate") from error
+    return name
+
+
+def hosts_of(certificate: x509.Certificate) -> tuple[str, ...]:
+    """The names and addresses at which the holder of `certificate` is to be believed as a server, but for its own."""
+    try:
+        names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    except x509.ExtensionNotFound:
+        return ()
+    own = common_name(certificate.subject)
+    return tuple(
+        str(name.value) for name in names if isinstance(name, x509.DNSName | x509.IPAddress) and str(name.value) != own
+    )
+
+
+def _host(host: str) -> x509.DNSName | x509.IPAddress:
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        try:
+            # RFC 5280 has internationalised names in their ASCII form.
+            name = host.encode("idna").decode("ascii")
+        except ValueError:
+            name = ""
+        if not name:
+            raise BadHost(f"{on_one_line(shortened(host))!r} is no host name, and no address") from None
+        return x509.DNSName(name)
+    if address.is_unspecified:
+        raise BadHost(f"{host} means all addresses: name the host or the addresses that robots connect to")
+    return x509.IPAddress(address)
+
+
+def _on_p256(key: object) -> ec.EllipticCurvePublicKey:
+    if not isinstance(key, ec.EllipticCurvePublicKey) or not isinstance(key.curve, ec.SECP256R1):
+        raise BadCertificate("the key is not on P-256")
+    return key
+
+
+def _named(name: str) -> x509.Name:
+    return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
+
+
+def _builder(
+    subject: x509.Name, issuer: x509.Name, holder: ec.EllipticCurvePublicKey, times: tuple[datetime, datetime]
+) -> x509.CertificateBuilder:
+    return (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(issuer)
+        .public_key(holder)
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(times[0])
+        .not_valid_after(times[1])
+    )

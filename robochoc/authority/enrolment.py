@@ -1,0 +1,168 @@
+"""Enrolment as a robot does it: a token for a first certificate, a certificate for the next one.
+
+A new robot believes nobody yet. It asks whoever answers for the Authority's certificate, compares that with the
+fingerprint in its token, and hangs up. Only then, on a second connection which OpenSSL verifies against that very
+certificate, and whose other end has to be the master, does it show the token's secret.
+"""
+
+from __future__ import annotations
+
+import hmac
+import socket
+import ssl
+import time
+from pathlib import Path
+
+from cryptography import x509
+from cryptography.hazmat.primitives.asymmetric import ec
+
+from robochoc.authority.certificates import (
+    MASTER,
+    BadCertificate,
+    check_issued,
+    fingerprint,
+    holder_of,
+    moment,
+    new_key,
+    pem,
+    read_certificate,
+    signing_request,
+)
+from robochoc.authority.frames import (
+    Answer,
+    BadFrame,
+    Certified,
+    Denied,
+    Exchange,
+    Introduce,
+    Introduction,
+    Question,
+    Redeem,
+    Renew,
+)
+from robochoc.authority.identity import CERTIFICATE, Identity, private_folder, save
+from robochoc.authority.token import Token
+from robochoc.files import write_atomically
+from robochoc.formats.diagnostics import on_one_line
+
+PATIENCE_S = 30.0
+"""So long may a question take, with the time that the service lets it wait."""
+
+
+class EnrolmentFailed(Exception):  # noqa: N818 - named for what happened
+    """There is no certificate; the message says why, and what to do."""
+
+
+class NotTrusted(EnrolmentFailed):
+    """Whoever answers is not who the token, or the identity, is from. Nothing secret was sent."""
+
+
+def enrol(
+    host: str, port: int, token: Token | str, folder: Path | str, name: str, patience_s: float = PATIENCE_S
+) -> Identity:
+    """Make a key in `folder`, and have the Authority at `host` and `port` certify that it is the key of `name`.
+
+    An identity in `folder` is replaced when the Authority has said yes. Raises `BadToken`, `NotTrusted`,
+    `EnrolmentFailed` (refused, or nobody there), `OSError` (the folder).
+    """
+    token = token if isinstance(token, Token) else Token.parse(token)
+    folder = Path(folder)
+    private_folder(folder)
+    place = (host, port)
+    ca = _introduced(place, token, patience_s)
+    key = new_key()
+    question = Redeem(token.secret, signing_request(key, name))
+    certificate = _certified(_ask(place, question, _believing(ca), patience_s), ca, key, name)
+    save(folder, key, certificate, ca)
+    return Identity.load(folder)
+
+
+def renew(identity: Identity, host: str, port: int, patience_s: float = PATIENCE_S) -> Identity:
+    """The same identity with a new certificate, which is in its folder as well.
+
+    The key stays: so one file is replaced, and no crash can part a key from its certificate. Raises `NotTrusted`,
+    `EnrolmentFailed`.
+    """
+    context = _believing(identity.ca)
+    context.load_cert_chain(identity.certificate_file, identity.key_file)
+    answer = _ask((host, port), Renew(signing_request(identity.key, identity.name)), context, patience_s)
+    certificate = _certified(answer, identity.ca, identity.key, identity.name)
+    write_atomically(identity.folder / CERTIFICATE, pem(certificate))
+    return Identity.load(identity.folder)
+
+
+def _introduced(place: tuple[str, int], token: Token, patience_s: float) -> x509.Certificate:
+    """The certificate of the Authority that `token` is from, as whoever is at `place` shows it."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.minimum_version = ssl.TLSVersion.TLSv1_3
+    context.check_hostname = False
+    context.verify_mode = ssl.CERT_NONE  # nothing secret is said here, and nothing heard is believed unchecked
+    answer = _ask(place, Introduce(), context, patience_s)
+    try:
+        ca = read_certificate(answer.ca) if isinstance(answer, Introduction) else None
+    except BadCertificate:
+        ca = None
+    if ca is None or not hmac.compare_digest(fingerprint(ca), token.fingerprint):
+        raise NotTrusted(
+            f"who answers at {_shown(place)} is not the Authority that the token is from: it is the address of "
+            "another one, or somebody is in between; the token was not shown"
+        )
+    return ca
+
+
+def _believing(ca: x509.Certificate) -> ssl.SSLContext:
+    """TLS with nobody but the master whom `ca` has certified."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # verifies the certificate, and its name
+    context.minimum_version = ssl.TLSVersion.TLSv1_3
+    context.hostname_checks_common_name = False
+    context.load_verify_locations(cadata=pem(ca).decode())
+    return context
+
+
+def _ask(place: tuple[str, int], question: Question, context: ssl.SSLContext, patience_s: float) -> Answer:
+    """The answer of whoever is at `place` and passes `context`."""
+    try:
+        with socket.create_connection(place, patience_s) as raw:
+            Exchange(raw, patience_s).wait()
+            # The name in the certificate is the master's, wherever it listens.
+            with context.wrap_socket(raw, server_hostname=MASTER) as connection:
+                exchange = Exchange(connection, patience_s)
+                exchange.send(question)
+                return exchange.answer()
+    except ssl.SSLCertVerificationError as error:
+        raise NotTrusted(
+            f"who answers at {_shown(place)} is not the master of this Authority ({error.verify_message}); "
+            "check the address, and the clocks of both machines"
+        ) from error
+    except ssl.SSLError as error:
+        raise EnrolmentFailed(
+            f"the Authority at {_shown(place)} has ended the connection ({error.reason or error}); "
+            "is the certificate that was shown still good?"
+        ) from error
+    except (OSError, BadFrame) as error:
+        why = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise EnrolmentFailed(
+            f"no answer from the Authority at {_shown(place)}: {why}; is 'robochoc master' running there?"
+        ) from error
+
+
+def _certified(answer: Answer, ca: x509.Certificate, key: ec.EllipticCurvePrivateKey, name: str) -> x509.Certificate:
+    """The certificate in `answer`, if `ca` says there that `key` is the key of `name`."""
+    match answer:
+        case Denied():
+            raise EnrolmentFailed(f"the Authority refuses: {on_one_line(answer.why)}")
+        case Certified():
+            try:
+                certificate = read_certificate(answer.certificate)
+                proven = check_issued(certificate, ca, moment(time.time()))
+            except BadCertificate as error:
+                raise EnrolmentFailed(f"the Authority has given a certificate that is not good: {error}") from error
+            if proven == name and holder_of(certificate) == key.public_key():
+                return certificate
+            raise EnrolmentFailed("the Authority has given the certificate of another name or key")
+        case _:
+            raise EnrolmentFailed("the Authority has answered another question")
+
+
+def _shown(place: tuple[str, int]) -> str:
+    return f"{place[0]}:{place[1]}"

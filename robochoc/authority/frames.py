@@ -1,0 +1,128 @@
+"""What robots and the enrolment service say to each other: one question, one answer, each a length and msgpack.
+
+The length is 4 bytes, most significant first. Whatever comes is read within a deadline and a size, and decoded into
+one of these structs or refused.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+
+import msgspec
+
+LARGEST_BYTES = 16384
+"""A request for a certificate has about 350 bytes, a certificate 800."""
+_LENGTH_BYTES = 4
+
+
+class BadFrame(ValueError):  # noqa: N818 - named for what was found
+    """What came is no question, or no answer, of these."""
+
+
+class _Frame(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True):
+    """Base of all frames."""
+
+
+class Introduce(_Frame, frozen=True):
+    """Which Authority do you speak for?"""
+
+
+class Redeem(_Frame, frozen=True):
+    """A certificate for `request` (PKCS 10, PEM), against the secret of a token."""
+
+    secret: bytes
+    request: bytes
+
+
+class Renew(_Frame, frozen=True):
+    """A new certificate for `request` (PKCS 10, PEM), by right of the one that this connection was made with."""
+
+    request: bytes
+
+
+class Introduction(_Frame, frozen=True):
+    """The Authority's certificate (PEM)."""
+
+    ca: bytes
+
+
+class Certified(_Frame, frozen=True):
+    """The certificate (PEM) that was asked for."""
+
+    certificate: bytes
+
+
+class Denied(_Frame, frozen=True):
+    """There is none, and why."""
+
+    why: str
+
+
+Question = Introduce | Redeem | Renew
+Answer = Introduction | Certified | Denied
+_questions = msgspec.msgpack.Decoder(Question)
+_answers = msgspec.msgpack.Decoder(Answer)
+
+
+def decode_question(content: bytes) -> Question:
+    """The question in `content`. Raises `BadFrame`."""
+    try:
+        question: Question = _questions.decode(content)
+    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
+        raise BadFrame(f"that is no question: {error}") from error
+    return question
+
+
+def decode_answer(content: bytes) -> Answer:
+    """The answer in `content`. Raises `BadFrame`."""
+    try:
+        answer: Answer = _answers.decode(content)
+    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
+        raise BadFrame(f"that is no answer: {error}") from error
+    return answer
+
+
+class Exchange:
+    """Frames on a connected socket, all of them within `seconds` from now, however slowly their bytes come."""
+
+    def __init__(self, connection: socket.socket, seconds: float) -> None:
+        self._connection = connection
+        self._deadline = time.monotonic() + seconds
+
+    def wait(self) -> None:
+        """Let the socket's next operation take as long as is left. Raises `TimeoutError` when nothing is."""
+        left = self._deadline - time.monotonic()
+        if left <= 0:
+            raise TimeoutError("it took too long")
+        self._connection.settimeout(left)
+
+    def send(self, frame: Question | Answer) -> None:
+        """Send `frame`. Raises `OSError`."""
+        content = msgspec.msgpack.encode(frame)
+        self.wait()
+        self._connection.sendall(len(content).to_bytes(_LENGTH_BYTES, "big") + content)
+
+    def question(self) -> Question:
+        """The next frame, a question. Raises `OSError`, `BadFrame`."""
+        return decode_question(self._receive())
+
+    def answer(self) -> Answer:
+        """The next frame, an answer. Raises `OSError`, `BadFrame`."""
+        return decode_answer(self._receive())
+
+    def _receive(self) -> bytes:
+        length = int.from_bytes(self._exactly(_LENGTH_BYTES), "big")
+        if length > LARGEST_BYTES:
+            raise BadFrame(f"{length} bytes were announced, and {LARGEST_BYTES} are allowed")
+        return self._exactly(length)
+
+    def _exactly(self, size: int) -> bytes:
+        content = bytearray()
+        while len(content) < size:
+            self.wait()
+            part = self._connection.recv(size - len(content))
+            if not part:
+                raise BadFrame("the other side has hung up in the middle")
+            content += part
+        return bytes(content)

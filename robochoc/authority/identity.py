@@ -1,0 +1,151 @@
+"""Identity: what a machine proves its name with, as a folder of three files.
+
+`key.pem` is made on the machine itself and never leaves it; `cert.pem` says whose it is; `ca.pem` is the certificate
+of the Authority that says so, and the only one that this machine believes.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509 import Certificate
+
+from robochoc.authority.certificates import (
+    BadCertificate,
+    check_issued,
+    holder_of,
+    hosts_of,
+    key_pem,
+    moment,
+    pem,
+    read_certificate,
+    read_key,
+)
+from robochoc.authority.registry import PRIVATE
+from robochoc.files import write_atomically
+
+KEY, CERTIFICATE, CA = "key.pem", "cert.pem", "ca.pem"
+_OTHERS = 0o077
+_LARGEST_BYTES = 65536
+
+
+class BadIdentity(Exception):  # noqa: N818 - named for what was found
+    """A folder that holds no identity, or one that cannot be used; the message says what to do."""
+
+
+@dataclass(frozen=True, repr=False)
+class Identity:
+    """A private key, the certificate that names its holder, and the Authority's. `load` has checked them."""
+
+    folder: Path
+    name: str
+    key: ec.EllipticCurvePrivateKey
+    certificate: Certificate
+    ca: Certificate
+
+    @classmethod
+    def load(cls, folder: Path | str, now: float | None = None) -> Identity:
+        """The identity in `folder`. `now`: Unix time, if not the clock's.
+
+        Raises `BadIdentity` when something is missing or malformed, others may read the key, the key is not the
+        certificate's, or the certificate is not the Authority's or not valid now.
+        """
+        folder = Path(folder)
+        try:
+            key = read_key(_secret(folder / KEY))
+            certificate, ca = read_certificate(_read(folder / CERTIFICATE)), read_certificate(_read(folder / CA))
+            name = check_issued(certificate, ca, moment(time.time() if now is None else now))
+            if holder_of(certificate) != key.public_key():
+                raise BadIdentity(f"{folder}: {KEY} is not the key of {CERTIFICATE}; enrol anew, with a new token")
+        except BadCertificate as error:
+            raise BadIdentity(f"{folder}: {error}; enrol anew, with a new token") from error
+        return cls(folder, name, key, certificate, ca)
+
+    @property
+    def key_file(self) -> Path:
+        """Where the private key is."""
+        return self.folder / KEY
+
+    @property
+    def certificate_file(self) -> Path:
+        """Where the certificate is."""
+        return self.folder / CERTIFICATE
+
+    @property
+    def ca_file(self) -> Path:
+        """Where the Authority's certificate is."""
+        return self.folder / CA
+
+    @property
+    def expires(self) -> datetime:
+        """Until when the certificate is valid."""
+        return self.certificate.not_valid_after_utc
+
+    @property
+    def hosts(self) -> tuple[str, ...]:
+        """The host names and addresses that the certificate names (the master's)."""
+        return hosts_of(self.certificate)
+
+    def is_due(self, now: float | None = None) -> bool:
+        """Whether more than half of the certificate's life is over at Unix time `now`: time to renew it."""
+        left = self.expires - moment(time.time() if now is None else now)
+        return left < (self.expires - self.certificate.not_valid_before_utc) / 2
+
+    def __repr__(self) -> str:
+        return f"<Identity {self.name}, until {self.expires.astimezone(UTC):%Y-%m-%d %H:%M} UTC>"
+
+
+def save(folder: Path, key: ec.EllipticCurvePrivateKey, certificate: Certificate, ca: Certificate) -> None:
+    """Write an identity; the certificate comes last, so that what is not complete is seen to be so."""
+    private_folder(folder)
+    for name in (CERTIFICATE, CA, KEY):
+        (folder / name).unlink(missing_ok=True)
+    write_atomically(folder / KEY, key_pem(key), PRIVATE)
+    write_atomically(folder / CA, pem(ca))
+    write_atomically(folder / CERTIFICATE, pem(certificate))
+
+
+def private_folder(folder: Path) -> None:
+    """Make `folder`, which nobody else may look into; an empty one that is there is closed to others.
+
+    Raises `OSError`, also for a folder with something in it that is open to others: it serves another purpose.
+    """
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    mode = folder.stat().st_mode
+    if not mode & _OTHERS:
+        return
+    if any(folder.iterdir()):
+        raise PermissionError(f"{folder} is open to others (mode {mode & 0o777:o}); give keys a folder of their own")
+    folder.chmod(0o700)
+
+
+def default_folder(name: str) -> Path:
+    """Where the identity of `name` is kept if nothing else is said: in the user's data folder."""
+    from platformdirs import user_data_path  # noqa: PLC0415 - only who is given no folder needs it
+
+    return user_data_path("robochoc") / "identities" / name
+
+
+def _secret(path: Path) -> bytes:
+    content = _read(path)
+    mode = path.stat().st_mode
+    if mode & _OTHERS:
+        raise BadIdentity(f"{path} can be read by others (mode {mode & 0o777:o}); say: chmod 600 {path}")
+    return content
+
+
+def _read(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            content = file.read(_LARGEST_BYTES + 1)
+    except FileNotFoundError:
+        raise BadIdentity(f"{path} is missing: there is no identity here yet, enrol with a token") from None
+    except OSError as error:
+        raise BadIdentity(f"{path} cannot be read: {error.strerror}") from error
+    if len(content) > _LARGEST_BYTES:
+        raise BadIdentity(f"{path} is no identity's file: it has more than {_LARGEST_BYTES} bytes")
+    return content

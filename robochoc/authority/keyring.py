@@ -1,0 +1,173 @@
+"""Key cards and key rings: what robots know each other's messages by, end to end.
+
+For each run a robot makes two fresh key pairs, which never leave its memory: Ed25519 (RFC 8032) to sign with, X25519
+(RFC 7748) to agree on secrets. It signs their public halves with the key of its certificate: its card. Whoever holds
+the Authority's certificate can check a card, whoever carried it. When the run is over the private halves are gone, so
+that nobody can read later what was recorded, not even with the key of a certificate.
+"""
+
+from __future__ import annotations
+
+import os
+from itertools import count
+from typing import NoReturn, Self, SupportsIndex
+
+import msgspec
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
+from cryptography.hazmat.primitives.asymmetric.x25519 import X25519PrivateKey, X25519PublicKey
+from cryptography.hazmat.primitives.kdf.hkdf import HKDF
+
+from robochoc.authority.certificates import BadCertificate, check_issued, holder_of, moment, pem, read_certificate
+from robochoc.authority.identity import Identity
+from robochoc.formats.diagnostics import on_one_line, shortened
+
+_PUBLIC_BYTES = 32
+_LARGEST_CARD_BYTES = 8192
+_SECRET_BYTES = 32
+
+
+class BadCard(ValueError):  # noqa: N818 - named for what was found
+    """A key card that does not prove what it says."""
+
+
+class UnknownPeer(LookupError):  # noqa: N818 - named for what was asked for
+    """No card of this robot was admitted."""
+
+
+class KeyCard(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The public keys of the robot `name` for the run `run`, signed (ECDSA, SHA-256) with its certificate's key."""
+
+    name: str
+    run: str
+    signing: bytes
+    """Ed25519, 32 bytes."""
+    sealing: bytes
+    """X25519, 32 bytes."""
+    certificate: bytes
+    """PEM."""
+    signature: bytes
+
+    def encode(self) -> bytes:
+        """The card as msgpack, about 1,000 bytes."""
+        return msgspec.msgpack.encode(self)
+
+    @classmethod
+    def decode(cls, content: bytes) -> Self:
+        """The card in `content`, not checked yet: `KeyRing.admit` does that. Raises `BadCard`."""
+        if len(content) > _LARGEST_CARD_BYTES:
+            raise BadCard(f"a key card has at most {_LARGEST_CARD_BYTES} bytes, this one {len(content)}")
+        try:
+            return msgspec.msgpack.decode(content, type=cls)
+        except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
+            raise BadCard(f"that is no key card: {error}") from error
+
+    def signed_part(self) -> bytes:
+        """What the signature is over."""
+        return bound(b"robochoc key card 1", self.name.encode(), self.run.encode(), self.signing, self.sealing)
+
+
+class KeyRing:
+    """The robot `own`'s keys for `run`, and the cards of its peers.
+
+    It belongs to one process: a copy would count anew what must never be counted twice. So it cannot be copied, and
+    refuses to serve in a forked child.
+    """
+
+    def __init__(self, own: Identity, run: str) -> None:
+        self.name = own.name
+        self.run = run
+        self._ca = own.ca
+        self._signing = Ed25519PrivateKey.generate()
+        self._sealing = X25519PrivateKey.generate()
+        self._peers: dict[str, KeyCard] = {}
+        self._numbers = count()
+        self._process = os.getpid()
+        public = (self._signing.public_key().public_bytes_raw(), self._sealing.public_key().public_bytes_raw())
+        unsigned = KeyCard(own.name, run, *public, pem(own.certificate), b"")
+        signature = own.key.sign(unsigned.signed_part(), ec.ECDSA(hashes.SHA256()))
+        self.card = msgspec.structs.replace(unsigned, signature=signature)
+
+    def admit(self, card: KeyCard, now: float) -> None:
+        """Believe `card` from now on (Unix time `now`), instead of an older one of that robot.
+
+        Raises `BadCard`: when the Authority has not issued its certificate, or that is not valid now or names
+        somebody else, the signature is wrong, or the card is from another run.
+        """
+        who = on_one_line(shortened(card.name))
+        try:
+            certificate = read_certificate(card.certificate)
+            proven = check_issued(certificate, self._ca, moment(now))
+            holder_of(certificate).verify(card.signature, card.signed_part(), ec.ECDSA(hashes.SHA256()))
+        except BadCertificate as error:
+            raise BadCard(f"the key card of {who}: {error}") from error
+        except (InvalidSignature, UnicodeEncodeError) as error:
+            raise BadCard(f"the key card of {who} is not signed with the key of its certificate") from error
+        if proven != card.name:
+            raise BadCard(f"the key card of {who} comes with the certificate of {on_one_line(shortened(proven))}")
+        if card.run != self.run:
+            raise BadCard(f"the key card of {who} is from another run")
+        if {len(card.signing), len(card.sealing)} != {_PUBLIC_BYTES}:
+            raise BadCard(f"the keys on the card of {who} do not have {_PUBLIC_BYTES} bytes")
+        try:
+            self._sealing.exchange(X25519PublicKey.from_public_bytes(card.sealing))
+        except ValueError as error:  # a point of small order: whatever is agreed on, everybody knows it
+            raise BadCard(f"the sealing key on the card of {who} is no key") from error
+        self._peers[card.name] = card
+
+    def dismiss(self, name: str) -> None:
+        """Believe no card of `name` any more: its robot was revoked, or has left."""
+        self._peers.pop(name, None)
+
+    def card_of(self, name: str) -> KeyCard:
+        """The card of `name`. Raises `UnknownPeer`."""
+        try:
+            return self._peers[name]
+        except KeyError:
+            raise UnknownPeer(f"no key card of {on_one_line(shortened(name))} was admitted") from None
+
+    def sign(self, content: bytes) -> bytes:
+        """An Ed25519 signature, 64 bytes."""
+        return self._signing.sign(content)
+
+    def is_signed(self, name: str, signature: bytes, content: bytes) -> bool:
+        """Whether `name` has signed `content`. Raises `UnknownPeer`."""
+        card = self.card_of(name)
+        try:
+            Ed25519PublicKey.from_public_bytes(card.signing).verify(signature, content)
+        except (InvalidSignature, ValueError):
+            return False
+        return True
+
+    def shared_secret(self, sender: str, receiver: str, purpose: bytes) -> bytes:
+        """32 bytes that only `sender` and `receiver` can know, one of which is this robot; the same for both.
+
+        X25519, then HKDF with SHA-256 (RFC 5869) over all that the two have agreed on: run, names, public keys and
+        `purpose`. The way back has another secret. Raises `UnknownPeer`.
+        """
+        peer = self.card_of(receiver if sender == self.name else sender)
+        cards = (self.card, peer) if sender == self.name else (peer, self.card)
+        agreed = bound(
+            purpose, self.run.encode(), sender.encode(), receiver.encode(), *(card.sealing for card in cards)
+        )
+        secret = self._sealing.exchange(X25519PublicKey.from_public_bytes(peer.sealing))
+        return HKDF(hashes.SHA256(), _SECRET_BYTES, salt=None, info=agreed).derive(secret)
+
+    def next_number(self) -> int:
+        """A number that this key ring has not given before, whoever asks: what nonces are made of.
+
+        Raises `RuntimeError` in a forked child, whose numbers its parent gives as well.
+        """
+        if os.getpid() != self._process:
+            raise RuntimeError("a key ring serves the process that made it: make one in the child")
+        return next(self._numbers)
+
+    def __reduce_ex__(self, _protocol: SupportsIndex) -> NoReturn:
+        raise TypeError("a key ring cannot be copied: numbers would be given twice")
+
+
+def bound(*parts: bytes) -> bytes:
+    """`parts` as one string from which each can be told: no two lists of parts give the same."""
+    return b"".join(len(part).to_bytes(8, "big") + part for part in parts)

@@ -1,0 +1,149 @@
+"""The Authority's registry: who is enrolled, with which certificates. One JSON file, safe between processes.
+
+A change reads the file, and replaces it, while it holds the lock (flock(2)) of a file beside it: `robochoc authority
+enrol` and a running master do not lose each other's changes. Readers take no lock: they see the old file or the new
+one, and what they have read is kept until the file is another.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from robochoc.files import write_atomically
+
+PRIVATE = 0o600
+_FILE, _LOCK = "registry.json", "lock"
+
+
+class BadAuthority(Exception):  # noqa: N818 - named for what was found
+    """The Authority's folder is not there, or what is in it cannot be used."""
+
+
+class Role(StrEnum):
+    """What a name takes part as."""
+
+    ROBOT = "robot"
+    OBSERVER = "observer"
+    MASTER = "master"
+
+
+class State(StrEnum):
+    """How it stands with a name."""
+
+    INVITED = "invited"  # it has a token that works
+    IN_FORCE = "in force"
+    EXPIRED = "expired"  # its last certificate, or its token unused
+    REVOKED = "revoked"
+
+
+class Invitation(msgspec.Struct, frozen=True):
+    """The token of a name: the digest of its secret, and until when (Unix time) it works."""
+
+    digest: str
+    expires: float
+    used: bool = False
+
+
+class Issued(msgspec.Struct, frozen=True):
+    """A certificate that was given: its serial number (hexadecimal), and when (Unix time) it expires."""
+
+    serial: str
+    expires: float
+
+
+class Member(msgspec.Struct, frozen=True):
+    """All that the Authority knows of one name. Certificates that have expired are forgotten."""
+
+    name: str
+    role: Role
+    invitation: Invitation | None = None
+    certificates: tuple[Issued, ...] = ()
+    """In force, unless they have expired."""
+    withdrawn: tuple[Issued, ...] = ()
+    """Revoked, or replaced by those of a new key."""
+    revoked: bool = False
+
+    def state(self, now: float) -> State:
+        """How it stands with this name at Unix time `now`."""
+        if self.invitation and not self.invitation.used and now < self.invitation.expires:
+            return State.INVITED
+        if self.revoked:
+            return State.REVOKED
+        return State.IN_FORCE if any(now < one.expires for one in self.certificates) else State.EXPIRED
+
+    def expires(self, now: float) -> float:
+        """Until when (Unix time) its token, if it is invited, or its last certificate was good; 0: it has neither."""
+        token = self.invitation.expires if self.invitation and not self.invitation.used else 0
+        if self.state(now) is State.INVITED:
+            return token
+        return max((one.expires for one in self.certificates), default=token)
+
+    def since(self, now: float) -> Member:
+        """The same, without the certificates that have expired."""
+        certificates = tuple(one for one in self.certificates if now < one.expires)
+        withdrawn = tuple(one for one in self.withdrawn if now < one.expires)
+        return msgspec.structs.replace(self, certificates=certificates, withdrawn=withdrawn)
+
+
+class _Content(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The file."""
+
+    members: dict[str, Member]
+    version: Literal[1] = 1
+
+
+class Registry:
+    """The registry in `folder`."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._known: tuple[tuple[int, ...], dict[str, Member]] = ((), {})
+
+    def members(self) -> Mapping[str, Member]:
+        """All names, as they stand now. Raises `BadAuthority`."""
+        path = self._folder / _FILE
+        try:
+            status = path.stat()
+            seen = (status.st_ino, status.st_mtime_ns, status.st_size)
+            known = self._known
+            if known[0] != seen:
+                known = (seen, msgspec.json.decode(path.read_bytes(), type=_Content).members)
+                # What was read may be newer than `seen`; then the next call reads it again.
+                self._known = known
+        except FileNotFoundError:
+            return {}
+        except OSError as error:
+            raise BadAuthority(f"{path} cannot be read: {error.strerror}") from error
+        except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+            raise BadAuthority(f"{path} is no registry of this version: {error}") from error
+        return known[1]
+
+    @contextmanager
+    def change(self) -> Iterator[dict[str, Member]]:
+        """The members, to be changed by nobody else meanwhile; written at the end, unless that raises."""
+        with locked(self._folder):
+            members = dict(self.members())
+            before = dict(members)
+            yield members
+            if members != before:
+                content = msgspec.json.format(msgspec.json.encode(_Content(members)))
+                write_atomically(self._folder / _FILE, content, PRIVATE)
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """While it lasts, no other process or thread is in here with the same folder."""
+    descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, PRIVATE)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)

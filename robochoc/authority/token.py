@@ -1,0 +1,66 @@
+"""Tokens: what a person carries from the Authority to a new robot, so that each knows the other.
+
+A token holds a secret, which the robot shows once, and the fingerprint of the Authority's certificate, by which the
+robot knows whom it may show it to before it has any certificate. Its text is base32 in lower case (RFC 4648): it
+survives being read aloud, and no letter is taken for a digit.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import hashlib
+import secrets
+from dataclasses import dataclass
+
+SECRET_BYTES = 20
+FINGERPRINT_BYTES = 32
+
+
+class BadToken(ValueError):  # noqa: N818 - named for what was found
+    """The text is no token, or not a whole one."""
+
+
+@dataclass(frozen=True, repr=False)
+class Token:
+    """A secret that works once, and the SHA-256 fingerprint of the certificate of the Authority that knows it."""
+
+    secret: bytes
+    fingerprint: bytes
+
+    @classmethod
+    def new(cls, fingerprint: bytes) -> Token:
+        """A token with a secret that nobody can guess (160 bits)."""
+        return cls(secrets.token_bytes(SECRET_BYTES), fingerprint)
+
+    @classmethod
+    def parse(cls, text: str) -> Token:
+        """The token that `text` stands for; blanks around it and capitals do no harm. Raises `BadToken`."""
+        secret, dot, fingerprint = text.strip().partition(".")
+        try:
+            token = cls(_decoded(secret), _decoded(fingerprint))
+        except (ValueError, binascii.Error):
+            token = cls(b"", b"")
+        if not dot or (len(token.secret), len(token.fingerprint)) != (SECRET_BYTES, FINGERPRINT_BYTES):
+            raise BadToken("that is no token, or only a part of one: copy all that 'robochoc authority enrol' printed")
+        return token
+
+    def __str__(self) -> str:
+        return f"{_encoded(self.secret)}.{_encoded(self.fingerprint)}"
+
+    def __repr__(self) -> str:
+        """Without the secret: a token may stand in a traceback or a log."""
+        return f"<Token of the Authority {self.fingerprint.hex()[:16]}>"
+
+
+def digest(secret: bytes) -> str:
+    """What the Authority keeps of a secret: who reads its registry can redeem nothing."""
+    return hashlib.sha256(b"robochoc token\0" + secret).hexdigest()
+
+
+def _encoded(content: bytes) -> str:
+    return base64.b32encode(content).decode().rstrip("=").lower()
+
+
+def _decoded(text: str) -> bytes:
+    return base64.b32decode(text.upper() + "=" * (-len(text) % 8))

@@ -1,0 +1,128 @@
+"""Channel filters: what is done to a message's content between the robot that says it and the one that hears it.
+
+A filter comes from an installed package, under the entry point group `robochoc.filters`, as protocols do. Several can
+be stacked: they seal in their order, and open in the reverse one. Two come with robochoc: `signed` and `sealed`. What
+they protect from, and how to write one: docs/security.md.
+"""
+
+from __future__ import annotations
+
+import difflib
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+
+from robochoc.authority.keyring import KeyRing
+from robochoc.formats.diagnostics import on_one_line
+
+GROUP = "robochoc.filters"
+
+
+class NotGenuine(Exception):  # noqa: N818 - named for what was found
+    """What has come is not what `sender` has sealed for this robot, in this context; nothing of it may be used."""
+
+
+class UnknownFilter(LookupError):  # noqa: N818 - named for what was asked for
+    """No installed package offers a filter of that name, or what it offers cannot be used."""
+
+
+class ChannelFilter(ABC):
+    """What is done to all messages of the robot whose keys are in `ring`.
+
+    `context` is what both sides know of a message without being told in it: run, sender, receiver and sequence number,
+    as bytes that the caller makes. It is not sent along; a message moved into another context does not open.
+    """
+
+    def __init__(self, ring: KeyRing) -> None:
+        self.ring = ring
+
+    @abstractmethod
+    def seal(self, receiver: str, content: bytes, context: bytes) -> bytes:
+        """What is sent instead of `content`. Each call may give something else. Raises `UnknownPeer`."""
+
+    @abstractmethod
+    def open(self, sender: str, content: bytes, context: bytes) -> bytes:
+        """What `sender` has sealed; `content` may be anything. Raises `NotGenuine`."""
+
+
+class FilterStack(ChannelFilter):
+    """Filters one upon the other, as one. Without any, messages stay as they are."""
+
+    def __init__(self, ring: KeyRing, filters: Sequence[type[ChannelFilter]]) -> None:
+        super().__init__(ring)
+        self._filters = tuple(kind(ring) for kind in filters)
+
+    def seal(self, receiver: str, content: bytes, context: bytes) -> bytes:
+        """What the last filter makes of what the first ones have made of `content`."""
+        for each in self._filters:
+            content = each.seal(receiver, content, context)
+        return content
+
+    def open(self, sender: str, content: bytes, context: bytes) -> bytes:
+        """What the first filter has sealed. A filter that fails in whatever way has not opened it: `NotGenuine`."""
+        for each in reversed(self._filters):
+            try:
+                content = each.open(sender, content, context)
+            except NotGenuine:
+                raise
+            except Exception as error:
+                told = on_one_line(f"{type(each).__name__} failed: {type(error).__name__}: {error}")
+                raise NotGenuine(told) from error
+        return content
+
+
+@dataclass(frozen=True)
+class FilterOffer:
+    """What a package offers as the filter `name`: the class at `place`, or why there is none."""
+
+    name: str
+    place: str
+    """Module and class, as the package names them."""
+    filter: type[ChannelFilter] | None
+    broken: str = ""
+    """Why it cannot be used; empty when it can."""
+
+
+def filter_offers() -> tuple[FilterOffer, ...]:
+    """All that installed packages offer, by name; what cannot be used too, with the reason."""
+    found = sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
+    return tuple(_offer(entry, [other for other in found if other.name == entry.name]) for entry in found)
+
+
+def filter_named(name: str) -> type[ChannelFilter]:
+    """The filter called `name`. Raises `UnknownFilter`, which names those there are."""
+    found = list(entry_points(group=GROUP, name=name))
+    if not found:
+        names = sorted({entry.name for entry in entry_points(group=GROUP)})
+        near = difflib.get_close_matches(name.lower(), names, 1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise UnknownFilter(f"no filter {name!r} is installed, only: {', '.join(names) or 'none'}{hint}")
+    offer = _offer(found[0], found)
+    if offer.filter is None:
+        raise UnknownFilter(f"{offer.place}, installed as filter {name!r}, {offer.broken}")
+    return offer.filter
+
+
+def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> FilterOffer:
+    """What stands behind `entry`: code of whoever wrote the package, which may fail in any way."""
+    places = sorted({one.value for one in namesakes})
+    if len(namesakes) > 1:
+        reason = f"is offered by several packages, and only one may: {' and '.join(places)}"
+        return FilterOffer(entry.name, entry.value, None, reason)
+    try:
+        loaded = entry.load()
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - one broken package must not hide the others
+        reason = f"cannot be imported: {type(error).__name__}: {error}"
+        return FilterOffer(entry.name, entry.value, None, reason)
+    fault = _fault(loaded)
+    return FilterOffer(entry.name, entry.value, None if fault else loaded, fault)
+
+
+def _fault(loaded: object) -> str:
+    """Why `loaded` cannot be used as a filter; empty when it can."""
+    if not (isinstance(loaded, type) and issubclass(loaded, ChannelFilter)):
+        return "is no subclass of ChannelFilter"
+    if loaded.__abstractmethods__:
+        return f"does not define {' and '.join(sorted(loaded.__abstractmethods__))}"
+    return ""

@@ -1,0 +1,37 @@
+"""The channel filter `signed`: everybody can read a message, and only its sender can have written it.
+
+Ed25519 (RFC 8032) over sender, receiver, context and content. 64 bytes more a message.
+"""
+
+from __future__ import annotations
+
+from robochoc.authority.keyring import UnknownPeer, bound
+from robochoc.communication.filters import ChannelFilter, NotGenuine
+
+_PURPOSE = b"robochoc signed 1"
+_SIGNATURE_BYTES = 64
+
+
+class Signed(ChannelFilter):
+    """Puts a signature before the content."""
+
+    def seal(self, receiver: str, content: bytes, context: bytes) -> bytes:
+        """Signature and content."""
+        signature = self.ring.sign(_signed_part(self.ring.name, receiver, content, context))
+        return signature + content
+
+    def open(self, sender: str, content: bytes, context: bytes) -> bytes:
+        """The content, if `sender` has signed it for this robot and `context`. Raises `NotGenuine`."""
+        signature, plain = content[:_SIGNATURE_BYTES], content[_SIGNATURE_BYTES:]
+        part = _signed_part(sender, self.ring.name, plain, context)
+        try:
+            genuine = self.ring.is_signed(sender, signature, part)
+        except UnknownPeer as error:
+            raise NotGenuine(str(error)) from error
+        if not genuine:
+            raise NotGenuine("the signature is wrong")
+        return plain
+
+
+def _signed_part(sender: str, receiver: str, content: bytes, context: bytes) -> bytes:
+    return bound(_PURPOSE, sender.encode(), receiver.encode(), context, content)

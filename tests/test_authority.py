@@ -1,0 +1,541 @@
+"""The Authority: whom it certifies, whom it refuses, and what others make of its certificates."""
+
+from __future__ import annotations
+
+import ssl
+import stat
+import string
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from authorities import HOUR, START, Clock, Seen, identity_of
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec, rsa
+from cryptography.x509.oid import ExtendedKeyUsageOID
+from hypothesis import given
+from hypothesis import strategies as st
+from program import ROOT
+
+from robochoc import files
+from robochoc.authority.authority import IN_FORCE_AT_MOST, Authority, BadName, NotGranted, UnknownName
+from robochoc.authority.certificates import (
+    MASTER,
+    BadCertificate,
+    BadHost,
+    check_issued,
+    fingerprint,
+    key_pem,
+    moment,
+    new_key,
+    pem,
+    read_certificate,
+    read_request,
+    signing_request,
+)
+from robochoc.authority.events import Granted, Refused
+from robochoc.authority.identity import BadIdentity, Identity, save
+from robochoc.authority.registry import BadAuthority, Role, State
+from robochoc.authority.token import BadToken, Token
+
+ENROLLER = """
+import sys
+from robochoc.authority.authority import Authority
+authority = Authority.open(sys.argv[1])
+print("ready", flush=True)
+sys.stdin.readline()
+for number in range(25):
+    authority.enrol(f"{sys.argv[2]}.{number}")
+"""
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def seen() -> Seen:
+    return Seen()
+
+
+@pytest.fixture
+def authority(tmp_path: Path, clock: Clock, seen: Seen) -> Authority:
+    return Authority.create(tmp_path / "authority", clock=clock, observer=seen)
+
+
+def mode(path: Path) -> int:
+    return stat.S_IMODE(path.stat().st_mode)
+
+
+def state_of(authority: Authority, name: str) -> State:
+    found = {member.name: member for member in authority.members()}
+    return found[name].state(authority.clock())
+
+
+def test_a_token_gives_a_certificate_in_its_name(authority: Authority, tmp_path: Path, seen: Seen) -> None:
+    assert authority.names() == ()
+    robot = identity_of(authority, "Robot3.1", tmp_path / "robot")
+    assert robot.name == "Robot3.1"
+    assert robot.expires == moment(START + 24 * HOUR)
+    assert robot.certificate.not_valid_before_utc == moment(START - 300)
+    assert authority.names() == ("Robot3.1",)
+    assert authority.names(Role.OBSERVER) == ()
+    assert not authority.is_revoked("Robot3.1")
+    assert not authority.is_revoked(robot.certificate.serial_number)
+    assert seen.events == [Granted(t=START, who="Robot3.1", what="redeem a token")]
+
+
+def test_robots_are_clients_and_the_master_is_a_server_with_names(authority: Authority, tmp_path: Path) -> None:
+    """Rustls looks at the subject alternative names; a robot named like a host must not pass for that host."""
+    robot = identity_of(authority, "localhost", tmp_path / "robot").certificate
+    master = authority.master_identity(["localhost", "192.168.1.14", "::1", "bücher.example"])
+
+    def usages(certificate: x509.Certificate) -> set[x509.ObjectIdentifier]:
+        return set(certificate.extensions.get_extension_for_class(x509.ExtendedKeyUsage).value)
+
+    assert usages(robot) == {ExtendedKeyUsageOID.CLIENT_AUTH}
+    assert usages(master.certificate) == {ExtendedKeyUsageOID.CLIENT_AUTH, ExtendedKeyUsageOID.SERVER_AUTH}
+    names = master.certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    assert names.get_values_for_type(x509.DNSName) == [MASTER, "localhost", "xn--bcher-kva.example"]
+    assert list(map(str, names.get_values_for_type(x509.IPAddress))) == ["192.168.1.14", "::1"]
+    assert set(master.hosts) == {"localhost", "192.168.1.14", "::1", "xn--bcher-kva.example"}
+    robots = robot.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    assert robots.get_values_for_type(x509.DNSName) == []
+
+
+def test_the_ca_signs_leaves_only(authority: Authority) -> None:
+    extensions = authority.certificate.extensions
+    basic = extensions.get_extension_for_class(x509.BasicConstraints)
+    assert basic.critical
+    assert basic.value == x509.BasicConstraints(ca=True, path_length=0)
+    usage = extensions.get_extension_for_class(x509.KeyUsage)
+    assert usage.critical
+    assert usage.value.key_cert_sign
+    assert not usage.value.digital_signature
+
+
+def test_a_robot_cannot_issue_certificates(authority: Authority, tmp_path: Path) -> None:
+    robot = identity_of(authority, "A", tmp_path / "a")
+    key = new_key()
+    forged = (
+        x509.CertificateBuilder()
+        .subject_name(x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "B")]))
+        .issuer_name(robot.certificate.subject)
+        .public_key(key.public_key())
+        .serial_number(1)
+        .not_valid_before(moment(START))
+        .not_valid_after(moment(START + HOUR))
+        .sign(robot.key, hashes.SHA256())
+    )
+    with pytest.raises(BadCertificate, match="has not issued"):
+        check_issued(forged, authority.certificate, moment(START))
+
+
+def test_the_ca_itself_is_nobodys_certificate(authority: Authority) -> None:
+    with pytest.raises(BadCertificate, match="would not have issued"):
+        check_issued(authority.certificate, authority.certificate, moment(START))
+
+
+def test_a_token_works_once(authority: Authority, seen: Seen) -> None:
+    token = authority.enrol("A")
+    authority.redeem(token.secret, signing_request(new_key(), "A"))
+    with pytest.raises(NotGranted, match="used already"):
+        authority.redeem(token.secret, signing_request(new_key(), "A"), "here:1")
+    why = "the token has been used already"
+    assert seen.refusals == [Refused(t=START, who="A", what="redeem a token", why=why, origin="here:1")]
+
+
+def test_a_token_expires(authority: Authority, clock: Clock, seen: Seen) -> None:
+    token = authority.enrol("A", ttl=timedelta(hours=2))
+    clock.now += 2 * HOUR
+    with pytest.raises(NotGranted, match="expired"):
+        authority.redeem(token.secret, signing_request(new_key(), "A"))
+    assert state_of(authority, "A") is State.EXPIRED
+    assert len(seen.refusals) == 1
+
+
+def test_a_newer_token_replaces_the_older_one(authority: Authority) -> None:
+    older, newer = authority.enrol("A"), authority.enrol("A")
+    with pytest.raises(NotGranted, match="unknown"):
+        authority.redeem(older.secret, signing_request(new_key(), "A"))
+    authority.redeem(newer.secret, signing_request(new_key(), "A"))
+
+
+def test_a_token_is_for_its_own_name_only_and_is_not_spent_by_the_attempt(authority: Authority, seen: Seen) -> None:
+    token = authority.enrol("A")
+    authority.enrol("B")
+    for other in ("B", "Stranger", MASTER, "a"):
+        with pytest.raises(NotGranted, match="not for this name"):
+            authority.redeem(token.secret, signing_request(new_key(), other))
+    assert [refusal.who for refusal in seen.refusals] == ["B", "Stranger", MASTER, "a"]
+    authority.redeem(token.secret, signing_request(new_key(), "A"))
+
+
+def request_with(key: ec.EllipticCurvePrivateKey | rsa.RSAPrivateKey, *names: str) -> bytes:
+    subject = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name) for name in names])
+    request = x509.CertificateSigningRequestBuilder().subject_name(subject).sign(key, hashes.SHA256())
+    return request.public_bytes(serialization.Encoding.PEM)
+
+
+def test_bad_requests_are_refused_and_the_token_lives_on(authority: Authority, seen: Seen) -> None:
+    token = authority.enrol("A")
+    good = signing_request(new_key(), "A")
+    der = bytearray(x509.load_pem_x509_csr(good).public_bytes(serialization.Encoding.DER))
+    der[-1] ^= 1
+    unsigned = ssl.DER_cert_to_PEM_cert(bytes(der)).replace("CERTIFICATE", "CERTIFICATE REQUEST").encode()
+    weak = request_with(rsa.generate_private_key(65537, 2048), "A")
+    other_curve = request_with(ec.generate_private_key(ec.SECP384R1()), "A")
+    several = request_with(new_key(), "A", "B")
+    nameless = request_with(new_key())
+    bad = [b"", b"\0\xff", good[:100], unsigned, weak, other_curve, several, nameless, pem(authority.certificate)]
+    for request in bad:
+        with pytest.raises(NotGranted):
+            authority.redeem(token.secret, request)
+    assert len(seen.refusals) == len(bad)
+    authority.redeem(token.secret, good)
+
+
+@given(st.binary(max_size=300))
+def test_no_bytes_make_reading_a_request_fail_otherwise(content: bytes) -> None:
+    wrapped = b"-----BEGIN CERTIFICATE REQUEST-----\n" + content + b"\n-----END CERTIFICATE REQUEST-----\n"
+    for request in (content, wrapped):
+        with pytest.raises(BadCertificate):
+            read_request(request)
+
+
+def test_renewal(authority: Authority, tmp_path: Path, clock: Clock, seen: Seen) -> None:
+    robot = identity_of(authority, "A", tmp_path / "a")
+    clock.now += 13 * HOUR
+    assert robot.is_due(clock.now)
+    assert not robot.is_due(START)
+    new = read_certificate(authority.renew(signing_request(robot.key, "A"), robot.certificate))
+    assert new.not_valid_after_utc == moment(clock.now + 24 * HOUR)
+    assert not authority.is_revoked(robot.certificate.serial_number)
+    assert not authority.is_revoked(new.serial_number)
+    with pytest.raises(NotGranted, match="another name"):
+        authority.renew(signing_request(robot.key, "B"), robot.certificate)
+    clock.now = START + 25 * HOUR
+    with pytest.raises(NotGranted, match="not now"):
+        authority.renew(signing_request(robot.key, "A"), robot.certificate)
+    assert len(seen.refusals) == 2
+
+
+def test_renewal_by_another_authoritys_certificate_is_refused(
+    authority: Authority, tmp_path: Path, clock: Clock
+) -> None:
+    authority.enrol("A")
+    other = Authority.create(tmp_path / "other", clock=clock)
+    stranger = identity_of(other, "A", tmp_path / "stranger")
+    with pytest.raises(NotGranted, match="has not issued"):
+        authority.renew(signing_request(stranger.key, "A"), stranger.certificate)
+
+
+def test_who_renews_without_end_is_stopped(authority: Authority, tmp_path: Path, clock: Clock) -> None:
+    robot = identity_of(authority, "A", tmp_path / "a")
+    for _ in range(IN_FORCE_AT_MOST - 1):
+        authority.renew(signing_request(robot.key, "A"), robot.certificate)
+    with pytest.raises(NotGranted, match="no more may be"):
+        authority.renew(signing_request(robot.key, "A"), robot.certificate)
+    clock.now += 25 * HOUR
+    authority.redeem(authority.enrol("A").secret, signing_request(new_key(), "A"))
+    (member,) = authority.members()
+    assert len(member.certificates) == 1
+    assert member.withdrawn == (), "what has expired is forgotten"
+
+
+def test_the_masters_certificate_is_not_renewed_from_afar(authority: Authority) -> None:
+    master = authority.master_identity(["localhost"])
+    with pytest.raises(NotGranted, match="not from afar"):
+        authority.renew(signing_request(master.key, MASTER), master.certificate)
+
+
+def test_revocation_takes_effect_at_once_also_in_another_process(authority: Authority, tmp_path: Path) -> None:
+    robot = identity_of(authority, "A", tmp_path / "a")
+    elsewhere = Authority.open(authority.folder, clock=authority.clock)
+    assert not elsewhere.is_revoked("A")
+    authority.revoke("A")
+    for each in (authority, elsewhere):
+        assert each.is_revoked("A")
+        assert each.is_revoked(robot.certificate.serial_number)
+        assert each.names() == ()
+        with pytest.raises(NotGranted, match="revoked"):
+            each.renew(signing_request(robot.key, "A"), robot.certificate)
+    assert state_of(authority, "A") is State.REVOKED
+
+
+def test_revocation_takes_an_unused_token_as_well(authority: Authority) -> None:
+    token = authority.enrol("A")
+    authority.revoke("A")
+    with pytest.raises(NotGranted, match="unknown"):
+        authority.redeem(token.secret, signing_request(new_key(), "A"))
+
+
+def test_who_is_readmitted_stays_out_until_the_token_is_shown_and_old_certificates_stay_revoked(
+    authority: Authority, tmp_path: Path
+) -> None:
+    old = identity_of(authority, "A", tmp_path / "old")
+    authority.revoke("A")
+    token = authority.enrol("A")
+    assert authority.is_revoked("A")
+    assert state_of(authority, "A") is State.INVITED
+    key = new_key()
+    new = read_certificate(authority.redeem(token.secret, signing_request(key, "A")))
+    assert not authority.is_revoked("A")
+    assert not authority.is_revoked(new.serial_number)
+    assert authority.is_revoked(old.certificate.serial_number)
+
+
+def test_a_name_has_one_key(authority: Authority, tmp_path: Path) -> None:
+    first = identity_of(authority, "A", tmp_path / "first")
+    second = identity_of(authority, "A", tmp_path / "second")
+    assert authority.is_revoked(first.certificate.serial_number)
+    assert not authority.is_revoked(second.certificate.serial_number)
+    with pytest.raises(NotGranted, match="revoked"):
+        authority.renew(signing_request(first.key, "A"), first.certificate)
+
+
+def test_what_is_unknown_is_denied(authority: Authority) -> None:
+    assert authority.is_revoked("Stranger")
+    assert authority.is_revoked(42)
+    authority.enrol("Robot1")
+    with pytest.raises(UnknownName, match="did you mean 'Robot1'"):
+        authority.revoke("Robt1")
+
+
+@pytest.mark.parametrize("name", ["", "1A", "A/B", "A*", "$SYS", "A B", "A\n", "é", MASTER, "Master", "A" * 65])
+def test_names_that_no_robot_can_have(authority: Authority, name: str) -> None:
+    with pytest.raises(BadName):
+        authority.enrol_all(["Good", name])
+    assert authority.members() == (), "all or none"
+
+
+def test_the_longest_name_can_be_certified(authority: Authority, tmp_path: Path) -> None:
+    assert identity_of(authority, "A" * 64, tmp_path / "a").name == "A" * 64
+
+
+def test_the_master_role_and_name_belong_together(authority: Authority) -> None:
+    with pytest.raises(BadName, match="needs no token"):
+        authority.enrol("A", Role.MASTER)
+    with pytest.raises(BadName, match="new Authority"):
+        authority.revoke(MASTER)
+    authority.master_identity(["localhost"])
+    assert authority.names(Role.MASTER) == (MASTER,)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "", "a" * 300, "a..b"])  # noqa: S104 - that is refused
+def test_hosts_that_no_certificate_can_name(authority: Authority, host: str) -> None:
+    with pytest.raises(BadHost):
+        authority.master_identity([host])
+    assert authority.members() == ()
+
+
+def test_keys_are_for_their_owner_only(authority: Authority, tmp_path: Path) -> None:
+    identity_of(authority, "A", tmp_path / "a")
+    authority.master_identity(["localhost"])
+    for folder in (authority.folder, authority.folder / "master", tmp_path / "a"):
+        assert mode(folder) == 0o700
+    for key in (
+        authority.folder / "ca.key",
+        authority.folder / "registry.json",
+        authority.folder / "master" / "key.pem",
+        tmp_path / "a" / "key.pem",
+    ):
+        assert mode(key) == 0o600
+
+
+def test_secrets_are_for_their_owner_only_where_files_have_names_from_the_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unknown(*_any: object) -> None:
+        return
+
+    monkeypatch.setattr(files, "_written_unnamed", unknown)
+    files.write_atomically(tmp_path / "secret", b"x", 0o600)
+    assert mode(tmp_path / "secret") == 0o600
+    assert [path.name for path in tmp_path.iterdir()] == ["secret"]
+
+
+def test_the_registry_holds_no_secret(authority: Authority) -> None:
+    token = authority.enrol("A")
+    written = (authority.folder / "registry.json").read_bytes()
+    assert str(token).partition(".")[0].encode() not in written
+    assert token.secret.hex().encode() not in written
+    assert token.secret not in written
+
+
+def test_a_folder_that_serves_another_purpose_is_left_alone(tmp_path: Path) -> None:
+    tmp_path.chmod(0o755)
+    (tmp_path / "thesis.txt").touch()
+    with pytest.raises(PermissionError, match="a folder of their own"):
+        Authority.create(tmp_path)
+    assert mode(tmp_path) == 0o755
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+
+
+def test_there_is_one_authority_in_a_folder(authority: Authority) -> None:
+    with pytest.raises(BadAuthority, match="already"):
+        Authority.create(authority.folder)
+    assert Authority.open(authority.folder, clock=authority.clock).certificate == authority.certificate
+
+
+def test_what_is_wrong_with_an_authority_is_said(authority: Authority, tmp_path: Path, clock: Clock) -> None:
+    key = authority.folder / "ca.key"
+    with pytest.raises(BadAuthority, match="robochoc authority init"):
+        Authority.open(tmp_path / "nowhere")
+    key.chmod(0o644)
+    with pytest.raises(BadAuthority, match="chmod 600"):
+        Authority.open(authority.folder, clock=clock)
+    key.chmod(0o600)
+    clock.now += timedelta(days=3651).total_seconds()
+    with pytest.raises(BadAuthority, match="expired"):
+        Authority.open(authority.folder, clock=clock)
+    clock.now = START
+    key.write_bytes(key_pem(new_key()))
+    with pytest.raises(BadAuthority, match="not the key"):
+        Authority.open(authority.folder, clock=clock)
+    key.write_bytes(b"rubbish")
+    with pytest.raises(BadAuthority, match="damaged"):
+        Authority.open(authority.folder, clock=clock)
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b'{"members":{},"version":2}', b'{"members":{"A":1}}', b"\xff"])
+def test_a_registry_that_is_none_is_not_overwritten(authority: Authority, content: bytes) -> None:
+    (authority.folder / "registry.json").write_bytes(content)
+    with pytest.raises(BadAuthority, match="registry"):
+        authority.enrol("A")
+    assert (authority.folder / "registry.json").read_bytes() == content
+
+
+def test_processes_do_not_lose_each_others_changes(tmp_path: Path) -> None:
+    """While the master redeems, the command line enrols: four processes, and threads of a fifth."""
+    authority = Authority.create(tmp_path / "authority")
+    tokens = authority.enrol_all([f"T{number}" for number in range(20)])
+    others = [
+        subprocess.Popen(
+            [sys.executable, "-c", ENROLLER, authority.folder, f"P{number}"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            cwd=ROOT,
+        )
+        for number in range(3)
+    ]
+    for other in others:
+        assert other.stdout
+        other.stdout.readline()
+    for other in others:
+        assert other.stdin
+        other.stdin.write(b"\n")
+        other.stdin.flush()
+
+    def redeem(name: str) -> bytes:
+        return authority.redeem(tokens[name].secret, signing_request(new_key(), name))
+
+    with ThreadPoolExecutor(4) as threads:
+        assert len(list(threads.map(redeem, tokens))) == 20
+    for other in others:
+        with other:
+            pass
+        assert other.returncode == 0
+    assert len(authority.members()) == 20 + 3 * 25
+    assert len(authority.names()) == 20
+
+
+def test_only_one_of_many_redeems_a_token(tmp_path: Path) -> None:
+    seen = Seen()
+    authority = Authority.create(tmp_path / "authority", observer=seen)
+    token = authority.enrol("A")
+
+    def redeem(_number: int) -> bool:
+        try:
+            authority.redeem(token.secret, signing_request(new_key(), "A"))
+        except NotGranted:
+            return False
+        return True
+
+    with ThreadPoolExecutor(8) as threads:
+        assert sum(threads.map(redeem, range(16))) == 1
+    assert len(seen.refusals) == 15
+
+
+def test_tokens_survive_being_copied_by_people(authority: Authority) -> None:
+    token = authority.enrol("A")
+    assert Token.parse(f"  {token}\n") == token
+    assert Token.parse(str(token).upper()) == token
+    assert token.fingerprint == fingerprint(authority.certificate)
+    assert str(token).partition(".")[0] not in repr(token)
+
+
+@given(st.text(string.printable, max_size=120))
+def test_no_text_makes_reading_a_token_fail_otherwise(text: str) -> None:
+    with pytest.raises(BadToken, match="copy all"):
+        Token.parse(text)
+
+
+@given(st.integers(0, 83))
+def test_a_part_of_a_token_is_none(length: int) -> None:
+    with pytest.raises(BadToken):
+        Token.parse(str(Token(bytes(20), bytes(32)))[:length])
+
+
+def test_an_identity_is_what_was_written(authority: Authority, tmp_path: Path) -> None:
+    robot = identity_of(authority, "A", tmp_path / "a")
+    again = Identity.load(robot.folder, START)
+    assert (again.name, again.certificate, again.ca) == ("A", robot.certificate, authority.certificate)
+    assert again.key.public_key() == robot.key.public_key()
+    assert {robot.key_file.name, robot.certificate_file.name, robot.ca_file.name} == {"key.pem", "cert.pem", "ca.pem"}
+    assert "A" in repr(robot)
+
+
+def test_an_identity_that_cannot_be_used_says_why(authority: Authority, tmp_path: Path, clock: Clock) -> None:
+    robot = identity_of(authority, "A", tmp_path / "a")
+    other = identity_of(authority, "B", tmp_path / "b")
+    stranger = Authority.create(tmp_path / "other", clock=clock)
+    folder = tmp_path / "a"
+
+    def fault(now: float = START) -> str:
+        with pytest.raises(BadIdentity) as raised:
+            Identity.load(folder, now)
+        return str(raised.value)
+
+    assert "not now" in fault(START + 25 * HOUR)
+    assert "clock" in fault(START - HOUR)
+    robot.key_file.chmod(0o640)
+    assert "chmod 600" in fault()
+    save(folder, robot.key, other.certificate, robot.ca)
+    assert "not the key" in fault()
+    save(folder, robot.key, robot.certificate, stranger.certificate)
+    assert "has not issued" in fault()
+    (folder / "cert.pem").write_bytes(b"x" * 70000)
+    assert "bytes" in fault()
+    (folder / "cert.pem").unlink()
+    assert "enrol" in fault()
+    (folder / "key.pem").write_bytes(b"rubbish")
+    assert "no private key" in fault()
+
+
+def test_the_clocks_of_two_machines_may_differ_by_five_minutes(authority: Authority, tmp_path: Path) -> None:
+    robot = identity_of(authority, "A", tmp_path / "a")
+    assert Identity.load(robot.folder, START - 299).name == "A"
+    with pytest.raises(BadIdentity):
+        Identity.load(robot.folder, START - 301)
+
+
+def test_certificates_live_as_long_as_is_said(tmp_path: Path, clock: Clock) -> None:
+    authority = Authority.create(tmp_path / "authority", clock=clock, lifetime=timedelta(minutes=10))
+    assert identity_of(authority, "A", tmp_path / "a").expires == moment(START + 600)
+
+
+def test_certificates_do_not_outlive_the_authority(authority: Authority, tmp_path: Path, clock: Clock) -> None:
+    clock.now += timedelta(days=3650).total_seconds() - HOUR
+    assert identity_of(authority, "A", tmp_path / "a").expires == authority.certificate.not_valid_after_utc
+
+
+def test_master_identities_are_written_where_asked(authority: Authority, tmp_path: Path) -> None:
+    master = authority.master_identity(["127.0.0.1"], tmp_path / "elsewhere")
+    assert master.folder == tmp_path / "elsewhere"
+    assert Identity.load(tmp_path / "elsewhere", START).name == MASTER
