@@ -1,0 +1,149 @@
+r"""FIPA ACL messages (FIPA00061), and their form as text (FIPA00070).
+
+>>> from robochoc.services.communicative_acts import Performative
+>>> from robochoc.services.identifier import AgentIdentifier
+>>> print(text(ACLMessage(Performative.INFORM, AgentIdentifier("a@p"), (AgentIdentifier("b@p"),), content='say "hi"')))
+(INFORM :sender (agent-identifier :name a@p) :receiver (set (agent-identifier :name b@p)) :content "say \"hi\"")
+"""
+
+from __future__ import annotations
+
+import re
+
+import msgspec
+
+from robochoc.services.communicative_acts import Performative
+from robochoc.services.identifier import AgentIdentifier, expression_of, identifier_of
+from robochoc.services.symbolic import (
+    BadExpression,
+    Caps,
+    Expression,
+    String,
+    Word,
+    head_of,
+    items_of,
+    listed,
+    name,
+    parameters,
+    read,
+    text_of,
+    written,
+)
+
+CAPS = Caps(characters=1 << 25, expressions=10_000, depth=16)
+"""The largest message of a protocol, a piece of a table of `dpop`, has 16 MiB, and a third more as text."""
+
+_DATE_TIME = re.compile(r"[+-]?[0-9]{8}T[0-9]{9}[A-Za-z]?")
+_USER_DEFINED = re.compile(r"x-[a-z0-9_.-]{1,64}")
+
+
+class BadACL(ValueError):  # noqa: N818 - the error is the text's
+    """A text or message that cannot be used; `at` is the character it is about, None: it is not about its form."""
+
+    def __init__(self, message: str, at: int | None = None) -> None:
+        super().__init__(message if at is None else f"character {at}: {message}")
+        self.at = at
+
+
+class ACLMessage(msgspec.Struct, frozen=True):
+    """The thirteen parameters of FIPA00061, under its names, and `user`, the user-defined ones; None: not given.
+
+    `reply_by` is a DateTime of FIPA00008, `20260131T120000000Z`, or with a `+` the time from now. Names in `user`
+    begin with `x-` and have small letters. Raises `ValueError` where either is not so.
+    """
+
+    performative: Performative
+    sender: AgentIdentifier | None = None
+    receiver: tuple[AgentIdentifier, ...] = ()
+    reply_to: tuple[AgentIdentifier, ...] = ()
+    content: str | None = None
+    language: str | None = None
+    encoding: str | None = None
+    ontology: str | None = None
+    protocol: str | None = None
+    conversation_id: str | None = None
+    reply_with: str | None = None
+    in_reply_to: str | None = None
+    reply_by: str | None = None
+    user: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.reply_by is not None and not _DATE_TIME.fullmatch(self.reply_by):
+            raise ValueError(f"reply-by {self.reply_by[:40]!r} is no DateTime such as 20260131T120000000Z")
+        for key, _ in self.user:
+            if not _USER_DEFINED.fullmatch(key):
+                raise ValueError(f"{key[:40]!r} is no name of a user-defined parameter, such as x-clock")
+        if len(dict(self.user)) < len(self.user):
+            raise ValueError("a user-defined parameter is given twice")
+
+
+_TEXTS = ("content", "language", "encoding", "ontology", "protocol", "conversation-id", "reply-with", "in-reply-to")
+_KNOWN = {"sender", "receiver", "reply-to", *_TEXTS, "reply-by"}
+
+
+def text(message: ACLMessage) -> str:
+    """The message as FIPA00070 writes it, on one line but for what is in strings; what is not given is left out."""
+    items: list[Expression] = []
+    if message.sender is not None:
+        items += [Word(":sender"), expression_of(message.sender)]
+    for key, agents in (("receiver", message.receiver), ("reply-to", message.reply_to)):
+        if agents:
+            items += [Word(f":{key}"), listed("set", *map(expression_of, agents))]
+    for key in _TEXTS:
+        value: str | None = getattr(message, key.replace("-", "_"))
+        if value is not None:
+            items += [Word(f":{key}"), String(value) if key == "content" else name(value)]
+    if message.reply_by is not None:
+        items += [Word(":reply-by"), Word(message.reply_by)]
+    for key, value in message.user:
+        items += [Word(f":X-{key[2:]}"), name(value)]
+    return written(listed(message.performative.upper(), *items))
+
+
+def parse(message: str) -> ACLMessage:
+    """The message that a text in the form of FIPA00070 is.
+
+    Values that may be any expression there are to be words or strings here. Raises `BadACL`, whatever is wrong.
+    """
+    try:
+        return _message(read(message, CAPS))
+    except BadExpression as bad:
+        raise BadACL(str(bad), bad.at) from None
+
+
+def _message(whole: Expression) -> ACLMessage:
+    act = head_of(whole, "a message")
+    try:
+        performative = Performative(act)
+    except ValueError:
+        raise BadExpression(f"{act[:40]!r} is no performative of FIPA00037", whole.at) from None
+    found = parameters(items_of(whole, (act,), "a message"), "the message")
+    for key, value in found.items():
+        if key not in _KNOWN and not key.startswith("x-"):
+            raise BadExpression(f"a message has no parameter :{key[:40]}; other ones are to begin with :X-", value.at)
+    texts = {key: text_of(value, f":{key}") for key, value in found.items() if key in _TEXTS or key == "reply-by"}
+    try:
+        return ACLMessage(
+            performative,
+            identifier_of(found["sender"]) if "sender" in found else None,
+            _agents(found.get("receiver"), ":receiver"),
+            _agents(found.get("reply-to"), ":reply-to"),
+            content=texts.get("content"),
+            language=texts.get("language"),
+            encoding=texts.get("encoding"),
+            ontology=texts.get("ontology"),
+            protocol=texts.get("protocol"),
+            conversation_id=texts.get("conversation-id"),
+            reply_with=texts.get("reply-with"),
+            in_reply_to=texts.get("in-reply-to"),
+            reply_by=texts.get("reply-by"),
+            user=tuple((key, text_of(value, f":{key[:40]}")) for key, value in found.items() if key.startswith("x-")),
+        )
+    except BadExpression:
+        raise
+    except ValueError as error:
+        raise BadExpression(str(error), whole.at) from None
+
+
+def _agents(expression: Expression | None, what: str) -> tuple[AgentIdentifier, ...]:
+    return () if expression is None else tuple(map(identifier_of, items_of(expression, ("set",), what)))

@@ -1,0 +1,182 @@
+"""The Directory Facilitator of FIPA00023: who is there, and who offers what.
+
+Pure: times are given, in seconds on any clock that does not go back. Every agent speaks for itself only; who asks
+(`requester`) is for the host to prove. Beside FIPA's functions a registration can be renewed without being told again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from robochoc.services.descriptions import (
+    AgentDescription,
+    Reason,
+    Refused,
+    check,
+    check_bounds,
+    matches,
+)
+
+MAX_REGISTRATIONS = 4096
+MAX_SUBSCRIPTIONS = 1024
+
+
+class Notice(NamedTuple):
+    """What `subscriber` is to be told about the agent called `name`: its description, or None once it has gone.
+
+    It has gone for the subscriber also when it is still there, but no longer what was asked for.
+    """
+
+    subscriber: str
+    name: str
+    description: AgentDescription | None
+
+
+class _Registration(NamedTuple):
+    description: AgentDescription
+    ends: float
+
+
+class Directory:
+    """The registrations of a platform. What it cannot do raises `Refused`, and then has changed nothing."""
+
+    def __init__(self) -> None:
+        self._registered: dict[str, _Registration] = {}
+        self._subscriptions: list[tuple[str, AgentDescription]] = []
+        self._notices: dict[tuple[str, str], Notice] = {}
+        self._lapsed: dict[str, None] = {}
+        self._next_end = math.inf
+
+    def __len__(self) -> int:
+        """How many are registered, those included whose lease has ended since a time was last given."""
+        return len(self._registered)
+
+    def register(self, description: AgentDescription, now: float, *, requester: str) -> None:
+        """From now on `requester`, who describes itself, can be found, for as long as its lease lasts."""
+        check(description)
+        _authorise(description.name, requester)
+        self._lapse(now)
+        if description.name in self._registered:
+            raise Refused(Reason.ALREADY_REGISTERED)
+        if len(self._registered) >= MAX_REGISTRATIONS:
+            raise Refused(Reason.INTERNAL_ERROR, f"the directory is full: {MAX_REGISTRATIONS} agents")
+        self._lapsed.pop(description.name, None)
+        self._put(description, now)
+
+    def modify(self, description: AgentDescription, now: float, *, requester: str) -> None:
+        """`description` takes the place of what `requester` has told before; its lease begins again."""
+        check(description)
+        _authorise(description.name, requester)
+        self._lapse(now)
+        self._known(description.name)
+        self._put(description, now)
+
+    def renew(self, name: str, now: float, *, requester: str) -> None:
+        """The lease of `name` begins again."""
+        _authorise(name, requester)
+        self._lapse(now)
+        description = self._known(name).description
+        self._registered[name] = _Registration(description, _end(description, now))
+
+    def deregister(self, name: str, *, requester: str) -> None:
+        """`name`, who asks for it, can no longer be found."""
+        if not name:
+            raise Refused(Reason.MISSING_PARAMETER, "df-agent-description", "name")
+        _authorise(name, requester)
+        self._known(name)
+        self._remove(name)
+
+    def search(
+        self, template: AgentDescription, now: float, max_results: int | None = None
+    ) -> tuple[AgentDescription, ...]:
+        """Who matches `template`, by name, and of them the first `max_results` only (None or negative: all)."""
+        check_bounds(template)
+        self._lapse(now)
+        known = self._registered
+        names = sorted(known) if not template.name else [template.name] if template.name in known else []
+        found = tuple(known[name].description for name in names if matches(template, known[name].description))
+        return found if max_results is None or max_results < 0 else found[:max_results]
+
+    def expire(self, now: float) -> tuple[str, ...]:
+        """Remove those whose lease has ended; the names of all to whom that happened since `expire` was last called."""
+        self._lapse(now)
+        names = tuple(self._lapsed)
+        self._lapsed.clear()
+        return names
+
+    def subscribe(self, subscriber: str, template: AgentDescription, now: float) -> None:
+        """Tell `subscriber` who matches `template`, now and whenever that changes. The same again is told again."""
+        check_bounds(template)
+        if (subscriber, template) not in self._subscriptions:
+            if len(self._subscriptions) >= MAX_SUBSCRIPTIONS:
+                raise Refused(Reason.INTERNAL_ERROR, f"the directory is full: {MAX_SUBSCRIPTIONS} subscriptions")
+            self._subscriptions.append((subscriber, template))
+        for description in self.search(template, now):
+            self._note(subscriber, description.name, description)
+
+    def unsubscribe(self, subscriber: str, template: AgentDescription | None = None) -> None:
+        """Tell `subscriber` no more about `template`; None: about anything, and nothing that is still to be told."""
+        kept = [
+            one for one in self._subscriptions if one[0] != subscriber or (template is not None and one[1] != template)
+        ]
+        if len(kept) == len(self._subscriptions):
+            raise Refused(Reason.NOT_REGISTERED)
+        self._subscriptions = kept
+        if template is None:
+            self._notices = {key: notice for key, notice in self._notices.items() if key[0] != subscriber}
+
+    def notices(self) -> Sequence[Notice]:
+        """What subscribers are to be told, oldest first, and each of an agent only what is newest; told once."""
+        told = tuple(self._notices.values())
+        self._notices.clear()
+        return told
+
+    def _known(self, name: str) -> _Registration:
+        if name not in self._registered:
+            raise Refused(Reason.NOT_REGISTERED)
+        return self._registered[name]
+
+    def _put(self, description: AgentDescription, now: float) -> None:
+        before = self._registered.get(description.name)
+        ends = _end(description, now)
+        self._registered[description.name] = _Registration(description, ends)
+        self._next_end = min(self._next_end, ends)
+        self._tell(description.name, before.description if before else None, description)
+
+    def _remove(self, name: str) -> None:
+        self._tell(name, self._registered.pop(name).description, None)
+
+    def _lapse(self, now: float) -> None:
+        """Remove those whose lease has ended by `now`. `_next_end` is never later than the first end to come."""
+        if now < self._next_end:
+            return
+        for name in [name for name, known in self._registered.items() if known.ends <= now]:
+            self._remove(name)
+            self._lapsed[name] = None
+        self._next_end = min((known.ends for known in self._registered.values()), default=math.inf)
+
+    def _tell(self, name: str, before: AgentDescription | None, after: AgentDescription | None) -> None:
+        """Note for each subscriber that `name` was described as `before`, and is as `after`."""
+        concerned: dict[str, bool] = {}
+        for subscriber, template in self._subscriptions:
+            if after is not None and matches(template, after):
+                concerned[subscriber] = True
+            elif before is not None and matches(template, before):
+                concerned.setdefault(subscriber, False)
+        for subscriber, there in concerned.items():
+            self._note(subscriber, name, after if there else None)
+
+    def _note(self, subscriber: str, name: str, description: AgentDescription | None) -> None:
+        self._notices.pop((subscriber, name), None)
+        self._notices[subscriber, name] = Notice(subscriber, name, description)
+
+
+def _authorise(name: str, requester: str) -> None:
+    if name != requester:
+        raise Refused(Reason.UNAUTHORISED)
+
+
+def _end(description: AgentDescription, now: float) -> float:
+    return math.inf if description.lease_s is None else now + description.lease_s

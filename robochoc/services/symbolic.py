@@ -1,0 +1,209 @@
+r"""Symbolic expressions, as FIPA writes messages (FIPA00070) and their contents in SL (FIPA00008).
+
+`(df-agent-description :name (agent-identifier :name "Robot3.1@host:7447/robochoc"))` is a list of words, strings and
+lists. Reading takes time in proportion to the text, does not recurse, and stops at the `Caps`.
+
+FIPA00070 knows one escape in strings, `\"`. With it alone no string could end in a backslash, so `\\` is one too, as in
+every Lisp; a backslash before anything else stands for itself.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import NamedTuple, assert_never
+
+
+class BadExpression(ValueError):  # noqa: N818 - the error is the text's
+    """A text that is no expression, or not the one expected; `at` is the character it is about, from 0."""
+
+    def __init__(self, message: str, at: int) -> None:
+        super().__init__(message)
+        self.at = at
+
+
+class Caps(NamedTuple):
+    """What a text may have at most: characters, words and strings and lists in it, and lists within lists."""
+
+    characters: int
+    expressions: int
+    depth: int
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A name, a keyword such as `:name`, or a number; `at` is where it begins in the text that it was read from."""
+
+    text: str
+    at: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class String:
+    """A quoted string: its content, without the quotes."""
+
+    text: str
+    at: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class List:
+    """What stands between two parentheses."""
+
+    items: tuple[Expression, ...]
+    at: int = field(default=0, compare=False)
+
+
+Expression = Word | String | List
+
+_SPACE = re.compile(r"[\x00-\x20]*")
+_WORD = re.compile(r'[^\x00-\x20()"]+')
+_SIZE = re.compile(r'#([0-9]{1,9})"')
+_STRING = re.compile(r'"([^"\\]*+(?:\\.[^"\\]*+)*+)"', re.DOTALL)
+"""Possessive, so that it neither goes back nor takes memory for each escape."""
+_SAFE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.:@/+*!?<>=-]*")
+_SHOWN = 40
+
+
+def read(text: str, caps: Caps) -> Expression:
+    """The one expression that `text` is. Raises `BadExpression`, which says what is wrong and where."""
+    if len(text) > caps.characters:
+        raise BadExpression(f"{len(text)} characters are too many: at most {caps.characters}", caps.characters)
+    opened: list[tuple[int, list[Expression]]] = []
+    count = 0
+    at = _after_space(text, 0)
+    while at < len(text):
+        count += 1
+        if count > caps.expressions:
+            raise BadExpression(f"more than {caps.expressions} words, strings and lists", at)
+        if text[at] == "(":
+            if len(opened) == caps.depth:
+                raise BadExpression(f"lists within lists deeper than {caps.depth}", at)
+            opened.append((at, []))
+            at = _after_space(text, at + 1)
+            continue
+        done, at = _closed(text, at, opened) if text[at] == ")" else _atom(text, at)
+        at = _after_space(text, at)
+        if opened:
+            opened[-1][1].append(done)
+        elif at < len(text):
+            raise BadExpression("the expression has ended, but the text goes on", at)
+        else:
+            return done
+    raise BadExpression("the text ends before its expression does" if opened else "no expression", len(text))
+
+
+def written(expression: Expression) -> str:
+    """The text of `expression`: one line but for what strings hold; `read` gives the same expression again.
+
+    Raises `ValueError` for a word that cannot be written as one.
+    """
+    match expression:
+        case Word(text):
+            if not _WORD.fullmatch(text):
+                raise ValueError(f"{text!r} is no word")
+            return text
+        case String(text):
+            escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+            return f'"{escaped}"'
+        case List(items):
+            return f"({' '.join(map(written, items))})"
+        case never:
+            assert_never(never)
+
+
+def name(text: str) -> Word | String:
+    """`text` as a word if it can be one, otherwise as a string: a word may not begin with a digit."""
+    return Word(text) if _SAFE_NAME.fullmatch(text) else String(text)
+
+
+def listed(head: str, *items: Expression) -> List:
+    """The list that begins with the word `head`."""
+    return List((Word(head), *items))
+
+
+def text_of(expression: Expression, what: str) -> str:
+    """The text of a word or a string. Raises `BadExpression`, which calls the expression `what`."""
+    if isinstance(expression, List):
+        raise BadExpression(f"{what} is to be a word or a string, not a list", expression.at)
+    return expression.text
+
+
+def head_of(expression: Expression, what: str) -> str:
+    """The word, in small letters, that a list begins with. Raises `BadExpression` where there is none."""
+    if not isinstance(expression, List) or not expression.items or not isinstance(expression.items[0], Word):
+        raise BadExpression(f"{what} is to be a list that begins with a word", expression.at)
+    return expression.items[0].text.lower()
+
+
+def items_of(expression: Expression, heads: tuple[str, ...], what: str) -> tuple[Expression, ...]:
+    """What follows in a list that begins with one of `heads`. Raises `BadExpression` for any other expression."""
+    head = head_of(expression, what)
+    if head not in heads or not isinstance(expression, List):
+        raise BadExpression(f"{what} is to begin with {' or '.join(heads)}, not with {_shown(head)}", expression.at)
+    return expression.items[1:]
+
+
+def parameters(items: tuple[Expression, ...], what: str) -> dict[str, Expression]:
+    """`:key value :key value ...` by key in small letters, without the colon. Raises `BadExpression`."""
+    found: dict[str, Expression] = {}
+    for key, value in zip(items[::2], items[1::2], strict=False):
+        if not isinstance(key, Word) or not key.text.startswith(":"):
+            raise BadExpression(f"a parameter of {what} is to begin with a colon", key.at)
+        known = key.text[1:].lower()
+        if known in found:
+            raise BadExpression(f"{what} has {_shown(key.text)} twice", key.at)
+        found[known] = value
+    if len(items) % 2:
+        raise BadExpression(f"the last parameter of {what} has no value", items[-1].at)
+    return found
+
+
+def _after_space(text: str, at: int) -> int:
+    found = _SPACE.match(text, at)
+    return found.end() if found else at
+
+
+def _closed(text: str, at: int, opened: list[tuple[int, list[Expression]]]) -> tuple[List, int]:
+    if not opened:
+        raise BadExpression(f"{text[at]} closes nothing", at)
+    began, items = opened.pop()
+    return List(tuple(items), began), at + 1
+
+
+def _atom(text: str, at: int) -> tuple[Word | String, int]:
+    """The word or string at `at`, and where it ends."""
+    if text[at] == '"':
+        return _string(text, at)
+    if sized := _SIZE.match(text, at):
+        return _sized_string(text, at, sized.end(), int(sized[1]))
+    found = _WORD.match(text, at)
+    if not found:
+        raise BadExpression("no expression begins here", at)
+    return Word(found[0], at), found.end()
+
+
+def _string(text: str, began: int) -> tuple[String, int]:
+    found = _STRING.match(text, began)
+    if not found:
+        raise BadExpression("a string is never closed", began)
+    # Two backslashes first: what is between them has none that is escaped itself.
+    content = "\\".join(part.replace('\\"', '"') for part in found[1].split("\\\\"))
+    return String(content, began), found.end()
+
+
+def _sized_string(text: str, began: int, start: int, size: int) -> tuple[String, int]:
+    """A string that says how many bytes of UTF-8 it has (FIPA00070, ByteLengthEncodedString)."""
+    content = text[start : start + size].encode("utf-8", "surrogatepass")[:size]
+    try:
+        decoded = content.decode()
+    except UnicodeDecodeError:
+        raise BadExpression(f"{size} bytes are no whole characters of UTF-8", began) from None
+    if len(content) < size:
+        raise BadExpression(f"a string is to have {size} bytes, and the text ends before", began)
+    return String(decoded, began), start + len(decoded)
+
+
+def _shown(text: str) -> str:
+    """As much of a foreign word as belongs in a message."""
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
