@@ -4,29 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from robochoc.observers.events import Event
+from robochoc.observers.events import Granted, Refused
 
-
-class Granted(Event, frozen=True):
-    """`who` was given `what`. `t` is Unix time: the Authority outlives runs."""
-
-    who: str
-    what: str
-    origin: str = ""
-    """Where the request came from, as `address:port`; empty where it was no network."""
-
-
-class Refused(Event, frozen=True):
-    """`who` claimed to be allowed `what`, and is not, because `why`. `t` is Unix time.
-
-    `who` is what the other side said of itself, so it may be anybody's name, or `unknown`.
-    """
-
-    who: str
-    what: str
-    why: str
-    origin: str = ""
-
+__all__ = ["AuthorityEvent", "AuthorityObserver", "Granted", "Refused", "unobserved"]
 
 AuthorityEvent = Granted | Refused
 AuthorityObserver = Callable[[AuthorityEvent], None]

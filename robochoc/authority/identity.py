@@ -10,6 +10,7 @@ import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import NamedTuple
 
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509 import Certificate
@@ -17,6 +18,7 @@ from cryptography.x509 import Certificate
 from robochoc.authority.certificates import (
     BadCertificate,
     check_issued,
+    common_name,
     holder_of,
     hosts_of,
     key_pem,
@@ -35,6 +37,14 @@ _LARGEST_BYTES = 65536
 
 class BadIdentity(Exception):  # noqa: N818 - named for what was found
     """A folder that holds no identity, or one that cannot be used; the message says what to do."""
+
+
+class IdentityTexts(NamedTuple):
+    """An identity as PEM. `key` is secret."""
+
+    key: bytes
+    certificate: bytes
+    ca: bytes
 
 
 @dataclass(frozen=True, repr=False)
@@ -64,6 +74,17 @@ class Identity:
         except BadCertificate as error:
             raise BadIdentity(f"{folder}: {error}; enrol anew, with a new token") from error
         return cls(folder, name, key, certificate, ca)
+
+    @classmethod
+    def of(cls, texts: IdentityTexts) -> Identity:
+        """The identity that `texts` was made of, in this same program."""
+        key, certificate, ca = read_key(texts.key), read_certificate(texts.certificate), read_certificate(texts.ca)
+        return cls(Path(), common_name(certificate.subject), key, certificate, ca)
+
+    @property
+    def texts(self) -> IdentityTexts:
+        """All of it as PEM: for zenoh, and for processes that this one starts."""
+        return IdentityTexts(key_pem(self.key), pem(self.certificate), pem(self.ca))
 
     @property
     def key_file(self) -> Path:

@@ -110,16 +110,21 @@ class RobotLink:
         return status.rpartition(")")[2].split()[0] == "R"
 
     def fate(self) -> str:
-        """How the process ended, in words. Its sentinel has told; the exit code comes a moment later."""
-        deadline = time.monotonic() + _EXIT_CODE_S
-        # Not `join`, whose time limit ends with the sentinel: a process can close all its files and live on.
-        while (code := self.process.exitcode) is None:
-            if time.monotonic() > deadline:
-                return "its process cannot be reached any more"
-            time.sleep(_EXIT_CODE_POLL_S)
-        if code < 0:
-            return f"its process was killed by {_name_of(-code)}"
-        return f"its process ended with status {code}"
+        """How the process ended, in words."""
+        return fate_of(self.process)
+
+
+def fate_of(process: BaseProcess) -> str:
+    """How `process` ended, in words. Its sentinel has told; the exit code comes a moment later."""
+    deadline = time.monotonic() + _EXIT_CODE_S
+    # Not `join`, whose time limit ends with the sentinel: a process can close all its files and live on.
+    while (code := process.exitcode) is None:
+        if time.monotonic() > deadline:
+            return "its process cannot be reached any more"
+        time.sleep(_EXIT_CODE_POLL_S)
+    if code < 0:
+        return f"its process was killed by {_name_of(-code)}"
+    return f"its process ended with status {code}"
 
 
 def _name_of(signum: int) -> str:

@@ -107,5 +107,31 @@ class Lost(Event, frozen=True):
     why: str
 
 
-AnyEvent = Began | Registered | Sent | Received | Decided | Heard | Improved | Settled | Concluded | Lost
+class Granted(Event, frozen=True):
+    """The Authority has granted `who` `what`; there `t` is Unix time, as the Authority outlives runs.
+
+    `origin` is where the request came from, as `address:port`; empty where it was no network.
+    """
+
+    who: str
+    what: str
+    origin: str = ""
+
+
+class Refused(Event, frozen=True):
+    """`who` claimed to be allowed `what`, and is not, because `why`. `t` and `origin` as in `Granted`.
+
+    `who` is what the other side said of itself, so it may be anybody's name, or `unknown`. Refusals in a run have the
+    run's time.
+    """
+
+    who: str
+    what: str
+    why: str
+    origin: str = ""
+
+
+AnyEvent = (
+    Began | Registered | Sent | Received | Decided | Heard | Improved | Settled | Concluded | Lost | Granted | Refused
+)
 Observer = Callable[[AnyEvent], None]

@@ -13,7 +13,8 @@ class Traits:
     is none. `synchronous`: one robot acts at a time. `costs`: it minimises (a DisWCSP). `n_ary`: constraints
     may be over more than two robots. `partially_known`: it takes PKC constraints. `everywhere`: its order changes
     during the search, so each robot of a constraint's scope has to know the constraint, and not only the lowest.
-    `tree`: it works on a pseudo-tree. `dynamic`: it goes on when the problem changes (then it is a
+    `beyond`: its robots also write to robots that they share no constraint with; where that is not so, access control
+    across machines is as narrow. `tree`: it works on a pseudo-tree. `dynamic`: it goes on when the problem changes (then it is a
     `DynamicProtocol`). `privacy`: what neighbours do not come to know.
     """
 
@@ -24,6 +25,7 @@ class Traits:
     n_ary: bool = True
     partially_known: bool = False
     everywhere: bool = False
+    beyond: bool = True
     tree: bool = False
     dynamic: bool = False
     privacy: str = ""

@@ -1,0 +1,75 @@
+"""Who may write to whom: zenoh's access control, default deny, bound to the name in a certificate.
+
+The key of a letter is `rc/msg/RECEIVER/SENDER`. A robot may put on keys that end with its own name only, and read those
+that begin with it, so that nobody writes in another's name or reads another's letters. Of the keys that end with its
+name it may use those to the master, and once the team is closed those to the robots it has to do with. Recovery
+(zenoh's advanced publishers) asks for what was missed under `@adv` below the same keys, and has the same rules.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from robochoc.communication.network.letters import MASTER
+
+ALL = "*"
+"""Whoever there is."""
+
+
+def letter_key(receiver: str, sender: str) -> str:
+    """Where letters from `sender` to `receiver` go."""
+    return f"rc/msg/{receiver}/{sender}"
+
+
+def life_key(name: str) -> str:
+    """The liveliness token of `name`."""
+    return f"rc/live/{name}"
+
+
+def name_in(key: str) -> str:
+    """The sender in a letter's key, or whose life a token is."""
+    return key.rpartition("/")[2]
+
+
+def access_control(reach: Mapping[str, Sequence[str]]) -> dict[str, Any]:
+    """Zenoh's `access_control`: those in `reach` may take part, and each may write to the master and whom it lists."""
+    rules: list[dict[str, Any]] = []
+    policies = []
+    for name, others in {**reach, MASTER: [ALL]}.items():
+        receivers = [ALL] if ALL in others else dict.fromkeys([MASTER, *others])
+        mine = _rules(name, [letter_key(other, name) for other in receivers])
+        rules += mine
+        policies.append({"rules": [rule["id"] for rule in mine], "subjects": [name]})
+    subjects = [{"id": name, "cert_common_names": [name]} for name in (*reach, MASTER)]
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": subjects,
+        "policies": policies,
+    }
+
+
+def _rules(name: str, written: Sequence[str]) -> list[dict[str, Any]]:
+    """What `name` may do, who writes letters to the keys `written`."""
+    read = [letter_key(name, ALL)]
+    says = ["put", "reply", "declare_queryable", "liveliness_token"]
+    hears = ["declare_subscriber", "query", "declare_liveliness_subscriber", "liveliness_query", "liveliness_token"]
+    return [
+        _rule(f"{name} writes", "ingress", says, [*written, *map(_recovery, written)]),
+        _rule(f"{name} reads", "ingress", hears, [*read, *map(_recovery, read)]),
+        _rule(f"{name} receives", "egress", says, [*read, *map(_recovery, read)]),
+        _rule(f"{name} is asked", "egress", hears, [letter_key(ALL, ALL), _recovery(letter_key(ALL, ALL))]),
+        _rule(f"{name} lives", "ingress", ["liveliness_token"], [life_key(name)]),
+        _rule(f"{name} watches", "ingress", ["declare_liveliness_subscriber", "liveliness_query"], [life_key(ALL)]),
+        _rule(f"{name} sees", "egress", ["liveliness_token"], [life_key(ALL)]),
+    ]
+
+
+def _recovery(key: str) -> str:
+    return f"{key}/@adv/**"
+
+
+def _rule(name: str, flow: str, messages: list[str], keys: list[str]) -> dict[str, Any]:
+    return {"id": name, "permission": "allow", "flows": [flow], "messages": messages, "key_exprs": keys}

@@ -1,0 +1,232 @@
+"""All of it on this machine: `--runtime network`. One process per robot, a master, a router, mutual TLS on loopback.
+
+For trying out, and for tests. Robots' processes come from a fork server, as a forked child of a process that has used
+zenoh hangs. Certificates are made for this one run, and are nowhere but in memory.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import multiprocessing
+import os
+import signal
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from multiprocessing.connection import wait
+from multiprocessing.process import BaseProcess
+from types import MappingProxyType
+from typing import NamedTuple, cast
+
+from robochoc.authority.admission import Household
+from robochoc.authority.identity import Identity, IdentityTexts
+from robochoc.communication.network.master import Master
+from robochoc.communication.network.post import LEASE_MS, CannotConnect, Post
+from robochoc.communication.network.robot import NetworkRobot
+from robochoc.communication.network.router import RouterFailed
+from robochoc.communication.robot_link import fate_of
+from robochoc.communication.run_result import Progress, RunResult
+from robochoc.communication.session import Epoch, Session
+from robochoc.communication.system import signals_held
+from robochoc.observers.events import Observer
+from robochoc.problem import Robot, Team
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.encoding import Unsupported
+from robochoc.solver.part import NO_BRIEF, Brief
+
+LOOPBACK = "127.0.0.1"
+GRACE_S = 2.0
+"""How long robots that were sent home get to end by themselves."""
+START_S = 60.0
+"""How long robots may take to come."""
+_ATTEMPTS = 5
+_LOWEST_NICE = 19
+_PRELOAD = ["robochoc.communication.network.robot"]
+_PR_SET_PDEATHSIG = 1
+_PR_SET_NAME = 15
+
+
+class Given(NamedTuple):
+    """With what a robot's process begins."""
+
+    robot: Robot
+    domain: CompiledDomain | None
+    identity: IdentityTexts
+    endpoint: str
+    protocol: type[Protocol]
+    patience_s: float
+
+
+class LocalNetwork(Session):
+    """One team on this machine, each robot in a process of its own, joined by zenoh. See `Session`, `ProcessesRun`.
+
+    `filters` are the channel filters that messages go through. Robots compile nothing: `domains` are their compiled
+    domains. `lease_ms` and `patience_s`: how long a link may be silent, and a robot away.
+    """
+
+    def __init__(
+        self,
+        team: Team,
+        protocol: type[Protocol],
+        *,
+        domains: Mapping[str, CompiledDomain] = MappingProxyType({}),
+        observer: Observer | None = None,
+        progress: Callable[[Progress], None] | None = None,
+        survive: bool = False,
+        brief: Brief = NO_BRIEF,
+        filters: tuple[str, ...] = (),
+        lease_ms: int = LEASE_MS,
+        patience_s: float = 10.0,
+    ) -> None:
+        self._protocol = protocol
+        self._brief = brief
+        self._processes: dict[str, BaseProcess] = {}
+        self._sent_home = False
+        self._household = Household(team.order)
+        self._waiting = [(robot, domains.get(robot.name)) for robot in team.robots]
+        self._patience_s = patience_s
+        self._observer = observer
+        self._master = self._opened(
+            lambda endpoint: Master(
+                self._household,
+                self._household.master_identity((LOOPBACK,)),
+                endpoint,
+                expected=team.order,
+                filters=filters,
+                patience_s=patience_s,
+                lease_ms=lease_ms,
+                survive=survive,
+                observer=observer,
+                watched=observer is not None,
+                progress=progress,
+            )
+        )
+
+    @staticmethod
+    def _opened(make: Callable[[str], Master]) -> Master:
+        """The master at a free port of loopback; somebody else may be quicker, then at another."""
+        for attempt in range(_ATTEMPTS):
+            with socket.create_server((LOOPBACK, 0)) as trial:
+                port = trial.getsockname()[1]
+            try:
+                return make(f"{LOOPBACK}:{port}").__enter__()
+            except RouterFailed:
+                if attempt == _ATTEMPTS - 1:
+                    raise
+        raise AssertionError
+
+    @property
+    def processes(self) -> Mapping[str, BaseProcess]:
+        """The robots' processes, by name."""
+        return self._processes
+
+    @property
+    def master(self) -> Master:
+        """The master of the run."""
+        return self._master
+
+    def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
+        """See `Session.search`. Raises `RobotsLost` and `Unsupported`."""
+        deadline = None if timeout is None else time.monotonic() + timeout
+        self._launch()
+        began = time.monotonic()
+        if not self._master.members.closed:
+            patience = began + START_S
+            limit = patience if deadline is None else min(deadline, patience)
+            if not self._master.gather(limit) and deadline != limit:
+                awaited = ", ".join(sorted(self._master.members.awaited)[:5])
+                raise Unsupported(f"robots did not register within {START_S:g} s: {awaited}")
+        left = None if deadline is None else max(0.0, deadline - time.monotonic())
+        return self._master.search(_name_of(self._protocol), self._protocol.traits, self._brief, left, messages)
+
+    def change(self, epoch: Epoch) -> None:
+        """Go on without the robots that were lost: no other change can happen here."""
+        gone = [name for name in self._master.members.robots if name not in epoch.team]
+        self._master.dismiss(gone)
+        self._brief = epoch.brief
+
+    def close(self) -> None:
+        """Send all home, and leave nothing behind."""
+        if self._sent_home:
+            return
+        self._sent_home = True
+        try:
+            self._master.leave("the run is over")
+            wait([process.sentinel for process in self._processes.values()], 0)
+        finally:
+            with signals_held():
+                self._end_processes()
+                self._master.__exit__(None, None, None)
+
+    def _launch(self) -> None:
+        """Start the robots' processes, and somebody who watches for their ends."""
+        waiting, self._waiting = self._waiting, []
+        if not waiting:
+            return
+        context = multiprocessing.get_context("forkserver")
+        context.set_forkserver_preload(_PRELOAD)
+        for robot, domain in waiting:
+            texts = self._household.identity(robot.name).texts
+            given = Given(robot, domain, texts, self._master.endpoint, self._protocol, self._patience_s)
+            process = context.Process(target=robot_process, name=robot.name, args=(given,), daemon=True)
+            process.start()
+            self._processes[robot.name] = process
+        threading.Thread(target=self._watch, args=[dict(self._processes)], daemon=True).start()
+
+    def _watch(self, processes: dict[str, BaseProcess]) -> None:
+        """Tell the master of processes that end, which it would notice later by itself."""
+        names = {process.sentinel: name for name, process in processes.items()}
+        while names and not self._sent_home:
+            for sentinel in wait(list(names), 0.2):
+                name = names.pop(cast("int", sentinel))
+                if not self._sent_home:
+                    self._master.lose(name, fate_of(processes[name]))
+
+    def _end_processes(self) -> None:
+        until = time.monotonic() + GRACE_S
+        alive = {process.sentinel for process in self._processes.values()}
+        while alive and time.monotonic() < until:
+            alive.difference_update(cast("list[int]", wait(list(alive), max(0.0, until - time.monotonic()))))
+        for process in self._processes.values():
+            process.kill()
+            process.join()
+            process.close()
+        self._processes = {}
+
+
+def robot_process(given: Given) -> None:
+    """What a robot's process runs. Ctrl-C reaches the whole process group, and is left to the parent."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    if sys.platform == "linux":
+        libc = ctypes.CDLL(None)
+        libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        libc.prctl(_PR_SET_NAME, given.robot.name.encode())
+    identity = Identity.of(given.identity)
+
+    def take_place(rank: int, size: int) -> None:
+        """As in `robot_process.py`: who comes earlier in the order goes first."""
+        wanted = _LOWEST_NICE * rank // size
+        os.setpriority(os.PRIO_PROCESS, 0, max(wanted, os.getpriority(os.PRIO_PROCESS, 0)))
+
+    try:
+        with Post(given.endpoint, identity, watch=(), patience_s=START_S) as post:
+            NetworkRobot(
+                given.robot,
+                given.domain,
+                identity,
+                post,
+                lambda _name: given.protocol,
+                patience_s=given.patience_s,
+                place=take_place,
+            ).run()
+    except CannotConnect as error:
+        sys.exit(str(error))
+
+
+def _name_of(protocol: type[Protocol]) -> str:
+    return protocol.__name__

@@ -1,0 +1,162 @@
+"""Who has registered with the master: profiles, lives, and what of them is common knowledge. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+from robochoc.communication.network.access import ALL
+from robochoc.communication.network.profile import (
+    BadProfile,
+    Profile,
+    Ranges,
+    acquaintances,
+    contradictions,
+    in_priority_order,
+    missing,
+    ranges_of,
+    silhouette,
+)
+from robochoc.communication.network.words import Account, Task
+from robochoc.problem import Robot
+from robochoc.protocols.traits import Traits
+from robochoc.solver.part import Brief
+
+
+class NotTaken(ValueError):  # noqa: N818 - named for the answer
+    """A robot cannot be registered; the message says why."""
+
+
+@dataclass
+class Member:
+    """A registered robot in its life `visit`. `account` is its report on the epoch; `gone` since when it is away."""
+
+    profile: Profile
+    visit: str
+    also: dict[str, Ranges] = field(default_factory=dict)
+    card: bytes = b""
+    joined: bool = False
+    ready: bool = False
+    account: Account | None = None
+    gone: float | None = None
+    left: bool = False
+
+    @property
+    def robot(self) -> Robot:
+        """Its silhouette."""
+        return silhouette(self.profile, self.also)
+
+
+class Members:
+    """All registered robots, by name. `expected` names who alone may come (None: whoever the Authority lets in)."""
+
+    def __init__(self, expected: Collection[str] | None, number: int | None) -> None:
+        self.expected = expected
+        self.number = number
+        self.robots: dict[str, Member] = {}
+        self.closed = False
+
+    @property
+    def profiles(self) -> dict[str, Profile]:
+        """What all have told of themselves."""
+        return {name: member.profile for name, member in self.robots.items()}
+
+    def register(self, sender: str, profile: Profile, visit: str) -> Member:
+        """Take `sender` in, or find it there already in the same life. Raises `NotTaken`."""
+        known = self.robots.get(sender)
+        if known and known.visit == visit:
+            return known
+        if profile.name != sender:
+            raise NotTaken(f"its file is {profile.name[:80]!r}'s, and its certificate {sender}'s")
+        if known and (self.closed or known.gone is None):
+            raise NotTaken(f"a robot called {sender} is registered already")
+        if self.closed or (self.expected is not None and sender not in self.expected):
+            raise NotTaken("the team is complete without it" if self.closed else "it is not one of the team")
+        try:
+            silhouette(profile, {})
+        except BadProfile as bad:
+            raise NotTaken(str(bad)) from None
+        others = {name: other for name, other in self.profiles.items() if name != sender}
+        wrong = next(contradictions({**others, sender: profile}), None)
+        if wrong:
+            raise NotTaken(wrong)
+        self.robots[sender] = Member(profile, visit)
+        return self.robots[sender]
+
+    @property
+    def awaited(self) -> set[str]:
+        """Who has to come yet, as far as that is known by name."""
+        return (set(self.expected or ()) | missing(self.profiles)) - self.robots.keys()
+
+    @property
+    def complete(self) -> bool:
+        """Whether all are there: as many as were asked for, or all that somebody names."""
+        enough = self.number is None or len(self.robots) >= self.number
+        return bool(self.robots) and enough and not self.awaited and all(m.joined for m in self.robots.values())
+
+    def unseen(self) -> dict[str, tuple[str, ...]]:
+        """Variables that parts of partially known constraints look at, and whose owners have not shown them."""
+        wanted: dict[str, dict[str, None]] = {}
+        for member in self.robots.values():
+            for child, names in member.profile.looks_at.items():
+                other = self.robots.get(child)
+                if other:
+                    unseen = [name for name in names if name not in other.profile.variables and name not in other.also]
+                    wanted.setdefault(child, {}).update(dict.fromkeys(unseen))
+        return {child: tuple(names) for child, names in wanted.items() if names}
+
+    def remove(self, names: Collection[str]) -> None:
+        """Robots are out for good: whoever named them as neighbours does so no more."""
+        for name in names:
+            self.robots.pop(name, None)
+
+    @property
+    def order(self) -> tuple[str, ...]:
+        """The total priority order of those that are there."""
+        return tuple(in_priority_order(self.profiles))
+
+    def reach(self, *, beyond: bool) -> dict[str, tuple[str, ...]]:
+        """To whom each may write: everybody, if the protocol goes beyond those it may share constraints with."""
+        if beyond:
+            return dict.fromkeys(self.robots, (ALL,))
+        here = self.profiles
+        met = acquaintances(here)
+        return {name: tuple(other for other in others if other in here) for name, others in met.items()}
+
+    def tasks(self, epoch: int, protocol: str, traits: Traits, brief: Brief) -> dict[str, Task]:
+        """What each robot is told for a search, in priority order."""
+        order = self.order
+        shown = {name: self.robots[name].robot for name in order}
+        domains = {
+            variable.name: ranges_of(variable.domain) for robot in shown.values() for variable in robot.variables
+        }
+        links = {name: self._links(name) for name in order} if traits.tree else None
+        cards = tuple(member.card for member in self.robots.values() if member.card)
+        return {
+            name: Task(
+                epoch,
+                protocol,
+                order,
+                {other: robot.interface for other, robot in shown.items()},
+                domains,
+                links,
+                tuple(parent for parent in self._links(name) if name in self.robots[parent].profile.looks_at),
+                brief.seed,
+                dict(brief.settings),
+                brief.aside,
+                cards,
+            )
+            for name in order
+        }
+
+    def neighbourhood(self, name: str, values: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
+        """Of the decided `values`, by robot, those that all whom `name` may share a constraint with show."""
+        found: dict[str, int] = {}
+        for other in acquaintances(self.profiles)[name]:
+            if other in self.robots:
+                interface = self.robots[other].robot.interface
+                found.update({v: value for v, value in values.get(other, {}).items() if v in interface})
+        return found
+
+    def _links(self, name: str) -> tuple[str, ...]:
+        return tuple(parent for parent in self.robots[name].profile.parents if parent in self.robots)

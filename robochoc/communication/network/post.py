@@ -1,0 +1,190 @@
+"""The post: what zenoh does for one participant. It carries letters both ways, and tells who is there.
+
+Letters travel by zenoh's advanced publishers and subscribers, which number what they carry, keep it, and ask again for
+what an outage has swallowed; plain ones lose messages without a word. Nothing but this file and `router.py` imports
+zenoh. Its callbacks run in threads of its own, and only put what comes into `inbox`.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterable
+from queue import SimpleQueue
+from types import TracebackType
+from typing import NamedTuple, Self
+
+import zenoh
+import zenoh.ext
+
+from robochoc.authority.identity import Identity
+from robochoc.communication.network.access import ALL, letter_key, life_key, name_in
+from robochoc.communication.network.letters import LARGEST_LETTER
+
+RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}
+HEARTBEAT_S = 0.5
+"""How soon a receiver learns that the last letter is missing."""
+KEPT_LETTERS = 100_000
+LEASE_MS = 10_000
+"""How long a link may be silent. TCP survives shorter outages by itself."""
+_LARGEST_BYTES = 4 * LARGEST_LETTER
+"""What zenoh takes from the network at once. More than a letter, so that one that is too large is refused aloud."""
+
+
+class CannotConnect(Exception):  # noqa: N818 - named for what happened
+    """There is no master at that address, or it does not let us in."""
+
+
+class Arrived(NamedTuple):
+    """A letter from `sender`."""
+
+    sender: str
+    content: bytes
+
+
+class Missed(NamedTuple):
+    """So many `letters` are lost for good, and zenoh cannot say whose."""
+
+    letters: int
+
+
+class Presence(NamedTuple):
+    """`name` is there, or is not any more as far as the router knows."""
+
+    name: str
+    there: bool
+
+
+class Woken(NamedTuple):
+    """Somebody in this process has something new to look at."""
+
+
+Item = Arrived | Missed | Presence | Woken
+
+
+class Post:
+    """The connection of `identity` with the router at `endpoint` (`HOST:PORT`); a context manager.
+
+    `lease_ms` is how long a silent link counts as alive. Raises `CannotConnect` when there is no connection within
+    `patience_s`.
+    """
+
+    def __init__(
+        self,
+        endpoint: str,
+        identity: Identity,
+        *,
+        watch: Iterable[str] = (ALL,),
+        patience_s: float = 10.0,
+        lease_ms: int = LEASE_MS,
+    ) -> None:
+        self.name = identity.name
+        self.inbox: SimpleQueue[Item] = SimpleQueue()
+        self._publishers: dict[str, zenoh.ext.AdvancedPublisher] = {}
+        try:
+            self._session = zenoh.open(client_config(endpoint, identity, patience_s, lease_ms))
+        except zenoh.ZError as error:
+            raise CannotConnect(f"no master answers at {endpoint}, or it does not let {self.name} in") from error
+        self._subscriber = zenoh.ext.declare_advanced_subscriber(
+            self._session,
+            letter_key(self.name, ALL),
+            self._take,
+            history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
+            recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+            subscriber_detection=True,
+        )
+        self._misses = self._subscriber.sample_miss_listener(self._note_miss)
+        self._token = self._session.liveliness().declare_token(life_key(self.name))
+        self._watchers = [
+            self._session.liveliness().declare_subscriber(life_key(name), self._note_presence, history=True)
+            for name in watch
+        ]
+
+    def send(self, receiver: str, content: bytes) -> None:
+        """Put a letter on its way. While the link is down it waits here; afterwards it is sent, or asked for."""
+        publisher = self._publishers.get(receiver)
+        if publisher is None:
+            publisher = self._publishers[receiver] = zenoh.ext.declare_advanced_publisher(
+                self._session,
+                letter_key(receiver, self.name),
+                congestion_control=zenoh.CongestionControl.BLOCK,
+                cache=zenoh.ext.CacheConfig(KEPT_LETTERS),
+                sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=HEARTBEAT_S, sporadic_heartbeat=None),
+                publisher_detection=True,
+            )
+        publisher.put(content)
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a link to the router now."""
+        return bool(self._session.info.routers_zid())
+
+    def wake(self) -> None:
+        """Have whoever waits at the inbox look up."""
+        self.inbox.put(Woken())
+
+    def close(self) -> None:
+        """End the connection. What zenoh has taken over is sent before."""
+        self._session.close()  # type: ignore[no-untyped-call]  # zenoh's stubs
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # What zenoh's threads call
+
+    def _take(self, sample: zenoh.Sample) -> None:
+        self.inbox.put(Arrived(name_in(str(sample.key_expr)), sample.payload.to_bytes()))
+
+    def _note_miss(self, miss: zenoh.ext.Miss) -> None:
+        self.inbox.put(Missed(miss.nb))
+
+    def _note_presence(self, sample: zenoh.Sample) -> None:
+        self.inbox.put(Presence(name_in(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT))
+
+
+def client_config(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Config:
+    """How a participant connects: to that one router, by mutual TLS, and in no other way."""
+    texts = identity.texts
+    tls = {
+        "root_ca_certificate_base64": encoded(texts.ca),
+        "connect_private_key_base64": encoded(texts.key),
+        "connect_certificate_base64": encoded(texts.certificate),
+        "enable_mtls": True,
+        "verify_name_on_connect": True,
+    }
+    return config(
+        {
+            "mode": "client",
+            "listen/endpoints": [],
+            "connect/endpoints": [f"tls/{endpoint}"],
+            "connect/timeout_ms": max(1, int(patience_s * 1000)),
+            "connect/exit_on_failure": True,
+            "connect/retry": RETRY,
+            "transport/link/tls": tls,
+            "transport/link/tx/lease": lease_ms,
+        }
+    )
+
+
+def config(settings: dict[str, object]) -> zenoh.Config:
+    """A configuration of zenoh: `settings`, and nothing that looks for others or listens where it was not told to."""
+    made = zenoh.Config()
+    common = {
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "transport/link/rx/max_message_size": _LARGEST_BYTES,
+        "transport/shared_memory/enabled": False,
+    }
+    for key, value in {**common, **settings}.items():
+        made.insert_json5(key, json.dumps(value))
+    return made
+
+
+def encoded(content: bytes) -> str:
+    """PEM as zenoh takes it where there is no file."""
+    return base64.b64encode(content).decode()

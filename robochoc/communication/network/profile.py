@@ -1,0 +1,179 @@
+"""What a robot tells the master of its file: who its neighbours are, and the variables that they see. Not more.
+
+The master makes silhouettes of profiles: robots without constraints and without what nobody sees. With them it works
+out what is common knowledge anyway: the priority order, the interfaces, the declared domains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import msgspec
+
+from robochoc.formats.constraints import is_name
+from robochoc.formats.extension import MAX_VALUES
+from robochoc.problem import Child, Constraint, CycleError, Domain, Kind, Parent, Robot, Variable, priority_order
+from robochoc.solver.encoding import dearest
+
+Ranges = tuple[tuple[int, int], ...]
+"""A domain: first and last value of each range, ascending."""
+
+MOST_NEIGHBOURS = 10_000
+MOST_VARIABLES = 10_000
+LONGEST_NAME = 255
+
+
+class BadProfile(ValueError):  # noqa: N818 - named for what was found
+    """What a robot tells of itself cannot be."""
+
+
+class Profile(msgspec.Struct, frozen=True, array_like=True):
+    """What the robot `name` tells of its file.
+
+    `variables` are its interface variables with their domains. `looks_at` names, by child, the child's variables that
+    this robot's parts of partially known constraints look at. `dearest` is the most that the constraints it holds can
+    charge together, short of being broken. `topics` are where it publishes its decision.
+    """
+
+    name: str
+    kind: Kind
+    parents: tuple[str, ...]
+    children: tuple[str, ...]
+    variables: dict[str, Ranges]
+    looks_at: dict[str, tuple[str, ...]]
+    weight: int
+    dearest: float
+    topics: tuple[str, ...]
+
+    @property
+    def neighbours(self) -> tuple[str, ...]:
+        """The parents, then the children."""
+        return (*self.parents, *self.children)
+
+
+def profile_of(robot: Robot) -> Profile:
+    """What `robot` tells of itself."""
+    shown = set(robot.interface)
+    own = {variable.name for variable in robot.variables}
+    parts = [constraint for child in robot.children for constraint in child.constraints]
+    return Profile(
+        name=robot.name,
+        kind=robot.kind,
+        parents=tuple(parent.name for parent in robot.parents),
+        children=tuple(child.name for child in robot.children),
+        variables={v.name: ranges_of(v.domain) for v in robot.variables if v.name in shown},
+        looks_at={
+            child.name: tuple(
+                dict.fromkeys(name for part in child.constraints for name in part.variables if name not in own)
+            )
+            for child in robot.children
+            if child.constraints
+        },
+        weight=robot.weight,
+        dearest=sum(dearest(constraint) for constraint in (*robot.private, *robot.shared, *parts)),
+        topics=tuple(topic.name for topic in robot.topics),
+    )
+
+
+def ranges_of(domain: Domain) -> Ranges:
+    """`domain` as it travels."""
+    return tuple((part[0], part[-1]) for part in domain.ranges)
+
+
+def domain_of(name: str, ranges: Ranges) -> Domain:
+    """The domain of the variable `name`. Raises `BadProfile`; nothing is made of absurd ones."""
+    last: int | None = None
+    size = 0
+    for low, high in ranges:
+        if low > high or (last is not None and low <= last):
+            raise BadProfile(f"the ranges of {name} are not ascending")
+        last, size = high, size + high - low + 1
+    if not 0 < size <= MAX_VALUES:
+        raise BadProfile(f"{name} has {size:,} values; there are 1 to {MAX_VALUES:,}")
+    return Domain(name, tuple(range(low, high + 1) for low, high in ranges))
+
+
+def silhouette(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
+    """The robot as others see it; `also` are variables that it has shown since. Raises `BadProfile`."""
+    names = (profile.name, *profile.neighbours, *profile.variables, *also)
+    bad = next((name for name in names if not is_name(name) or len(name) > LONGEST_NAME), None)
+    if bad is not None:
+        raise BadProfile(f"{bad[:LONGEST_NAME]!r} is no name")
+    if len(profile.neighbours) > MOST_NEIGHBOURS or len(profile.variables) > MOST_VARIABLES:
+        raise BadProfile("it has too many neighbours or variables")
+    if len({profile.name, *profile.neighbours}) <= len(profile.neighbours):
+        raise BadProfile("it names itself, or a neighbour twice")
+    shown = {**profile.variables, **also}
+    return Robot(
+        name=profile.name,
+        variables=tuple(Variable(name, domain_of(name, ranges)) for name, ranges in shown.items()),
+        kind=profile.kind,
+        parents=tuple(Parent(name) for name in profile.parents),
+        children=tuple(Child(name) for name in profile.children),
+        shown=tuple(shown),
+        weight=max(profile.weight, 1),
+    )
+
+
+def contradictions(profiles: Mapping[str, Profile]) -> Iterator[str]:
+    """What cannot be if all of `profiles` are of one team: neighbours that disagree, variables with two owners."""
+    owner: dict[str, str] = {}
+    for profile in profiles.values():
+        for variable in profile.variables:
+            other = owner.setdefault(variable, profile.name)
+            if other != profile.name:
+                yield f"the variable {variable} is {other}'s, and {profile.name}'s too"
+        for parent in profile.parents:
+            if parent in profiles and profile.name not in profiles[parent].children:
+                yield f"{profile.name} calls {parent} its parent, which does not list it as a child"
+        for child in profile.children:
+            if child in profiles and profile.name not in profiles[child].parents:
+                yield f"{profile.name} calls {child} its child, which does not list it as a parent"
+    kinds = {profile.kind: profile.name for profile in profiles.values()}
+    if len(kinds) > 1:
+        yield f"{' and '.join(f'{name} is a {kind}' for kind, name in kinds.items())}: a team is one or the other"
+    try:
+        priority_order({profile.name: profile.parents for profile in profiles.values()})
+    except CycleError as cycle:
+        yield f"the parents form a cycle: {cycle}"
+
+
+def missing(profiles: Mapping[str, Profile]) -> set[str]:
+    """Neighbours that somebody names and that have not come."""
+    return {name for profile in profiles.values() for name in profile.neighbours} - profiles.keys()
+
+
+def acquaintances(profiles: Mapping[str, Profile]) -> dict[str, tuple[str, ...]]:
+    """For each robot the others that it may share a constraint with: its neighbours, and other parents of a child.
+
+    A constraint over more than two robots stands with its lowest robot, and the others are parents of that one.
+    """
+    found: dict[str, dict[str, None]] = {name: dict.fromkeys(one.neighbours) for name, one in profiles.items()}
+    for profile in profiles.values():
+        for parent in (one for one in profile.parents if one in found):
+            found[parent].update(dict.fromkeys(other for other in profile.parents if other != parent))
+    return {name: tuple(others) for name, others in found.items()}
+
+
+def in_priority_order(profiles: Mapping[str, Profile]) -> Sequence[str]:
+    """The total priority order of a team whose profiles do not contradict each other."""
+    return priority_order({profile.name: profile.parents for profile in profiles.values()})
+
+
+def among(robot: Robot, interfaces: Mapping[str, Sequence[str]]) -> Robot:
+    """`robot` in a team of those in `interfaces`: without neighbours that have left, and constraints with them.
+
+    It shows the variables that stand there for it, whoever looks at them.
+    """
+    known = {name for names in interfaces.values() for name in names} | {v.name for v in robot.variables}
+
+    def kept(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
+        return tuple(constraint for constraint in constraints if known.issuperset(constraint.variables))
+
+    return replace(
+        robot,
+        parents=tuple(replace(p, constraints=kept(p.constraints)) for p in robot.parents if p.name in interfaces),
+        children=tuple(replace(c, constraints=kept(c.constraints)) for c in robot.children if c.name in interfaces),
+        shown=tuple(interfaces[robot.name]),
+    )

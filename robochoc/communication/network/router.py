@@ -1,0 +1,179 @@
+"""The router: the one process that all connect to. It checks certificates and who may write to whom.
+
+It is a process of its own (`python -m robochoc.communication.network.router`) that takes its configuration from
+standard input and holds no letters but those under way. zenoh's access control cannot be changed while it runs: to
+register or revoke somebody, the router is closed and opened anew with other rules, in a fraction of a second; what was
+sent meanwhile is recovered (`post.py`). What it refuses it tells in its log only, so that is read (`Refusals`).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import IO, NamedTuple
+
+import zenoh
+
+from robochoc.authority.identity import Identity
+from robochoc.communication.network.access import access_control
+from robochoc.communication.network.post import config, encoded
+
+START_S = 10.0
+"""How long the router may take to listen."""
+_READY = "listening"
+_LOG = "warn,zenoh::net::routing::interceptor=trace,zenoh_link_tls=warn"
+_CHUNK = 65536
+_DENIED = re.compile(
+    rb"CertCommonName\(([^)]*)\)\S* is unauthorized to ([A-Za-z/ ]+?) \(ingress\) on (\S+)[^\n]*\n"
+    rb"[^\n]*interceptor: Msg intercepted!"
+)
+_TLS = re.compile(rb"zenoh_link_tls::unicast: ((?:invalid peer certificate|received corrupt message|peer )[^\n]*)")
+_HINT = re.compile(r"\. Hint: .*$")
+_COLOURS = re.compile(rb"\x1b\[[0-9;]*m")
+
+
+class RouterFailed(Exception):  # noqa: N818 - named for what happened
+    """The router cannot listen."""
+
+
+class Refusal(NamedTuple):
+    """The router has refused `who` (as its certificate says; empty: it was not let in) to do `what`."""
+
+    who: str
+    what: str
+    why: str
+
+
+class Router:
+    """Runs the router's process with the master's `identity`, on `endpoint` (`HOST:PORT`).
+
+    `refused` is told of refusals, from a thread of its own. Whoever opens it closes it.
+    """
+
+    def __init__(self, endpoint: str, identity: Identity, refused: Callable[[Refusal], None], lease_ms: int) -> None:
+        self.endpoint = endpoint
+        self._identity = identity
+        self._refused = refused
+        self._lease_ms = lease_ms
+        self._process: subprocess.Popen[bytes] | None = None
+        self._reader: threading.Thread | None = None
+
+    def open(self, reach: Mapping[str, Sequence[str]]) -> None:
+        """Listen, with these rules (see `access_control`) instead of those before. Raises `RouterFailed`."""
+        self.close()
+        process = subprocess.Popen(  # noqa: S603 - this file, with this interpreter
+            [sys.executable, "-m", __name__],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, "RUST_LOG": _LOG, "NO_COLOR": "1"},
+            start_new_session=True,
+        )
+        self._process = process
+        if process.stdin is None or process.stdout is None:
+            raise RouterFailed("it has no standard streams")
+        process.stdin.write(json.dumps(self._settings(reach)).encode() + b"\n")
+        process.stdin.flush()
+        self._wait_until_ready(process.stdout)
+        self._reader = threading.Thread(target=self._read, args=[process.stdout], daemon=True)
+        self._reader.start()
+
+    @property
+    def ended(self) -> bool:
+        """Whether its process is gone though nobody closed it."""
+        return self._process is not None and self._process.poll() is not None
+
+    def close(self) -> None:
+        """Let everybody go. Its process ends at once."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        process.kill()
+        process.wait()
+        if self._reader:
+            self._reader.join()
+        for stream in (process.stdin, process.stdout):
+            if stream:
+                stream.close()
+
+    def _settings(self, reach: Mapping[str, Sequence[str]]) -> dict[str, object]:
+        texts = self._identity.texts
+        return {
+            "mode": "router",
+            "listen/endpoints": [f"tls/{self.endpoint}"],
+            "connect/endpoints": [],
+            "transport/link/tls": {
+                "root_ca_certificate_base64": encoded(texts.ca),
+                "listen_private_key_base64": encoded(texts.key),
+                "listen_certificate_base64": encoded(texts.certificate),
+                "enable_mtls": True,
+                "close_link_on_expiration": True,
+            },
+            "transport/link/tx/lease": self._lease_ms,
+            "access_control": access_control(reach),
+        }
+
+    def _wait_until_ready(self, output: IO[bytes]) -> None:
+        said: list[str] = []
+        watch = threading.Timer(START_S, self._give_up)
+        watch.start()
+        try:
+            for line in output:
+                word = line.decode(errors="replace").strip()
+                if word == _READY:
+                    return
+                said.append(word)
+        finally:
+            watch.cancel()
+        why = "; ".join(said[-2:]) or "it ended without a word"
+        raise RouterFailed(f"cannot listen on {self.endpoint}: {why}")
+
+    def _give_up(self) -> None:
+        if self._process:
+            self._process.kill()
+
+    def _read(self, output: IO[bytes]) -> None:
+        """Read the log to its end, and tell of refusals. In chunks: at full load there are 80,000 lines a second."""
+        rest = b""
+        while chunk := os.read(output.fileno(), _CHUNK):
+            text = rest + chunk
+            whole = text.rfind(b"\n") + 1
+            last = text.rfind(b"\n", 0, max(0, whole - 1)) + 1
+            if b"unauthorized" in text[last:whole]:  # what becomes of it stands in the next line
+                whole = last
+            for refusal in refusals(text[:whole]):
+                self._refused(refusal)
+            rest = text[whole:]
+
+
+def refusals(log: bytes) -> Iterator[Refusal]:
+    """What a part of the router's log tells of refusals."""
+    plain = _COLOURS.sub(b"", log)
+    for who, what, where in _DENIED.findall(plain):
+        action = f"{what.decode().lower()} {where.decode(errors='replace')}"
+        yield Refusal(who.decode(errors="replace"), action, "no rule of the Authority allows it")
+    for why in _TLS.findall(plain):
+        yield Refusal("", "connect", _HINT.sub("", why.decode(errors="replace")))
+
+
+def main() -> None:
+    """The router's process: it ends when standard input does, so never later than the master."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    zenoh.init_log_from_env_or("error")
+    settings = json.loads(sys.stdin.readline())
+    with zenoh.open(config(settings)):
+        sys.stdout.write(f"{_READY}\n")
+        sys.stdout.flush()
+        while sys.stdin.read(1):
+            time.sleep(0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,100 @@
+"""Constraints on the wire: some protocols have every robot of a constraint's scope know it, not only the lowest.
+
+They travel as data, predicates as the functional expressions of files, and are parsed and type-checked as those are.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+from robochoc.expression import Expression, ExpressionError, Type, parse, text
+from robochoc.formats.constraints import is_name
+from robochoc.problem import Constraint, Model, Predicate, Relation, Semantics, Term
+from robochoc.solver.explanation import Known
+
+
+class BadShared(ValueError):  # noqa: N818 - named for what was found
+    """A constraint from elsewhere that cannot be."""
+
+
+class RelationRecord(msgspec.Struct, frozen=True, tag=True, array_like=True):
+    """A relation; see `Relation`."""
+
+    name: str
+    arity: int
+    semantics: Semantics
+    tuples: tuple[tuple[int, ...], ...]
+    costs: tuple[float, ...]
+    default_cost: float
+
+
+class PredicateRecord(msgspec.Struct, frozen=True, tag=True, array_like=True):
+    """A predicate; `body` is a functional expression."""
+
+    name: str
+    parameters: tuple[str, ...]
+    body: str
+
+
+class SharedRecord(msgspec.Struct, frozen=True, array_like=True):
+    """A shared constraint with its `key` (`solver/explanation.py`)."""
+
+    key: str
+    name: str
+    definition: RelationRecord | PredicateRecord
+    scope: tuple[Term, ...]
+    parameters: tuple[Term, ...]
+    model: Model | None
+    cost: float
+
+
+def record_of(known: Known) -> SharedRecord:
+    """`known` as it travels."""
+    one = known.constraint
+    return SharedRecord(known.key, one.name, _defined(one.definition), one.scope, one.parameters, one.model, one.cost)
+
+
+def known_of(record: SharedRecord) -> Known:
+    """The constraint in `record`. Raises `BadShared`."""
+    variables = [term for term in (*record.scope, *record.parameters) if isinstance(term, str)]
+    if not all(map(is_name, variables)) or not set(record.parameters) <= set(record.scope):
+        raise BadShared(f"the scope of {record.name!r} is none")
+    definition = _definition(record.definition)
+    arity = definition.arity if isinstance(definition, Relation) else len(definition.parameters)
+    if arity != len(record.parameters) or not record.cost >= 0:
+        raise BadShared(f"{record.name!r} has {len(record.parameters)} arguments where {arity} are needed")
+    return Known(
+        record.key,
+        Constraint(record.name, definition, record.scope, record.parameters, record.model, record.cost),
+    )
+
+
+def _defined(definition: Relation | Predicate) -> RelationRecord | PredicateRecord:
+    if isinstance(definition, Predicate):
+        return PredicateRecord(definition.name, definition.parameters, text(definition.body))
+    return RelationRecord(
+        definition.name,
+        definition.arity,
+        definition.semantics,
+        definition.tuples,
+        definition.costs,
+        definition.default_cost,
+    )
+
+
+def _definition(record: RelationRecord | PredicateRecord) -> Relation | Predicate:
+    if isinstance(record, PredicateRecord):
+        return Predicate(record.name, record.parameters, _body(record))
+    if any(len(values) != record.arity for values in record.tuples):
+        raise BadShared(f"a tuple of {record.name!r} has not {record.arity} values")
+    costs = len(record.tuples) if record.semantics is Semantics.SOFT else 0
+    if len(record.costs) != costs or not all(cost >= 0 for cost in (*record.costs, record.default_cost)):
+        raise BadShared(f"the costs of {record.name!r} are none")
+    return Relation(record.name, record.arity, record.semantics, record.tuples, record.costs, record.default_cost)
+
+
+def _body(record: PredicateRecord) -> Expression:
+    try:
+        return parse(record.body, record.parameters, Type.BOOLEAN)
+    except ExpressionError as error:
+        raise BadShared(f"the predicate {record.name!r}: {error}") from None
