@@ -13,9 +13,9 @@ class Traits:
     is none. `synchronous`: one robot acts at a time. `costs`: it minimises (a DisWCSP). `n_ary`: constraints
     may be over more than two robots. `partially_known`: it takes PKC constraints. `everywhere`: its order changes
     during the search, so each robot of a constraint's scope has to know the constraint, and not only the lowest.
-    `beyond`: its robots also write to robots that they share no constraint with; where that is not so, access control
-    across machines is as narrow. `tree`: it works on a pseudo-tree. `dynamic`: it goes on when the problem changes (then it is a
-    `DynamicProtocol`). `privacy`: what neighbours do not come to know.
+    `beyond`: its robots also write to robots that they share no constraint with; where they do not, access control
+    across machines keeps them from it. `tree`: it works on a pseudo-tree. `dynamic`: it goes on when the problem
+    changes (then it is a `DynamicProtocol`). `privacy`: what neighbours do not come to know.
     """
 
     paper: str = ""

@@ -22,8 +22,10 @@ from typing import NamedTuple, cast
 
 from robochoc.authority.admission import Household
 from robochoc.authority.identity import Identity, IdentityTexts
+from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.master import Master
-from robochoc.communication.network.post import LEASE_MS, CannotConnect, Post
+from robochoc.communication.network.members import Members
+from robochoc.communication.network.post import CannotConnect, Post
 from robochoc.communication.network.robot import NetworkRobot
 from robochoc.communication.network.router import RouterFailed
 from robochoc.communication.robot_link import fate_of
@@ -63,8 +65,7 @@ class Given(NamedTuple):
 class LocalNetwork(Session):
     """One team on this machine, each robot in a process of its own, joined by zenoh. See `Session`, `ProcessesRun`.
 
-    `filters` are the channel filters that messages go through. Robots compile nothing: `domains` are their compiled
-    domains. `lease_ms` and `patience_s`: how long a link may be silent, and a robot away.
+    Robots compile nothing: `domains` are their compiled domains.
     """
 
     def __init__(
@@ -75,32 +76,26 @@ class LocalNetwork(Session):
         domains: Mapping[str, CompiledDomain] = MappingProxyType({}),
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
-        survive: bool = False,
+        conditions: Conditions = Conditions(),
         brief: Brief = NO_BRIEF,
-        filters: tuple[str, ...] = (),
-        lease_ms: int = LEASE_MS,
-        patience_s: float = 10.0,
     ) -> None:
         self._protocol = protocol
         self._brief = brief
+        self._patience_s = conditions.patience_s
         self._processes: dict[str, BaseProcess] = {}
         self._sent_home = False
         self._household = Household(team.order)
         self._waiting = [(robot, domains.get(robot.name)) for robot in team.robots]
-        self._patience_s = patience_s
-        self._observer = observer
+        watched = observer is not None
         self._master = self._opened(
             lambda endpoint: Master(
                 self._household,
                 self._household.master_identity((LOOPBACK,)),
                 endpoint,
-                expected=team.order,
-                filters=filters,
-                patience_s=patience_s,
-                lease_ms=lease_ms,
-                survive=survive,
+                Members(team.order),
+                conditions,
                 observer=observer,
-                watched=observer is not None,
+                watched=watched,
                 progress=progress,
             )
         )
@@ -140,12 +135,12 @@ class LocalNetwork(Session):
                 awaited = ", ".join(sorted(self._master.members.awaited)[:5])
                 raise Unsupported(f"robots did not register within {START_S:g} s: {awaited}")
         left = None if deadline is None else max(0.0, deadline - time.monotonic())
-        return self._master.search(_name_of(self._protocol), self._protocol.traits, self._brief, left, messages)
+        return self._master.search(self._protocol.__name__, self._protocol.traits, self._brief, left, messages)
 
     def change(self, epoch: Epoch) -> None:
         """Go on without the robots that were lost: no other change can happen here."""
         gone = [name for name in self._master.members.robots if name not in epoch.team]
-        self._master.dismiss(gone)
+        self._master.members.remove(gone)
         self._brief = epoch.brief
 
     def close(self) -> None:
@@ -226,7 +221,3 @@ def robot_process(given: Given) -> None:
             ).run()
     except CannotConnect as error:
         sys.exit(str(error))
-
-
-def _name_of(protocol: type[Protocol]) -> str:
-    return protocol.__name__

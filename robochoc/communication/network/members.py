@@ -17,7 +17,7 @@ from robochoc.communication.network.profile import (
     ranges_of,
     silhouette,
 )
-from robochoc.communication.network.words import Account, Task
+from robochoc.communication.network.words import Task
 from robochoc.problem import Robot
 from robochoc.protocols.traits import Traits
 from robochoc.solver.part import Brief
@@ -29,15 +29,13 @@ class NotTaken(ValueError):  # noqa: N818 - named for the answer
 
 @dataclass
 class Member:
-    """A registered robot in its life `visit`. `account` is its report on the epoch; `gone` since when it is away."""
+    """A registered robot in its life `visit`; `gone` since when it is away (None: it is there)."""
 
     profile: Profile
     visit: str
     also: dict[str, Ranges] = field(default_factory=dict)
     card: bytes = b""
     joined: bool = False
-    ready: bool = False
-    account: Account | None = None
     gone: float | None = None
     left: bool = False
 
@@ -48,9 +46,13 @@ class Member:
 
 
 class Members:
-    """All registered robots, by name. `expected` names who alone may come (None: whoever the Authority lets in)."""
+    """All registered robots, by name.
 
-    def __init__(self, expected: Collection[str] | None, number: int | None) -> None:
+    `expected` names who alone may come (None: whoever the Authority lets in), `number` says how many do. Without either
+    the team is complete when every neighbour that a robot names is there.
+    """
+
+    def __init__(self, expected: Collection[str] | None = None, number: int | None = None) -> None:
         self.expected = expected
         self.number = number
         self.robots: dict[str, Member] = {}

@@ -19,14 +19,13 @@ import zenoh.ext
 
 from robochoc.authority.identity import Identity
 from robochoc.communication.network.access import ALL, letter_key, life_key, name_in
+from robochoc.communication.network.conditions import LEASE_MS
 from robochoc.communication.network.letters import LARGEST_LETTER
 
 RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}
 HEARTBEAT_S = 0.5
 """How soon a receiver learns that the last letter is missing."""
 KEPT_LETTERS = 100_000
-LEASE_MS = 10_000
-"""How long a link may be silent. TCP survives shorter outages by itself."""
 _LARGEST_BYTES = 4 * LARGEST_LETTER
 """What zenoh takes from the network at once. More than a letter, so that one that is too large is refused aloud."""
 

@@ -51,13 +51,16 @@ class Refusal(NamedTuple):
     why: str
 
 
+RefusalObserver = Callable[[Refusal], None]
+
+
 class Router:
     """Runs the router's process with the master's `identity`, on `endpoint` (`HOST:PORT`).
 
     `refused` is told of refusals, from a thread of its own. Whoever opens it closes it.
     """
 
-    def __init__(self, endpoint: str, identity: Identity, refused: Callable[[Refusal], None], lease_ms: int) -> None:
+    def __init__(self, endpoint: str, identity: Identity, refused: RefusalObserver, lease_ms: int) -> None:
         self.endpoint = endpoint
         self._identity = identity
         self._refused = refused

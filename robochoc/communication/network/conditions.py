@@ -1,0 +1,26 @@
+"""Under which conditions a run across machines takes place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+LEASE_MS = 10_000
+"""How long a link may be silent. TCP survives shorter outages by itself."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What the master is told besides the problem.
+
+    `filters` are the channel filters that messages go through. In a `private` run nobody tells its values. A robot may
+    be away for `patience_s`; a link that is silent for `lease_ms` counts as down. With `survive`, robots that are
+    lost break the search off, and are told of in its result; otherwise `RobotsLost` is raised. `protocol` is what the
+    Directory Facilitator says that robots speak.
+    """
+
+    filters: tuple[str, ...] = ()
+    private: bool = False
+    patience_s: float = 10.0
+    lease_ms: int = LEASE_MS
+    survive: bool = False
+    protocol: str = ""

@@ -1,0 +1,59 @@
+"""The gate: who may connect now, and write to whom. It follows the Authority's registry, and works the router."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+from robochoc.authority.admission import Admission
+from robochoc.authority.identity import Identity
+from robochoc.authority.registry import Role
+from robochoc.communication.network.router import RefusalObserver, Router
+
+Reach = Mapping[str, tuple[str, ...]]
+"""Who may take part, and to whom each may write besides the master."""
+
+
+class Gate:
+    """The router at `endpoint`, with rules that follow `admission`. Whoever opens it closes it."""
+
+    def __init__(
+        self, admission: Admission, identity: Identity, endpoint: str, refused: RefusalObserver, lease_ms: int
+    ) -> None:
+        self._admission = admission
+        self._router = Router(endpoint, identity, refused, lease_ms)
+        self._ways: Reach = {}
+        self._admitted: dict[str, tuple[str, ...]] | None = None
+
+    def open(self) -> None:
+        """Let in all whom the Authority has certified; they may write to the master."""
+        self.follow()
+
+    def open_ways(self, ways: Reach) -> None:
+        """From now on robots may write to those that `ways` names for them."""
+        self._ways = ways
+        self.follow()
+
+    def follow(self) -> None:
+        """Let in who was enrolled since, and keep out who was revoked. Raises `RouterFailed`."""
+        names = [*self._admission.names(Role.ROBOT), *self._admission.names(Role.OBSERVER)]
+        admitted = {name: self._ways.get(name, ()) for name in names if not self.is_revoked(name)}
+        if admitted != self._admitted:
+            self._admitted = admitted
+            self._router.open(admitted)
+
+    def is_revoked(self, name: str) -> bool:
+        """Whether `name` is to be turned away."""
+        return self._admission.is_revoked(name)
+
+    def revoked(self, names: Collection[str]) -> list[str]:
+        """Those of `names` that are to be turned away now."""
+        return [name for name in names if self.is_revoked(name)]
+
+    @property
+    def broken(self) -> bool:
+        """Whether the router's process is gone though nobody closed it."""
+        return self._router.ended
+
+    def close(self) -> None:
+        """Let everybody go."""
+        self._router.close()

@@ -1,0 +1,206 @@
+"""One epoch of a robot across machines: from the master's task to the account of what came of it.
+
+The loop around it is `robot.py`'s. What `robot_process.py` does between its queues and its host, this does between
+letters and a host.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from robochoc.communication.control import Conclusion, Counters, Events, Ready
+from robochoc.communication.host import Host
+from robochoc.communication.network.profile import BadProfile, among, domain_of
+from robochoc.communication.network.shared import BadShared, SharedRecord, known_of, record_of
+from robochoc.communication.network.words import Account, Checked, Copies, Said, Task, ToMaster
+from robochoc.communication.system import own_memory
+from robochoc.message import Envelope
+from robochoc.observers.events import AnyEvent
+from robochoc.problem import INFINITE, Model, Robot
+from robochoc.protocols.findings import NOTHING
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.encoding import Unsupported
+from robochoc.solver.explanation import Known, held
+from robochoc.solver.part import Brief, Part
+
+EVENTS_AT_ONCE = 500
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a searcher has around it: how it speaks to the master and to others, and what is wanted of it.
+
+    `place` is told the robot's place in the priority order, and how many robots there are.
+    """
+
+    say: Callable[[ToMaster], None]
+    send: Callable[[str, Said | Copies], None]
+    place: Callable[[int, int], None]
+    observed: bool
+    private: bool
+
+
+class Searcher:
+    """The robot `robot` in the epoch of `task`. `domain` is its compiled domain, None: it needs no solver for that."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        domain: CompiledDomain | None,
+        task: Task,
+        protocol: type[Protocol],
+        around: Surroundings,
+    ) -> None:
+        self.epoch = task.epoch
+        self._robot = among(robot, task.interfaces)
+        self._domain = domain
+        self._task = task
+        self._protocol = protocol
+        self._around = around
+        self._host: Host | None = None
+        self._copies: dict[str, tuple[SharedRecord, ...]] = {}
+        self._early: list[Envelope] = []
+        self._events: list[AnyEvent] = []
+        self._began = 0.0
+        self._sent = self._received = 0
+        self._told: tuple[int, int] | None = None
+        self._searching = self._concluded = self._paused = False
+
+    @property
+    def assignment(self) -> dict[str, int]:
+        """The own variables' values as decided; empty while there are none."""
+        return self._host.protocol.assignment if self._host else {}
+
+    @property
+    def restless(self) -> bool:
+        """Whether the master does not know the counters yet."""
+        return self._searching and self._told != (self._sent, self._received)
+
+    # Getting ready
+
+    def prepare(self) -> None:
+        """Tell others which constraints they have to know; get ready once all children have told. Raises `Unsupported`.
+
+        Only protocols whose order changes have more than the lowest robot know a constraint (`Traits.everywhere`).
+        """
+        if self._protocol.traits.everywhere:
+            owners = {name: agent for agent, names in self._task.interfaces.items() for name in names}
+            known = [one for one in held(self._robot) if one.constraint.model is not Model.PKC]
+            for parent in self._robot.parents:
+                theirs = [one for one in known if parent.name in {owners.get(v) for v in one.constraint.variables}]
+                self._around.send(parent.name, Copies(self.epoch, tuple(map(record_of, theirs))))
+        self._get_ready()
+
+    def learn(self, sender: str, constraints: tuple[SharedRecord, ...]) -> None:
+        """`sender` holds these constraints, and this robot is in their scopes. Raises `Unsupported`."""
+        self._copies[sender] = constraints
+        self._get_ready()
+
+    def _get_ready(self) -> None:
+        everywhere = self._protocol.traits.everywhere
+        if self._host or (everywhere and any(child.name not in self._copies for child in self._robot.children)):
+            return
+        self._host = Host.of(self._protocol, self._part())
+        if self._around.observed:
+            self._host.observe(self._events.append, self._now)
+        self._around.place(self._task.order.index(self._robot.name), len(self._task.order))
+        self._conclude(self._host)
+        self._around.say(Ready(self.epoch))
+
+    def _part(self) -> Part:
+        task = self._task
+        try:
+            copies = [known_of(record) for records in self._copies.values() for record in records]
+            domains = {name: domain_of(name, ranges) for name, ranges in task.domains.items()}
+        except (BadShared, BadProfile) as bad:
+            raise Unsupported(f"{self._robot.name} was told what cannot be: {bad}") from None
+        brief = Brief(task.seed, task.settings, task.aside)
+        own = (self._robot, task.order, task.interfaces, self._domain)
+        return Part(*own, _sorted(copies, task.order), domains, task.links, task.secretive, brief)
+
+    # Searching
+
+    def search(self) -> None:
+        """All are ready: begin."""
+        if self._host is None:
+            return
+        self._began = time.monotonic()
+        self._searching = True
+        self._told = (-1, -1)
+        self._send(self._host, self._host.start())
+        early, self._early = self._early, []
+        self.take_in(early)
+
+    def hear(self, envelope: Envelope) -> bool:
+        """Whether `envelope` belongs into the packet that is being made up; if not, it waits, or comes too late."""
+        if not self._searching and not self._paused:
+            self._early.append(envelope)
+        return self._searching
+
+    def take_in(self, packet: Sequence[Envelope]) -> None:
+        """Give the protocol all messages that wait. Raises `BadMessage`."""
+        if packet and self._host:
+            self._received += len(packet)
+            self._send(self._host, self._host.handle(packet))
+            if len(self._events) > EVENTS_AT_ONCE:
+                self.report_events()
+
+    def _send(self, host: Host, envelopes: Sequence[Envelope]) -> None:
+        for _, receiver, content, clock in envelopes:
+            self._around.send(receiver, Said(self.epoch, clock, content))
+        self._sent += len(envelopes)
+        self._conclude(host)
+
+    def _conclude(self, host: Host) -> None:
+        verdict = host.protocol.verdict
+        if verdict is not None and not self._concluded:
+            self._concluded = True
+            self._around.say(Conclusion(self.epoch, verdict))
+
+    # Reporting
+
+    def tell_counters(self, wave: int) -> None:
+        """Tell the master what was sent and taken in: in answer to `wave`, or (0) as there is nothing to do."""
+        self._told = (self._sent, self._received)
+        self._around.say(Counters(self.epoch, wave, *self._told))
+
+    def report_events(self) -> None:
+        """Tell the master what an observer is to be told."""
+        events, self._events[:] = list(self._events), []
+        for start in range(0, len(events), EVENTS_AT_ONCE):
+            self._around.say(Events(events[start : start + EVENTS_AT_ONCE]))
+
+    def pause(self) -> None:
+        """Be silent, and report: what still arrives is lost."""
+        self._searching, self._paused = False, True
+        self.report_events()
+        if self._host is None:
+            return
+        protocol, private = self._host.protocol, self._around.private
+        metrics = replace(self._host.metrics(), memory=own_memory())
+        assignment, findings = ({}, NOTHING) if private else (protocol.assignment, protocol.findings)
+        self._around.say(Account(self.epoch, protocol.value is not None, assignment, metrics, findings))
+
+    def judged(self, told: Mapping[str, int]) -> Checked:
+        """Hold all own constraints against what everybody has decided; of robots that stepped aside nothing is asked.
+
+        By the problem itself, not by the compiled constraints that the protocol works with.
+        """
+        values = {**told, **self.assignment}
+        parts = [part for child in self._robot.children for part in child.constraints]
+        own = self._robot.private if self.assignment else ()
+        constraints = [one for one in (*own, *self._robot.shared, *parts) if values.keys() >= set(one.variables)]
+        cost = sum(constraint.price(values) for constraint in constraints)
+        return Checked(self.epoch, cost < INFINITE, cost if cost < INFINITE else 0)
+
+    def _now(self) -> float:
+        return time.monotonic() - self._began
+
+
+def _sorted(copies: Sequence[Known], order: Sequence[str]) -> tuple[Known, ...]:
+    """In the order of those who hold them, as all runtimes have it, whoever was heard first."""
+    rank = {name: place for place, name in enumerate(order)}
+    return tuple(sorted(copies, key=lambda known: rank.get(known.key.partition("<")[0], -1)))
