@@ -16,10 +16,11 @@ CENTRAL = "central"
 
 
 class Runtime(StrEnum):
-    """Where robots live: each in its own OS process, or all in one thread."""
+    """Where robots live: each in its own OS process, all in one thread, or each in a process joined by a network."""
 
     PROCESSES = "processes"
     SIMULATOR = "simulator"
+    NETWORK = "network"
 
 
 class ScheduleName(StrEnum):
@@ -57,7 +58,8 @@ class Options:
     robot's domain; `cache` says whether solutions of local problems are kept in the user's cache folder. `count` is
     for the central judge: the number of all solutions. `verify` asks for a second opinion on a `no-solution`.
     `settings` are the protocol's, as text; its chance is drawn from `seed` too. With `on_loss` set to withdraw, robots
-    whose processes end leave the problem; up to `spares` of them come back.
+    whose processes end leave the problem; up to `spares` of them come back. `filters` are the
+    network's: the channel filters that messages go through.
     """
 
     protocol: str = SATISFIES
@@ -77,3 +79,4 @@ class Options:
     spares: int = 0
     channel: ChannelModel | None = None
     settings: Mapping[str, str] = field(default_factory=dict)
+    filters: tuple[str, ...] = ()

@@ -43,6 +43,17 @@ def refuse_unfit(team: Team, options: Options, protocol: type[Protocol]) -> None
         refuse(team, "--withdraw maximal", FirstFit.traits)
     if options.spares:
         refuse(team, "--spare", Traits(costs=True))
+    _refuse_network(team, options)
+
+
+def _refuse_network(team: Team, options: Options) -> None:
+    """What a run on a network cannot do, or only that can."""
+    if options.runtime is Runtime.NETWORK:
+        refuse_scenario(team, "--runtime network")
+        if options.spares:
+            raise Unsupported("--spare starts processes of this machine again; drop --runtime network")
+    elif options.filters:
+        raise Unsupported("--filter is for messages that cross a network; add --runtime network")
 
 
 def refuse_central(team: Team, options: Options) -> None:

@@ -337,7 +337,22 @@ class _Run:
 
             survive = self._options.on_loss is OnLoss.WITHDRAW
             return ProcessesRun(team, protocol, domains=domains, survive=survive, brief=brief, **watchers)
+        if self._options.runtime is Runtime.NETWORK:
+            return self._network(protocol, team, domains, brief)
         return Simulation(team, protocol, _schedule(self._options), domains=domains, brief=brief, **watchers)
+
+    def _network(
+        self, protocol: type[Protocol], team: Team, domains: Mapping[str, CompiledDomain], brief: Brief
+    ) -> Session:
+        try:
+            from robochoc.communication.network.conditions import Conditions  # noqa: PLC0415 - one runtime is enough
+            from robochoc.communication.network.local import LocalNetwork  # noqa: PLC0415 - and it is an extra
+        except ModuleNotFoundError as missing:
+            raise Unsupported(f"--runtime network needs {missing.name}; say: pip install 'robochoc[network]'") from None
+        survive = self._options.on_loss is OnLoss.WITHDRAW
+        conditions = Conditions(filters=self._options.filters, survive=survive)
+        watchers: _Watchers = {"observer": self._observer, "progress": self._progress}
+        return LocalNetwork(team, protocol, domains=domains, conditions=conditions, brief=brief, **watchers)
 
     def _announce(self, protocol: type[Protocol], number: int = 0, opened: str = "") -> None:
         if self._observer:

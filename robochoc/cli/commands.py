@@ -11,9 +11,12 @@ from robochoc.cli.animate import animate
 from robochoc.cli.authority import authority
 from robochoc.cli.cache import cache
 from robochoc.cli.compile import compile_team
+from robochoc.cli.directory import directory
 from robochoc.cli.export import export
 from robochoc.cli.generate import generate
+from robochoc.cli.master import master
 from robochoc.cli.protocols import protocols
+from robochoc.cli.robot import robot
 from robochoc.cli.solve import solve
 from robochoc.cli.validate import validate
 
@@ -45,7 +48,20 @@ def cli() -> None:
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
 
 
-for command in (solve, validate, generate, animate, compile_team, export, cache, protocols, authority):
+for command in (
+    solve,
+    validate,
+    generate,
+    animate,
+    compile_team,
+    export,
+    cache,
+    protocols,
+    authority,
+    master,
+    robot,
+    directory,
+):
     cli.add_command(command)
 
 

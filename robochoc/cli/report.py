@@ -57,9 +57,10 @@ def _epochs(outcome: Outcome) -> list[str]:
 
 def _place(team: Team, outcome: Outcome) -> str:
     match outcome.runtime:
-        case "processes":
+        case "processes" | "network":
             seed = f", seed {outcome.seed}" if outcome.order == "random" else ""
-            return f"{len(team.robots)} process{'es' * (len(team.robots) != 1)}{seed}"
+            joined = " on a network" * (outcome.runtime == "network")
+            return f"{len(team.robots)} process{'es' * (len(team.robots) != 1)}{joined}{seed}"
         case "central":
             return "ACE on all files merged"
         case _:

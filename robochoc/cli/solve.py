@@ -63,10 +63,13 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--runtime",
-    type=click.Choice(["processes", "simulator"]),
+    type=click.Choice(["processes", "simulator", "network"]),
     default="processes",
     show_default=True,
-    help="processes: one OS process per robot; simulator: one thread, repeatable.",
+    help=(
+        "processes: one OS process per robot; simulator: one thread, repeatable; network: processes that register with"
+        " a master and talk through it by mutual TLS, on this machine (see robochoc master)."
+    ),
 )
 @click.option(
     "--seed",
@@ -138,6 +141,13 @@ if TYPE_CHECKING:
         "N robots that die (1, without a number) come back: their files are read again, and they join at the end of"
         " the order. Implies --on-loss withdraw."
     ),
+)
+@click.option(
+    "--filter",
+    "filters",
+    multiple=True,
+    metavar="NAME",
+    help="Network only: signed or sealed, or an installed filter; messages go through all of them, in this order.",
 )
 @click.option("--explain", is_flag=True, help="Show the pseudo-tree too, if the robots have built one.")
 @click.option("--count", is_flag=True, help="With --protocol central: count all solutions.")

@@ -66,21 +66,38 @@ def protocol_settings(given: Iterable[str]) -> dict[str, str]:
 
 def check_settings(settings: dict[str, Any]) -> None:
     """Options that would be ignored are wrong usage."""
-    if settings["channel"] and settings["runtime"] != "simulator":
-        raise click.UsageError("--channel is the simulator's; add --runtime simulator")
-    if settings["channel"] and (settings["delay"] or settings["schedule"] != "concurrent"):
-        raise click.UsageError("--channel says how long messages take; drop --delay and --schedule random")
-    if settings["runtime"] != "simulator" and (settings["delay"] or settings["schedule"] != "concurrent"):
-        raise click.UsageError("--delay and --schedule are the simulator's; add --runtime simulator")
+    _check_simulated(settings)
     if settings["timeout"] is not None and not settings["timeout"] > 0:
         raise click.UsageError("--timeout takes a number of seconds")
-    if settings["delay"] and settings["schedule"] != "concurrent":
-        raise click.UsageError("--delay is for --schedule concurrent: in a random one any message may take any time")
     if settings["protocol"] == "central":
         _check_central(settings)
     elif settings["count"]:
         raise click.UsageError("--count is for --protocol central")
-    if (settings["on_loss"] or settings["spares"]) and settings["runtime"] != "processes":
+    _check_processes(settings)
+
+
+def _check_simulated(settings: dict[str, Any]) -> None:
+    """How long messages take is for the simulator alone, and to be said in one way."""
+    simulated = settings["runtime"] == "simulator"
+    scheduled = settings["delay"] or settings["schedule"] != "concurrent"
+    if settings["channel"] and not simulated:
+        raise click.UsageError("--channel is the simulator's; add --runtime simulator")
+    if settings["channel"] and scheduled:
+        raise click.UsageError("--channel says how long messages take; drop --delay and --schedule random")
+    if scheduled and not simulated:
+        raise click.UsageError("--delay and --schedule are the simulator's; add --runtime simulator")
+    if settings["delay"] and settings["schedule"] != "concurrent":
+        raise click.UsageError("--delay is for --schedule concurrent: in a random one any message may take any time")
+
+
+def _check_processes(settings: dict[str, Any]) -> None:
+    """What only robots with processes can do, or only those on a network."""
+    runtime = settings["runtime"]
+    if settings["filters"] and runtime != "network":
+        raise click.UsageError("--filter is for messages that cross a network; add --runtime network")
+    if settings["spares"] and runtime == "network":
+        raise click.UsageError("--spare starts processes of this machine again; drop --runtime network")
+    if (settings["on_loss"] or settings["spares"]) and runtime == "simulator":
         raise click.UsageError(
             "--on-loss and --spare are for processes, which can die; drop --runtime simulator, or write a scenario.xml"
         )
@@ -92,10 +109,10 @@ def _check_central(settings: dict[str, Any]) -> None:
     """There are no robots, and no second opinion."""
     if settings["verify"]:
         raise click.UsageError("--verify asks ACE, which is --protocol central itself")
-    asked = {name: settings[name] for name in ("messages", "on_loss", "spares", "channel")}
+    asked = {name: settings[name] for name in ("messages", "on_loss", "spares", "channel", "filters")}
     asked["order"] = settings["order"] != GIVEN
     asked["set"] = settings["settings_given"]
     for name, value in asked.items():
         if value:
-            option = "--" + name.removesuffix("s" if name == "spares" else "").replace("_", "-")
+            option = "--" + name.removesuffix("s" if name in {"spares", "filters"} else "").replace("_", "-")
             raise click.UsageError(f"{option} is for robots that solve it together, not for --protocol central")

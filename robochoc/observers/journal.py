@@ -65,7 +65,7 @@ class Recorder:
 
     def __call__(self, event: AnyEvent) -> None:
         """Take in one event. `Began` opens a run; times are compared within a run only."""
-        if isinstance(event, Began):
+        if isinstance(event, Began) or not self._runs:  # across machines somebody may be refused before anybody begins
             self._runs.append([])
         self._runs[-1].append(event)
 

@@ -26,7 +26,7 @@ from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.post import CannotConnect, Post
-from robochoc.communication.network.robot import NetworkRobot
+from robochoc.communication.network.robot import Manner, NetworkRobot
 from robochoc.communication.network.router import RouterFailed
 from robochoc.communication.robot_link import fate_of
 from robochoc.communication.run_result import Progress, RunResult
@@ -92,7 +92,7 @@ class LocalNetwork(Session):
                 self._household,
                 self._household.master_identity((LOOPBACK,)),
                 endpoint,
-                Members(team.order),
+                Members(team.order, order=team.order),
                 conditions,
                 observer=observer,
                 watched=watched,
@@ -210,14 +210,7 @@ def robot_process(given: Given) -> None:
 
     try:
         with Post(given.endpoint, identity, watch=(), patience_s=START_S) as post:
-            NetworkRobot(
-                given.robot,
-                given.domain,
-                identity,
-                post,
-                lambda _name: given.protocol,
-                patience_s=given.patience_s,
-                place=take_place,
-            ).run()
+            manner = Manner(given.patience_s, place=take_place)
+            NetworkRobot(given.robot, given.domain, identity, post, lambda _name: given.protocol, manner).run()
     except CannotConnect as error:
         sys.exit(str(error))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from robochoc.communication.network.access import ALL
@@ -49,11 +49,15 @@ class Members:
     """All registered robots, by name.
 
     `expected` names who alone may come (None: whoever the Authority lets in), `number` says how many do. Without either
-    the team is complete when every neighbour that a robot names is there.
+    the team is complete when every neighbour that a robot names is there. `order` is the priority order, where it is
+    known before; parents come before their children in it.
     """
 
-    def __init__(self, expected: Collection[str] | None = None, number: int | None = None) -> None:
+    def __init__(
+        self, expected: Collection[str] | None = None, number: int | None = None, order: Sequence[str] | None = None
+    ) -> None:
         self.expected = expected
+        self._order = order
         self.number = number
         self.robots: dict[str, Member] = {}
         self.closed = False
@@ -115,6 +119,8 @@ class Members:
     @property
     def order(self) -> tuple[str, ...]:
         """The total priority order of those that are there."""
+        if self._order is not None:
+            return tuple(name for name in self._order if name in self.robots)
         return tuple(in_priority_order(self.profiles))
 
     def reach(self, *, beyond: bool) -> dict[str, tuple[str, ...]]:

@@ -11,6 +11,7 @@ import secrets
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from queue import Empty
 from typing import NamedTuple
 
@@ -74,12 +75,29 @@ class _Over(Exception):  # noqa: N818 - not an error: the way out of the loop
         self.failed = failed
 
 
+def _nothing(*_told: object) -> None:
+    """Who is told things that nobody wants to know."""
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How a robot takes part.
+
+    `patience_s` is how long the master may be gone. `sniffed`: the master's observers are to be told of all that the
+    robot does, even if they do not ask for it. `place` is told the robot's place in the priority order, and how many
+    robots there are, before each search; `stage` in a few words how far it is.
+    """
+
+    patience_s: float = 10.0
+    sniffed: bool = False
+    place: Callable[[int, int], None] = _nothing
+    stage: Callable[[str], None] = _nothing
+
+
 class NetworkRobot:
     """The robot `robot` at its `post`, with its compiled `domain` (None: it needs no solver for that).
 
-    `protocol_named` finds the protocol that the master asks for; it raises `LookupError`. `patience_s` is how long the
-    master may be gone. `place` is told the robot's place in the priority order before each search, and `stage` in a few
-    words how far it is.
+    `protocol_named` finds the protocol that the master asks for; it raises `LookupError`.
     """
 
     def __init__(
@@ -89,19 +107,14 @@ class NetworkRobot:
         identity: Identity,
         post: Post,
         protocol_named: Callable[[str], type[Protocol]],
-        *,
-        patience_s: float = 10.0,
-        place: Callable[[int, int], None] = lambda _rank, _size: None,
-        stage: Callable[[str], None] = lambda _stage: None,
+        manner: Manner = Manner(),
     ) -> None:
         self._robot = robot
         self._domain = domain
         self._identity = identity
         self._post = post
         self._protocol_named = protocol_named
-        self._patience_s = patience_s
-        self._place = place
-        self._stage = stage
+        self._manner = manner
         self._letters = Letters(robot.name)
         self._visit = secrets.token_hex(_VISIT_BYTES)
         self._ring: KeyRing | None = None
@@ -176,8 +189,8 @@ class NetworkRobot:
                 self._register()
             return
         self._away = True
-        if now - self._connected > self._patience_s:
-            raise _Over(f"the master is gone: no link to it for {self._patience_s:g} s", failed=True)
+        if now - self._connected > self._manner.patience_s:
+            raise _Over(f"the master is gone: no link to it for {self._manner.patience_s:g} s", failed=True)
 
     # Letters
 
@@ -261,7 +274,7 @@ class NetworkRobot:
             case Task():
                 self._take_task(word)
             case Search(epoch) if searcher and epoch == searcher.epoch:
-                self._stage("searching")
+                self._manner.stage("searching")
                 searcher.search()
             case Wave(number) if searcher:
                 searcher.tell_counters(number)
@@ -295,7 +308,7 @@ class NetworkRobot:
                 raise Unsupported(f"{self._robot.name}: {unknown}") from None
             card = self._ring.card.encode()
         self._say(Joined(card))
-        self._stage("registered, waiting for the others")
+        self._manner.stage("registered, waiting for the others")
 
     def _take_task(self, task: Task) -> None:
         """A new epoch."""
@@ -306,7 +319,8 @@ class NetworkRobot:
             protocol = self._protocol_named(task.protocol)
         except LookupError as unknown:
             raise Unsupported(f"{self._robot.name}: {unknown}") from None
-        around = Surroundings(self._say, self._send, self._place, self._welcome.observed, self._welcome.private)
+        observed = self._welcome.observed or self._manner.sniffed
+        around = Surroundings(self._say, self._send, self._manner.place, observed, self._welcome.private)
         self._searcher = Searcher(self._robot, self._domain, task, protocol, around)
         self._searcher.prepare()
         ahead, self._ahead = self._ahead, []
@@ -330,7 +344,7 @@ class NetworkRobot:
         if self._welcome is None:
             return
         self._say(word)
-        until = time.monotonic() + self._patience_s
+        until = time.monotonic() + self._manner.patience_s
         while time.monotonic() < until and self._post.connected:
             for item in self._items():
                 if isinstance(item, Arrived) and item.sender == MASTER and self._is_leave(item.content):

@@ -18,7 +18,7 @@ from robochoc.communication.network.words import Account, Checked, Copies, Said,
 from robochoc.communication.system import own_memory
 from robochoc.message import Envelope
 from robochoc.observers.events import AnyEvent
-from robochoc.problem import INFINITE, Model, Robot
+from robochoc.problem import INFINITE, Kind, Model, Robot
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.domain import CompiledDomain
@@ -27,6 +27,7 @@ from robochoc.solver.explanation import Known, held
 from robochoc.solver.part import Brief, Part
 
 EVENTS_AT_ONCE = 500
+PAIR = 2
 
 
 @dataclass(frozen=True)
@@ -86,13 +87,27 @@ class Searcher:
 
         Only protocols whose order changes have more than the lowest robot know a constraint (`Traits.everywhere`).
         """
+        owners = {name: agent for agent, names in self._task.interfaces.items() for name in names}
+        self._refuse_unfit(owners)
         if self._protocol.traits.everywhere:
-            owners = {name: agent for agent, names in self._task.interfaces.items() for name in names}
             known = [one for one in held(self._robot) if one.constraint.model is not Model.PKC]
             for parent in self._robot.parents:
                 theirs = [one for one in known if parent.name in {owners.get(v) for v in one.constraint.variables}]
                 self._around.send(parent.name, Copies(self.epoch, tuple(map(record_of, theirs))))
         self._get_ready()
+
+    def _refuse_unfit(self, owners: Mapping[str, str]) -> None:
+        """Raise `Unsupported` for what the own file asks and the protocol cannot do: nobody else has seen the file."""
+        robot, traits = self._robot, self._protocol.traits
+        refused = f", which {self._task.protocol} does not support"
+        if robot.kind is Kind.DISWCSP and not traits.costs:
+            raise Unsupported(f"{robot.name} is part of a DisWCSP{refused}")
+        parts = [part for child in robot.children for part in child.constraints]
+        for constraint in (*robot.shared, *parts):
+            if constraint.model is Model.PKC and not traits.partially_known:
+                raise Unsupported(f"{robot.name} shares a partially known constraint (PKC, {constraint.name}){refused}")
+            if not traits.n_ary and len({owners.get(variable) for variable in constraint.variables}) > PAIR:
+                raise Unsupported(f"{robot.name} holds a constraint over more than two robots{refused}")
 
     def learn(self, sender: str, constraints: tuple[SharedRecord, ...]) -> None:
         """`sender` holds these constraints, and this robot is in their scopes. Raises `Unsupported`."""

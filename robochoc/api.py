@@ -1,0 +1,189 @@
+"""robochoc as a library: `robochoc.load(path).solve()`, and the paper's `AgentsContainer` (Figures 3 and 4).
+
+    >>> import robochoc
+    >>> outcome = robochoc.load("instances/queens3d-4").solve(runtime="simulator")
+    >>> outcome.verdict
+    <Verdict.NO_SOLUTION: 'no-solution'>
+
+Both are thin, and on the same code as the command line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robochoc.defaults import MINIMISES
+from robochoc.formats import read_team
+from robochoc.observers.events import Observer
+from robochoc.options import Options, Runtime, Withdrawal
+from robochoc.orders import Order
+from robochoc.outcome import Outcome
+from robochoc.problem import Kind, Team
+from robochoc.registry import UnknownProtocol, offers
+from robochoc.run import solve
+
+if TYPE_CHECKING:
+    from robochoc.communication.network.robot import Ending
+    from robochoc.machines.place import Place
+
+_MASTER, _AGENT = "Master", "Agent"
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A team that was read and found valid: `team` is its data."""
+
+    team: Team
+
+    def solve(
+        self,
+        protocol: str | None = None,
+        runtime: str = Runtime.PROCESSES,
+        *,
+        order: str | None = None,
+        withdraw: str | None = None,
+        settings: Mapping[str, object] = {},
+        observer: Observer | None = None,
+        **options: Any,  # noqa: ANN401 - the other fields of `Options`, by their names
+    ) -> Outcome:
+        """Let the robots solve it together; see `robochoc.options.Options` for what else can be said.
+
+        Without a `protocol`, the one that suits the team. Raises what `robochoc.run.solve` raises, and `ValueError` or
+        `TypeError` where an option is none. A program that starts processes is to do so below
+        `if __name__ == "__main__":`.
+        """
+        default = Options()
+        suits = replace(default, protocol=default.protocol if self.team.kind is Kind.DISCSP else MINIMISES)
+        asked = replace(
+            suits,
+            runtime=Runtime(runtime),
+            order=Order(order) if order else None,
+            withdraw=Withdrawal(withdraw) if withdraw else None,
+            settings={name: str(value) for name, value in settings.items()},
+            **options,
+        )
+        return solve(self.team, replace(asked, protocol=protocol) if protocol else asked, observer=observer)
+
+
+def load(path: Path | str) -> Problem:
+    """The team in the folder `path`. Raises `InvalidInput` with every mistake's file and line."""
+    return Problem(read_team(Path(path)))
+
+
+@dataclass
+class AgentsContainer:
+    """What runs on one machine of several: the master, or robots. The paper's, line by line in Python's spelling.
+
+    Figure 3, the master's machine:
+
+        main_container = AgentsContainer()
+        main_container.set_agent_type("MasterABT")
+        main_container.add_agent("MASTER", sniff=False)
+        main_container.run()
+
+    Figure 4, a robot's:
+
+        container = AgentsContainer()
+        container.set_agent_type("AgentABT")
+        container.add_agent("Robot3.1", "Robot3.1.xml", sniff=True)
+        container.set_main_container("192.168.1.14")
+        container.run()
+
+    The type's second part names the protocol, as its class is called (`MasterAFCng`) or as it is installed. `run`
+    returns the outcome on the master's machine, and on a robot's how it ended there, by its name. Where the Authority
+    is, where to listen, tokens and identities are as on the command line: `set_listen`, `set_authority`, `set_identity`.
+    """
+
+    _type: str = ""
+    _agents: dict[str, tuple[Path | None, bool]] = field(default_factory=dict)
+    _main: Place | None = None
+    _listen: Place | None = None
+    _authority: Path | None = None
+    _identities: dict[str, tuple[Path | None, str | None]] = field(default_factory=dict)
+
+    def set_agent_type(self, kind: str) -> None:
+        """`MasterABT`, `AgentABT`: which end this is, and the protocol. Raises `ValueError`, `UnknownProtocol`."""
+        if not kind.startswith((_MASTER, _AGENT)):
+            raise ValueError(f"{kind!r} is no type of agent: MasterABT or AgentABT, or with another protocol's name")
+        protocol_called(kind.removeprefix(_MASTER).removeprefix(_AGENT))
+        self._type = kind
+
+    def add_agent(self, name: str, file: Path | str | None = None, *, sniff: bool = False) -> None:
+        """Run the agent `name`: a robot with its `file`, or the master, which has none.
+
+        `sniff`: whoever watches at the master is told of all that it says and hears.
+        """
+        self._agents[name] = (None if file is None else Path(file), sniff)
+
+    def set_main_container(self, place: str) -> None:
+        """Where the master listens: `HOST` or `HOST:PORT`. Raises `BadPlace`."""
+        from robochoc.machines.place import Place  # noqa: PLC0415 - an extra
+
+        self._main = Place.parse(place)
+
+    def set_listen(self, place: str) -> None:
+        """The master: listen here, instead of on loopback. Raises `BadPlace`."""
+        from robochoc.machines.place import Place  # noqa: PLC0415 - an extra
+
+        self._listen = Place.parse(place)
+
+    def set_authority(self, folder: Path | str) -> None:
+        """The master: the Authority's folder, instead of the user's own."""
+        self._authority = Path(folder)
+
+    def set_identity(self, name: str, folder: Path | str | None = None, token: str | None = None) -> None:
+        """A robot: where its key and certificate are, and a token, if it has to get them first."""
+        self._identities[name] = (None if folder is None else Path(folder), token)
+
+    def run(self, observer: Observer | None = None, **plan: Any) -> Outcome | dict[str, Ending]:  # noqa: ANN401
+        """Be the master, or the robots, of one run. `plan` holds further fields of `robochoc.machines.lead.Plan`.
+
+        Raises what `lead` and `join` raise.
+        """
+        if not self._type:
+            raise ValueError("say first what this container is: set_agent_type('MasterABT') or ('AgentABT')")
+        if self._type.startswith(_MASTER):
+            return self._lead(observer, plan)
+        return self._join()
+
+    def _lead(self, observer: Observer | None, plan: Mapping[str, Any]) -> Outcome:
+        from robochoc.authority.authority import default_folder  # noqa: PLC0415 - an extra
+        from robochoc.machines.lead import HERE, Plan, lead  # noqa: PLC0415 - the same
+
+        protocol = protocol_called(self._type.removeprefix(_MASTER))
+        folder = self._authority or default_folder()
+        watched = any(sniff for _, sniff in self._agents.values())
+        asked = Plan(folder, self._listen or HERE, protocol=protocol, **plan)
+        return lead(asked, observer=observer, watched=watched).outcome
+
+    def _join(self) -> dict[str, Ending]:
+        from concurrent.futures import ThreadPoolExecutor  # noqa: PLC0415 - robots' machines only
+
+        if self._main is None or not self._agents:
+            raise ValueError("a robot needs its file and its master: add_agent(name, file), set_main_container(host)")
+        with ThreadPoolExecutor(len(self._agents)) as pool:
+            running = {name: pool.submit(self._robot, name, self._main) for name in self._agents}
+            return {name: robot.result() for name, robot in running.items()}
+
+    def _robot(self, name: str, main: Place) -> Ending:
+        from robochoc.communication.network.robot import Manner  # noqa: PLC0415 - an extra
+        from robochoc.machines.join import PATIENCE_S, identity_of, join  # noqa: PLC0415 - the same
+        from robochoc.solver.compile import Compiler  # noqa: PLC0415 - the same
+
+        file, sniff = self._agents[name]
+        if file is None or file.stem != name:
+            raise ValueError(f"{name} needs its file, {name}.xml")
+        identity = identity_of(name, main, *self._identities.get(name, (None, None)))
+        with Compiler() as compiler:
+            return join(file, main, identity, Manner(PATIENCE_S, sniffed=sniff), compiler)
+
+
+def protocol_called(word: str) -> str:
+    """The installed name of the protocol that the paper's type names: `ABT` is `abt`. Raises `UnknownProtocol`."""
+    for offer in offers():
+        if offer.protocol and word.casefold() in {offer.name.casefold(), offer.protocol.__name__.casefold()}:
+            return offer.name
+    raise UnknownProtocol(f"no protocol {word!r} is installed; robochoc protocols lists them")

@@ -1,0 +1,86 @@
+"""`robochoc directory`: ask a running master's Directory Facilitator who is there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from robochoc.cli.network import PlaceType, network_failures_told
+from robochoc.cli.paths import InputPath
+
+if TYPE_CHECKING:
+    from robochoc.machines.place import Place
+    from robochoc.services.descriptions import AgentDescription
+
+
+@click.command(short_help="Ask a running master who is there, and offers what.")
+@click.option(
+    "--master", "place", type=PlaceType(), required=True, metavar="HOST:PORT", help="Where the master listens."
+)
+@click.option(
+    "--as", "name", required=True, metavar="NAME", help="Who asks: an enrolled name (--role observer will do)."
+)
+@click.option("--token", metavar="TOKEN", help="Enrol with this token first.")
+@click.option(
+    "--identity",
+    type=InputPath(),
+    metavar="DIR",
+    help="Where the key and the certificate are  [default: robochoc/identities/NAME in your data folder]",
+)
+@click.option(
+    "--search",
+    "slots",
+    multiple=True,
+    metavar="SLOT=VALUE",
+    help="Only who matches: protocol=abt, variable=V3.1, topic=..., name=Robot3.1, ontology=..., language=...",
+)
+@click.option("--at-most", type=click.IntRange(1), metavar="N", help="At most so many agents.")
+@click.option("--sl", is_flag=True, help="Print the answer as it comes: FIPA-SL0.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object an agent.")
+def directory(
+    place: Place,
+    name: str,
+    token: str | None,
+    identity: Path | None,
+    slots: tuple[str, ...],
+    at_most: int | None,
+    *,
+    sl: bool,
+    as_json: bool,
+) -> None:
+    """List the agents that a running master's Directory Facilitator knows: their protocols, variables and topics.
+
+    A search gives back who matches all that is asked for.
+    """
+    if sl and as_json:
+        raise click.UsageError("--sl and --json are two forms of one answer; drop one")
+    with network_failures_told(place):
+        from robochoc.machines.consult import consult, found, search_words
+        from robochoc.machines.join import identity_of
+
+        words = search_words(place, slots, at_most)
+        answer = consult(place, identity_of(name, place, identity, token), words)
+        if sl:
+            click.echo(answer)
+            return
+        agents = found(answer)
+        if as_json:
+            import msgspec
+
+            for agent in agents:
+                click.echo(msgspec.json.encode(agent).decode())
+        else:
+            _print_table(agents)
+
+
+def _print_table(agents: tuple[AgentDescription, ...]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("agent", "protocols", "variables", "topics")
+    for agent in agents:
+        kinds = {kind: [one.name for one in agent.services if one.type == kind] for kind in ("variable", "topic")}
+        table.add_row(agent.name, ", ".join(agent.protocols), ", ".join(kinds["variable"]), ", ".join(kinds["topic"]))
+    Console().print(table if agents else "nobody that matches")

@@ -1,0 +1,95 @@
+"""`robochoc robot`: one robot, on its own machine (Figure 4)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from robochoc.cli.failure import LOST, Failure
+from robochoc.cli.local import limits, local_options
+from robochoc.cli.network import PlaceType, network_failures_told
+from robochoc.cli.paths import InputPath
+from robochoc.cli.progress import progress_line
+
+if TYPE_CHECKING:
+    from robochoc.machines.place import Place
+
+
+@click.command(short_help="Be one robot, on its own machine, in a master's run.")
+@click.argument("file", type=InputPath())
+@click.option(
+    "--master", "place", type=PlaceType(), required=True, metavar="HOST:PORT", help="Where the master listens."
+)
+@click.option("--token", metavar="TOKEN", help="Enrol with this token first (robochoc authority enrol has printed it).")
+@click.option(
+    "--identity",
+    type=InputPath(),
+    metavar="DIR",
+    help="Where the robot's key and certificate are  [default: robochoc/identities/NAME in your data folder]",
+)
+@click.option(
+    "--patience",
+    type=click.FloatRange(0, min_open=True),
+    default=30.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="How long the master may be out of reach, at the beginning and later.",
+)
+@click.option("--sniff", is_flag=True, help="Let the master's journal have all that this robot says and hears.")
+@local_options
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
+@click.pass_context
+def robot(
+    context: click.Context,
+    /,
+    file: Path,
+    place: Place,
+    *,
+    token: str | None,
+    identity: Path | None,
+    as_json: bool,
+    **given: Any,  # noqa: ANN401 - how it takes part and compiles
+) -> None:
+    """Be the robot of FILE in the next run of the master, until that is over.
+
+    The robot knows its own file and nothing else. The first time it needs a token, with which it gets its certificate;
+    afterwards it proves with that who it is, and renews it by itself.
+    """
+    with network_failures_told(file):
+        from robochoc.communication.network.robot import Manner
+        from robochoc.communication.run_result import Progress
+        from robochoc.machines.join import identity_of, join
+        from robochoc.solver.cache import SolutionCache
+        from robochoc.solver.compile import Compiler
+
+        with progress_line(file.stem) as progress:
+            began = _seconds()
+
+            def stage(words: str) -> None:
+                if progress:
+                    progress(Progress(0, _seconds() - began, words))
+
+            proof = identity_of(file.stem, place, identity, token)
+            manner = Manner(given["patience"], sniffed=given["sniff"], stage=stage)
+            cache = None if given["no_cache"] else SolutionCache()
+            with Compiler(limits(given["local_solutions"], given["local_timeout"]), cache) as compiler:
+                ending = join(file, place, proof, manner, compiler)
+        if ending.failed:
+            raise Failure(LOST, f"{file.stem}: {ending.why}")
+        if as_json:
+            import msgspec
+
+            told = {"robot": file.stem, "outcome": ending.why, "assignment": ending.assignment}
+            click.echo(msgspec.json.encode(told).decode())
+        else:
+            decision = ", ".join(f"{name} = {value}" for name, value in ending.assignment.items())
+            click.echo(f"{file.stem}: {ending.why}; {decision or 'no value'}")
+    context.exit(0)
+
+
+def _seconds() -> float:
+    import time
+
+    return time.monotonic()

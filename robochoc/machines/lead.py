@@ -1,0 +1,223 @@
+"""A whole run from the master's side: open, gather, search, let robots step aside, check, tell the outcome.
+
+Section 5.2: "The master waits for the confirmation of creation all agents before ordering the start of the search."
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import NamedTuple
+
+from robochoc.answers import Refuted
+from robochoc.anytime import bound_of, joined, tree_of
+from robochoc.authority.authority import Authority
+from robochoc.authority.enrolment_server import EnrolmentServer
+from robochoc.communication.host import BadSettings, settings_of
+from robochoc.communication.network.conditions import Conditions
+from robochoc.communication.network.master import Master
+from robochoc.communication.network.members import Members
+from robochoc.communication.robot_link import RobotsLost
+from robochoc.communication.run_result import Progress, RunResult
+from robochoc.defaults import MINIMISES, SATISFIES
+from robochoc.machines.place import LOOPBACK, Place
+from robochoc.machines.speaking import FIRST_FIT, spoken
+from robochoc.observers.events import Observer
+from robochoc.options import Withdrawal
+from robochoc.outcome import Outcome, Verdict
+from robochoc.problem import Kind, Team
+from robochoc.protocols.traits import Traits
+from robochoc.solver.encoding import Unsupported
+from robochoc.solver.part import Brief
+
+HERE = Place(LOOPBACK)
+"""Anything but loopback must be asked for."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a master is to do.
+
+    `place` is where it listens, `hosts` how robots may call that place besides. `names` says who is in the team, or
+    `number` how many are; without either the team is complete when every neighbour that somebody names is there.
+    `protocol` is by default the one that suits the team. `timeout` counts from when the team is complete, `gather_s`
+    is how long that may take (seconds; None: no limit). `authority` is the folder of the Authority.
+    """
+
+    authority: Path
+    place: Place = HERE
+    hosts: tuple[str, ...] = ()
+    name: str = "team"
+    names: tuple[str, ...] | None = None
+    number: int | None = None
+    protocol: str | None = None
+    settings: Mapping[str, str] = field(default_factory=dict)
+    seed: int = 0
+    withdraw: Withdrawal | None = None
+    gather_s: float | None = None
+    timeout: float | None = None
+    messages: int | None = None
+    conditions: Conditions = Conditions()
+
+
+class Led(NamedTuple):
+    """The outcome, and what the master knows of the team: silhouettes, without any constraint."""
+
+    outcome: Outcome
+    team: Team
+
+
+def lead(
+    plan: Plan,
+    *,
+    observer: Observer | None = None,
+    watched: bool = False,
+    progress: Callable[[Progress], None] | None = None,
+    listening: Callable[[], None] = lambda: None,
+) -> Led:
+    """Be the master of one run. `listening` is called once robots can come.
+
+    Raises `BadAuthority`, `BadHost`, `RouterFailed`, `RobotsLost`, `Unsupported`, `UnknownProtocol`, `Refuted`, and
+    `OSError` when the enrolment service cannot listen.
+    """
+    if plan.protocol:
+        _check_settings(plan.protocol, plan.settings)
+    authority = Authority.open(plan.authority, observer=observer or (lambda _event: None))
+    hosts = [*([] if plan.place.anywhere else [plan.place.host]), *plan.hosts]
+    if not hosts:
+        raise Unsupported(f"{plan.place} is every address and the name of none; say how robots call it: --host NAME")
+    identity = authority.master_identity(hosts)
+    conditions = replace(plan.conditions, protocol=plan.protocol or "")
+    members = Members(plan.names, plan.number)
+    master = Master(
+        authority, identity, str(plan.place), members, conditions, observer=observer, watched=watched, progress=progress
+    )
+    service = EnrolmentServer(authority, identity, plan.place.host, plan.place.enrolment_port)
+    with service, master:
+        listening()
+        return _Lead(plan, master).run()
+
+
+class _Lead:
+    """One run, once the master listens."""
+
+    def __init__(self, plan: Plan, master: Master) -> None:
+        self._plan = plan
+        self._master = master
+        self._lost: dict[str, str] = {}
+        self._outcome = Outcome(plan.name, plan.protocol or SATISFIES, "network", plan.seed, Verdict.UNKNOWN)
+
+    def run(self) -> Led:
+        try:
+            outcome = self._solved()
+        except BaseException as error:
+            failure = isinstance(error, RobotsLost | Unsupported | Refuted)
+            self._master.leave(f"the run was broken off: {error if failure else 'the master has stopped'}", failed=True)
+            raise
+        self._master.leave(_in_words(outcome))
+        return Led(outcome, self._team())
+
+    def _solved(self) -> Outcome:
+        plan, members = self._plan, self._master.members
+        if not self._master.gather(None if plan.gather_s is None else time.monotonic() + plan.gather_s):
+            awaited = ", ".join(sorted(members.awaited)[:5]) or "more robots"
+            raise RobotsLost({"the team": f"it was not complete after {plan.gather_s:g} s; awaited: {awaited}"})
+        kind = self._team().kind
+        protocol = plan.protocol or (SATISFIES if kind is Kind.DISCSP else MINIMISES)
+        _check_settings(protocol, plan.settings)
+        self._outcome = replace(self._outcome, protocol=protocol)
+        traits = spoken(protocol).traits
+        at_once = plan.withdraw is Withdrawal.FEWEST and traits.costs
+        result = self._search(protocol, traits, self._brief(aside=at_once))
+        outcome = self._answered(result, traits, aside=at_once)
+        if outcome.verdict is not Verdict.NO_SOLUTION or plan.withdraw is None or at_once:
+            return outcome
+        fewest = plan.withdraw is Withdrawal.FEWEST
+        second = MINIMISES if fewest else FIRST_FIT
+        self._outcome = replace(self._outcome, metrics=outcome.metrics, witness=outcome.witness, placed_by=second)
+        traits = spoken(second).traits
+        return self._answered(self._search(second, traits, self._brief(aside=fewest)), traits, aside=True)
+
+    def _search(self, protocol: str, traits: Traits, brief: Brief) -> RunResult:
+        """Search until robots stop getting lost; without `survive` the first loss raises `RobotsLost`."""
+        plan, master = self._plan, self._master
+        deadline = None if plan.timeout is None else time.monotonic() + plan.timeout
+        while True:
+            left = None if deadline is None else max(0.0, deadline - time.monotonic())
+            result = master.search(protocol, traits, brief, left, plan.messages)
+            self._outcome = replace(self._outcome, metrics=self._outcome.metrics + result.metrics)
+            if not result.lost:
+                return result
+            self._lost |= result.lost
+            master.members.remove(result.lost)
+            if not master.members.robots:
+                raise RobotsLost(self._lost)
+
+    def _answered(self, result: RunResult, traits: Traits, *, aside: bool) -> Outcome:
+        """What `result` comes to, once every robot has checked its own constraints. Raises `Refuted`."""
+        outcome = replace(
+            self._outcome,
+            verdict=result.verdict,
+            witness=result.witness or self._outcome.witness,
+            tree=tree_of(result.findings),
+            bound=bound_of(result.findings) if result.verdict is Verdict.UNKNOWN else None,
+            lost=tuple(self._lost),
+            withdrawn=tuple(self._lost),
+        )
+        ended = result.verdict is Verdict.SOLUTION
+        if result.verdict is Verdict.UNKNOWN:
+            outcome = replace(outcome, reason=self._limit())
+        if result.verdict is Verdict.NO_SOLUTION or not (ended or traits.costs):
+            return outcome
+        proven = ended and (traits.complete or not traits.costs)
+        out = tuple(name for name in self._master.members.order if not self._master.tally.assigned.get(name))
+        if ended and aside:
+            outcome = replace(outcome, withdrawn=(*outcome.withdrawn, *out))
+        verdict = self._verdict(traits, aside=bool(out)) if proven else Verdict.UNKNOWN
+        if self._plan.conditions.private:
+            reason = "every robot knows its own values, and nobody else's (--private)"
+            return replace(outcome, verdict=verdict, reason=reason)
+        held, cost = self._master.checked(result.assignments)
+        if held and (aside or not out):
+            verdict = verdict if proven or not ended else Verdict.SOLUTION
+            return replace(outcome, verdict=verdict, assignment=joined(result.assignments), cost=cost, verified=True)
+        if proven:
+            raise Refuted(f"{outcome.protocol} has a solution for {outcome.team}, which the robots' own checks refute")
+        reason = outcome.reason or f"{outcome.protocol} has come to its end, and what it came by breaks a constraint"
+        return replace(outcome, verdict=Verdict.UNKNOWN, reason=reason)
+
+    def _verdict(self, traits: Traits, *, aside: bool) -> Verdict:
+        """What the answer of a protocol that has come to its end is."""
+        minimal = traits.costs and traits.complete and (aside or self._team().kind is Kind.DISWCSP)
+        return Verdict.OPTIMAL if minimal else Verdict.SOLUTION
+
+    def _brief(self, *, aside: bool) -> Brief:
+        """What robots are told; to step aside costs more than all that constraints can charge together."""
+        dearest = sum(member.profile.dearest for member in self._master.members.robots.values())
+        own = self._outcome.placed_by is None
+        return Brief(self._plan.seed, self._plan.settings if own else {}, 1 + dearest if aside else None)
+
+    def _limit(self) -> str:
+        plan = self._plan
+        if plan.messages is not None and sum(self._outcome.metrics.messages.values()) >= plan.messages:
+            return f"so many messages have been sent (--messages {plan.messages})"
+        return "the time was over" if plan.timeout is None else f"the time was over (--timeout {plan.timeout:g})"
+
+    def _team(self) -> Team:
+        members = self._master.members
+        return Team(self._plan.name, tuple(members.robots[name].robot for name in members.order))
+
+
+def _check_settings(protocol: str, settings: Mapping[str, str]) -> None:
+    try:
+        settings_of(spoken(protocol), settings)
+    except BadSettings as wrong:
+        raise Unsupported(f"--set: {wrong} (protocol {protocol})") from None
+
+
+def _in_words(outcome: Outcome) -> str:
+    """The outcome, as robots are told it."""
+    aside = f", {len(outcome.aside)} step aside" if outcome.aside else ""
+    return f"{outcome.verdict}{aside}"

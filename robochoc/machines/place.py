@@ -1,0 +1,69 @@
+"""Where a master is: `HOST:PORT`, and what stands at the port after it."""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+from typing import NamedTuple
+
+DEFAULT_PORT = 7447
+"""Zenoh's own."""
+LOOPBACK = "127.0.0.1"
+_LARGEST_PORT = 65_534
+_HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]*[A-Za-z0-9])?")
+
+
+class BadPlace(ValueError):  # noqa: N818 - named for what was given
+    """That is no address of a master."""
+
+
+class Place(NamedTuple):
+    """A host name or address, and a port. The master's enrolment service listens one port higher."""
+
+    host: str
+    port: int = DEFAULT_PORT
+
+    @classmethod
+    def parse(cls, text: str) -> Place:
+        """The place that `HOST`, `HOST:PORT` or `[IPv6]:PORT` names. Raises `BadPlace`."""
+        host, port = text, ""
+        if text.startswith("["):
+            host, _, port = text[1:].partition("]")
+            port = port.removeprefix(":")
+        elif text.count(":") <= 1:
+            host, _, port = text.partition(":")
+        if not _is_host(host) or (port and not (port.isdecimal() and 0 < int(port) <= _LARGEST_PORT)):
+            raise BadPlace(f"{text!r} is no HOST:PORT, such as 192.168.1.14:{DEFAULT_PORT}")
+        return cls(host, int(port) if port else DEFAULT_PORT)
+
+    @property
+    def enrolment_port(self) -> int:
+        """Where tokens are redeemed."""
+        return self.port + 1
+
+    @property
+    def open_to_others(self) -> bool:
+        """Whether other machines can reach it."""
+        try:
+            return not ipaddress.ip_address(self.host).is_loopback
+        except ValueError:
+            return self.host != "localhost"
+
+    @property
+    def anywhere(self) -> bool:
+        """Whether it stands for all addresses of a machine, and so is the name of none."""
+        try:
+            return ipaddress.ip_address(self.host).is_unspecified
+        except ValueError:
+            return False
+
+    def __str__(self) -> str:
+        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+
+
+def _is_host(host: str) -> bool:
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return _HOST.fullmatch(host) is not None
+    return True
