@@ -94,7 +94,7 @@ class AgentsContainer:
 
     The type's second part names the protocol, as its class is called (`MasterAFCng`) or as it is installed. `run`
     returns the outcome on the master's machine, and on a robot's how it ended there, by its name. Where the Authority
-    is, where to listen, tokens and identities are as on the command line: `set_listen`, `set_authority`, `set_identity`.
+    is, where to listen, tokens and identities: as on the command line (`set_listen`, `set_authority`, `set_identity`).
     """
 
     _type: str = ""

@@ -57,7 +57,7 @@ class Checked(OfEpoch, frozen=True):
     """What the constraints that I hold charge for the values that you told me; `allowed`: none is broken."""
 
     allowed: bool
-    cost: float
+    cost: int | float
 
 
 class Objection(_Word, frozen=True):
