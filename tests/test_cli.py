@@ -197,7 +197,7 @@ def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
     ("words", "said"),
     [
         (["--protocol", "abtt"], "did you mean 'abt'"),
-        (["--runtime", "network"], "network"),
+        (["--runtime", "threads"], "threads"),
         (["--seed", "-1"], "--seed"),
         (["--timeout", "0"], "--timeout"),
         (["--withdraw=most"], "fewest"),
