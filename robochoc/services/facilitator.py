@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 from robochoc.services.communicative_acts import Performative
 from robochoc.services.descriptions import FAILURES, AgentDescription, Reason, Refused
-from robochoc.services.directory import Directory
+from robochoc.services.directory import Directory, Notice
+from robochoc.services.identifier import AgentIdentifier, expression_of
 from robochoc.services.sl import (
     DIRECTORY,
     Action,
@@ -39,6 +40,33 @@ def handle(directory: Directory, requester: str, content: str, now: float) -> tu
     except BadExpression as bad:
         return Performative.NOT_UNDERSTOOD, content_of(listed("unsupported-value", String(f"{bad} (at {bad.at})")))
     return Performative.INFORM, content_of(answer)
+
+
+def subscribe(directory: Directory, requester: str, content: str, now: float) -> tuple[Performative, str] | None:
+    """From now on tell `requester` of what a SUBSCRIBE's `content` searches for (see `told`); None: granted.
+
+    By fipa-subscribe (FIPA00035), where the content would be an `iota` expression, which SL0 does not have: here it is
+    the search action that would find the same. What is refused comes as from `handle`.
+    """
+    try:
+        action = action_in(content)
+        try:
+            if action.function != Function.SEARCH:
+                raise Refused(Reason.UNSUPPORTED_FUNCTION, action.function[:40])  # noqa: TRY301 - as in `handle`
+            directory.subscribe(requester, description_of(_arguments(action, at_most=2)[0]), now)
+        except Refused as refused:
+            return Performative.REFUSE, content_of(action.whole, _proposition(refused.reason, refused.about))
+    except BadExpression as bad:
+        return Performative.NOT_UNDERSTOOD, content_of(listed("unsupported-value", String(f"{bad} (at {bad.at})")))
+    return None
+
+
+def told(df: AgentIdentifier, notice: Notice) -> str:
+    """The content of the INFORM that tells a subscriber of `notice`: what a search for that agent finds now."""
+    searched = described(AgentDescription(notice.name))
+    action = listed("action", expression_of(df), listed(Function.SEARCH, searched))
+    found = [] if notice.description is None else [described(notice.description)]
+    return content_of(listed("result", action, listed("set", *found)))
 
 
 def _answer(directory: Directory, requester: str, action: Action, now: float) -> Expression:

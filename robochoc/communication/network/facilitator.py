@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from contextlib import suppress
 
 from robochoc.communication.network.profile import Profile
-from robochoc.communication.network.words import Told
+from robochoc.communication.network.words import Ask, Told
+from robochoc.services.communicative_acts import Performative
 from robochoc.services.descriptions import AgentDescription, Refused, ServiceDescription
 from robochoc.services.directory import Directory
-from robochoc.services.facilitator import handle
+from robochoc.services.facilitator import handle, subscribe, told
+from robochoc.services.sl import df_on
 
 ASKED_AT_MOST = 20
 """Requests that a participant may make in a second."""
@@ -26,7 +29,10 @@ class DirectoryFacilitator:
         self._endpoint = endpoint
         self._protocol = protocol
         self._directory = Directory()
+        self._df = df_on(f"{endpoint}/robochoc")
         self._asked: dict[str, list[float]] = {}
+        self._numbers: dict[str, int] = {}
+        """The number under which each subscriber has asked last."""
 
     def enter(self, profile: Profile) -> None:
         """The robot of `profile` can be found: by its protocol, its variables, its topics. Raises `Refused`."""
@@ -50,16 +56,36 @@ class DirectoryFacilitator:
         """Forget those whose lease has ended."""
         self._directory.expire(time.time())
 
-    def answer(self, requester: str, number: int, request: str) -> Told:
-        """What `requester` asks for in SL0, answered. Raises `TooOften`."""
+    def answer(self, requester: str, ask: Ask) -> Told | None:
+        """What `requester` asks for in SL0, answered; None: `notices` will have it. Raises `TooOften`."""
         now = time.time()
         recent = [t for t in self._asked.get(requester, []) if now - t < 1]
         self._asked[requester] = [*recent, now]
         if len(recent) >= ASKED_AT_MOST:
             raise TooOften(f"more than {ASKED_AT_MOST} requests a second")
-        performative, content = handle(self._directory, self._aid(requester), request, now)
-        return Told(number, str(performative), content)
+        aid = self._aid(requester)
+        if not ask.subscribe:
+            return _told(ask.number, handle(self._directory, aid, ask.content, now))
+        self._numbers[aid] = ask.number
+        refusal = subscribe(self._directory, aid, ask.content, now)
+        return _told(ask.number, refusal) if refusal else None
+
+    def notices(self) -> Iterator[tuple[str, Told]]:
+        """What subscribers are to be told, each with the subscriber's name."""
+        for notice in self._directory.notices():
+            number = self._numbers.get(notice.subscriber, 0)
+            yield notice.subscriber.partition("@")[0], _told(number, (Performative.INFORM, told(self._df, notice)))
+
+    def forget(self, subscriber: str) -> None:
+        """Whoever is not there any more is told nothing."""
+        with suppress(Refused):
+            self._directory.unsubscribe(self._aid(subscriber))
 
     def _aid(self, name: str) -> str:
         """The name of a participant's agent identifier: `Robot3.1@host:port/robochoc`."""
         return f"{name}@{self._endpoint}/robochoc"
+
+
+def _told(number: int, answer: tuple[Performative, str]) -> Told:
+    performative, content = answer
+    return Told(number, str(performative), content)

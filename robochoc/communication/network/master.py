@@ -225,6 +225,7 @@ class Master:
         if now - self._read_registry >= REGISTRY_S:
             self._read_registry = now
             self._facilitator.expire()
+            self._tell_subscribers()
             self._follow_registry()
 
     def _ask_around(self, tally: Tally, now: float) -> None:
@@ -270,8 +271,8 @@ class Master:
         match opened.word:
             case Register(profile, visit):
                 self._register(sender, profile, visit)
-            case Ask(number, request):
-                self._answer(sender, number, request)
+            case Ask():
+                self._answer(sender, opened.word)
             case _:
                 member = self.members.robots.get(sender)
                 if member is None:
@@ -313,11 +314,19 @@ class Master:
             raise RobotsLost({name: str(bad)}) from None
         member.also.update({variable: variables[variable] for variable in wanted})
 
-    def _answer(self, sender: str, number: int, request: str) -> None:
+    def _answer(self, sender: str, ask: Ask) -> None:
         try:
-            self._tell(sender, self._facilitator.answer(sender, number, request))
+            told = self._facilitator.answer(sender, ask)
         except TooOften as often:
             self._refuse(sender, "ask the Directory Facilitator", str(often))
+            return
+        if told:
+            self._tell(sender, told)
+        self._tell_subscribers()
+
+    def _tell_subscribers(self) -> None:
+        for subscriber, told in self._facilitator.notices():
+            self._tell(subscriber, told)
 
     # Who is there
 
@@ -340,6 +349,8 @@ class Master:
 
     def _note_presence(self, name: str, *, there: bool) -> None:
         member = self.members.robots.get(name)
+        if not there:
+            self._facilitator.forget(name)
         if member:
             member.gone = None if there else member.gone or time.monotonic()
 

@@ -69,10 +69,14 @@ class Objection(_Word, frozen=True):
 
 
 class Ask(_Word, frozen=True):
-    """A request to the Directory Facilitator, in SL0; the answer has the same `number`."""
+    """To the Directory Facilitator, in SL0; answers have the same `number`.
+
+    `subscribe`: tell me now and whenever it changes what this search finds.
+    """
 
     number: int
     content: str
+    subscribe: bool = False
 
 
 class Bye(_Word, frozen=True):
