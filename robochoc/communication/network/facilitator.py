@@ -76,11 +76,6 @@ class DirectoryFacilitator:
             number = self._numbers.get(notice.subscriber, 0)
             yield notice.subscriber.partition("@")[0], _told(number, (Performative.INFORM, told(self._df, notice)))
 
-    def forget(self, subscriber: str) -> None:
-        """Whoever is not there any more is told nothing."""
-        with suppress(Refused):
-            self._directory.unsubscribe(self._aid(subscriber))
-
     def _aid(self, name: str) -> str:
         """The name of a participant's agent identifier: `Robot3.1@host:port/robochoc`."""
         return f"{name}@{self._endpoint}/robochoc"

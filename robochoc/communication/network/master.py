@@ -349,8 +349,6 @@ class Master:
 
     def _note_presence(self, name: str, *, there: bool) -> None:
         member = self.members.robots.get(name)
-        if not there:
-            self._facilitator.forget(name)
         if member:
             member.gone = None if there else member.gone or time.monotonic()
 
