@@ -42,14 +42,6 @@ class Place(NamedTuple):
         return self.port + 1
 
     @property
-    def open_to_others(self) -> bool:
-        """Whether other machines can reach it."""
-        try:
-            return not ipaddress.ip_address(self.host).is_loopback
-        except ValueError:
-            return self.host != "localhost"
-
-    @property
     def anywhere(self) -> bool:
         """Whether it stands for all addresses of a machine, and so is the name of none."""
         try:
