@@ -81,7 +81,11 @@ class ADOPT(BoundingProtocol):
 
     messages = TreeMessage | Value | Cost | Threshold | Terminate
     traits = Traits(
-        paper="Modi, Shen, Tambe, Yokoo 2005", costs=True, everywhere=True, privacy="constraints among others"
+        paper="Modi, Shen, Tambe, Yokoo 2005",
+        costs=True,
+        everywhere=True,
+        beyond=False,
+        privacy="constraints among others",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

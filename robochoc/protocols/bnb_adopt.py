@@ -86,6 +86,7 @@ class BnBADOPT(BoundingProtocol):
         paper="Yeoh, Felner, Koenig 2010; Gutierrez & Meseguer 2010",
         costs=True,
         everywhere=True,
+        beyond=False,
         privacy="constraints among others",
     )
 

@@ -152,7 +152,11 @@ class DPOP(TreeProtocol):
 
     messages = TreeMessage | Domain | Dimensions | Proceed | UTIL | VALUE
     traits = Traits(
-        paper="Petcu & Faltings 2005", costs=True, everywhere=True, privacy="constraints of others, but for sums"
+        paper="Petcu & Faltings 2005",
+        costs=True,
+        everywhere=True,
+        beyond=False,
+        privacy="constraints of others, but for sums",
     )
     settings: DPOPSettings = DPOPSettings()
 

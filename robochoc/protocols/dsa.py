@@ -61,6 +61,7 @@ class DSA(CycleProtocol):
         complete=False,
         costs=True,
         everywhere=True,
+        beyond=False,
         privacy="constraints among others",
     )
 

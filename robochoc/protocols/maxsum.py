@@ -92,6 +92,7 @@ class MaxSum(CycleProtocol):
         paper="Farinelli, Rogers, Petcu, Jennings 2008",
         complete=False,
         costs=True,
+        beyond=False,
         privacy="constraints among others",
     )
 

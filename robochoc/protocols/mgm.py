@@ -82,6 +82,7 @@ class MGM(Gainers):
         complete=False,
         costs=True,
         everywhere=True,
+        beyond=False,
         privacy="constraints among others",
     )
 

@@ -103,6 +103,7 @@ class MGM2(Gainers):
         complete=False,
         costs=True,
         everywhere=True,
+        beyond=False,
         privacy="constraints among others",
     )
 

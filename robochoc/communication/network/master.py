@@ -283,7 +283,8 @@ class Master:
     def _hear(self, name: str, member: Member, word: Word) -> None:
         match word:
             case OfEpoch():
-                self.tally.hear(name, word)
+                if not self.tally.hear(name, word):
+                    self._refuse(name, "a letter to the master", f"{type(word).__name__} says what cannot be")
             case Joined(card):
                 member.card, member.joined = card, True
             case Shown(variables):

@@ -61,6 +61,8 @@ class Members:
         self.number = number
         self.robots: dict[str, Member] = {}
         self.closed = False
+        self._over: set[str] = set()
+        """Lives that have ended. In one that goes on after all, letters are numbered as nobody expects."""
 
     @property
     def profiles(self) -> dict[str, Profile]:
@@ -74,6 +76,8 @@ class Members:
             return known
         if profile.name != sender:
             raise NotTaken(f"its file is {profile.name[:80]!r}'s, and its certificate {sender}'s")
+        if visit in self._over:
+            raise NotTaken("it was away for too long; start it anew")
         if known and (self.closed or known.gone is None):
             raise NotTaken(f"a robot called {sender} is registered already")
         if self.closed or (self.expected is not None and sender not in self.expected):
@@ -86,6 +90,8 @@ class Members:
         wrong = next(contradictions({**others, sender: profile}), None)
         if wrong:
             raise NotTaken(wrong)
+        if known:
+            self._over.add(known.visit)
         self.robots[sender] = Member(profile, visit)
         return self.robots[sender]
 
@@ -114,7 +120,9 @@ class Members:
     def remove(self, names: Collection[str]) -> None:
         """Robots are out for good: whoever named them as neighbours does so no more."""
         for name in names:
-            self.robots.pop(name, None)
+            member = self.robots.pop(name, None)
+            if member:
+                self._over.add(member.visit)
 
     @property
     def order(self) -> tuple[str, ...]:

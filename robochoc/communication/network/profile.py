@@ -13,7 +13,18 @@ import msgspec
 
 from robochoc.formats.constraints import is_name
 from robochoc.formats.extension import MAX_VALUES
-from robochoc.problem import Child, Constraint, CycleError, Domain, Kind, Parent, Robot, Variable, priority_order
+from robochoc.problem import (
+    INFINITE,
+    Child,
+    Constraint,
+    CycleError,
+    Domain,
+    Kind,
+    Parent,
+    Robot,
+    Variable,
+    priority_order,
+)
 from robochoc.solver.encoding import dearest
 
 Ranges = tuple[tuple[int, int], ...]
@@ -22,6 +33,8 @@ Ranges = tuple[tuple[int, int], ...]
 MOST_NEIGHBOURS = 10_000
 MOST_VARIABLES = 10_000
 LONGEST_NAME = 255
+LARGEST_WEIGHT = 1_000_000
+"""As in files."""
 
 
 class BadProfile(ValueError):  # noqa: N818 - named for what was found
@@ -96,14 +109,20 @@ def domain_of(name: str, ranges: Ranges) -> Domain:
 
 def silhouette(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
     """The robot as others see it; `also` are variables that it has shown since. Raises `BadProfile`."""
-    names = (profile.name, *profile.neighbours, *profile.variables, *also)
+    looked_at = [name for names in profile.looks_at.values() for name in names]
+    names = (profile.name, *profile.neighbours, *profile.variables, *looked_at, *also)
     bad = next((name for name in names if not is_name(name) or len(name) > LONGEST_NAME), None)
     if bad is not None:
         raise BadProfile(f"{bad[:LONGEST_NAME]!r} is no name")
-    if len(profile.neighbours) > MOST_NEIGHBOURS or len(profile.variables) > MOST_VARIABLES:
+    if len(profile.neighbours) > MOST_NEIGHBOURS or max(len(profile.variables), len(looked_at)) > MOST_VARIABLES:
         raise BadProfile("it has too many neighbours or variables")
     if len({profile.name, *profile.neighbours}) <= len(profile.neighbours):
         raise BadProfile("it names itself, or a neighbour twice")
+    strangers = profile.looks_at.keys() - set(profile.children)
+    if strangers:  # the master would have them show what is none of its business
+        raise BadProfile(f"it looks at variables of {min(strangers)[:LONGEST_NAME]}, which is no child of it")
+    if not (0 <= profile.dearest < INFINITE and 1 <= profile.weight <= LARGEST_WEIGHT):
+        raise BadProfile(f"costs of {profile.dearest:g} and a weight of {profile.weight} cannot be")
     shown = {**profile.variables, **also}
     return Robot(
         name=profile.name,
@@ -112,7 +131,7 @@ def silhouette(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
         parents=tuple(Parent(name) for name in profile.parents),
         children=tuple(Child(name) for name in profile.children),
         shown=tuple(shown),
-        weight=max(profile.weight, 1),
+        weight=profile.weight,
     )
 
 

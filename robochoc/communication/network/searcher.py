@@ -18,6 +18,7 @@ from robochoc.communication.network.words import Account, Checked, Copies, Said,
 from robochoc.communication.system import own_memory
 from robochoc.message import Envelope
 from robochoc.observers.events import AnyEvent
+from robochoc.outcome import Metrics
 from robochoc.problem import INFINITE, Kind, Model, Robot
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.protocol import Protocol
@@ -128,13 +129,27 @@ class Searcher:
     def _part(self) -> Part:
         task = self._task
         try:
-            copies = [known_of(record) for records in self._copies.values() for record in records]
+            copies = [self._known(sender, record) for sender, told in self._copies.items() for record in told]
             domains = {name: domain_of(name, ranges) for name, ranges in task.domains.items()}
         except (BadShared, BadProfile) as bad:
             raise Unsupported(f"{self._robot.name} was told what cannot be: {bad}") from None
         brief = Brief(task.seed, task.settings, task.aside)
         own = (self._robot, task.order, task.interfaces, self._domain)
         return Part(*own, _sorted(copies, task.order), domains, task.links, task.secretive, brief)
+
+    def _known(self, sender: str, record: SharedRecord) -> Known:
+        """The constraint that `sender` holds: only a child can, over variables that are there, mine among them."""
+        known = known_of(record)
+        variables = set(known.constraint.variables)
+        mine, theirs = (set(self._task.interfaces.get(name, ())) for name in (self._robot.name, sender))
+        children = {child.name for child in self._robot.children}
+        if (
+            sender not in children
+            or not variables <= self._task.domains.keys()
+            or not (variables & mine and variables & theirs)
+        ):
+            raise BadShared(f"{sender} holds {known.constraint.name!r} over what it cannot")
+        return known
 
     # Searching
 
@@ -156,8 +171,8 @@ class Searcher:
         return self._searching
 
     def take_in(self, packet: Sequence[Envelope]) -> None:
-        """Give the protocol all messages that wait. Raises `BadMessage`."""
-        if packet and self._host:
+        """Give the protocol all messages that wait, unless the search is over. Raises `BadMessage`."""
+        if packet and self._host and self._searching:
             self._received += len(packet)
             self._send(self._host, self._host.handle(packet))
             if len(self._events) > EVENTS_AT_ONCE:
@@ -192,7 +207,8 @@ class Searcher:
         """Be silent, and report: what still arrives is lost."""
         self._searching, self._paused = False, True
         self.report_events()
-        if self._host is None:
+        if self._host is None:  # others have not told what they hold, and maybe never will
+            self._around.say(Account(self.epoch, False, {}, Metrics(), NOTHING))
             return
         protocol, private = self._host.protocol, self._around.private
         metrics = replace(self._host.metrics(), memory=own_memory())

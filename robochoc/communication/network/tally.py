@@ -33,15 +33,18 @@ class Tally:
         self._unchecked = set(order)
 
     def hear(self, name: str, word: OfEpoch) -> bool:
-        """Take in what a robot tells of this search; whether the word is one for the master."""
-        if name not in self._silent | self._accounts.keys():
+        """Take in what a robot tells of this search; whether the word is one for the master.
+
+        Late words of another search, and those of robots that were lost, say nothing.
+        """
+        if word.epoch != self.epoch or name not in self._silent | self._accounts.keys():
             return True
         match word:
             case Ready():
                 self._unready.discard(name)
             case Counters(_, wave, sent, received):
                 self.counters.answer(name, wave, Counts(sent, received))
-            case Conclusion(_, verdict):
+            case Conclusion(_, verdict) if verdict in set(Verdict):
                 self.verdict, self._witness = Verdict(verdict), name
             case Account():
                 self._accounts[name] = word

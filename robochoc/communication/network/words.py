@@ -8,6 +8,7 @@ robot to robot, and it never sees them. What both runtimes with processes say al
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Annotated
 
 import msgspec
 
@@ -16,6 +17,9 @@ from robochoc.communication.network.profile import Profile, Ranges
 from robochoc.communication.network.shared import SharedRecord
 from robochoc.outcome import Metrics
 from robochoc.protocols.findings import Findings
+
+LATEST = 2**53
+"""The latest that a clock of constraint checks can be. Each says its own, and must not overflow another's."""
 
 
 class _Word(msgspec.Struct, frozen=True, tag=True, array_like=True):
@@ -161,7 +165,7 @@ class Leave(_Word, frozen=True):
 class Said(OfEpoch, frozen=True):
     """A protocol's message, as the filters have sealed it, with the sender's NCCC clock."""
 
-    clock: int
+    clock: Annotated[int, msgspec.Meta(ge=0, le=LATEST)]
     content: bytes
 
 

@@ -1,0 +1,298 @@
+"""Letters: numbers, replays, sizes, directions, and bytes of any kind."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import get_args
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robochoc.communication.control import Counters, Events, Failed, Ready, Wave
+from robochoc.communication.network.letters import LARGEST_LETTER, MASTER, Letter, Letters, Opened, Refused, TooLarge
+from robochoc.communication.network.profile import Profile
+from robochoc.communication.network.words import (
+    LATEST,
+    Ask,
+    Copies,
+    Denied,
+    Judge,
+    Leave,
+    Register,
+    Said,
+    Task,
+    Told,
+    ToMaster,
+    ToPeer,
+    ToRobot,
+    Welcome,
+    Word,
+)
+from robochoc.observers.events import Received
+from robochoc.problem import Kind
+
+PROFILE = Profile("R1", Kind.DISCSP, ("R0",), (), {"X": ((1, 3), (5, 5))}, {}, 1, 0, ("/R1/goal",))
+OUTSIDE = (Register, Welcome, Denied, Ask, Told)
+WORDS = get_args(ToMaster), get_args(ToRobot), get_args(ToPeer)
+
+
+def pair(sender: str = "R1", receiver: str = "R2", run: str = "run") -> tuple[Letters, Letters]:
+    return Letters(sender, run), Letters(receiver, run)
+
+
+def said(number: int) -> Said:
+    return Said(1, number, b"%d" % number)
+
+
+TEXTS = st.text(max_size=5)
+NUMBERS = st.integers(-(2**63), 2**64 - 1)
+SEVERAL = st.lists(TEXTS, max_size=3).map(tuple)
+DOMAINS = st.dictionaries(TEXTS, st.lists(st.tuples(NUMBERS, NUMBERS), max_size=2).map(tuple), max_size=2)
+SPECIAL: dict[type[Word], st.SearchStrategy[Word]] = {
+    Register: st.builds(Register, st.just(PROFILE), TEXTS),
+    Events: st.just(Events([Received(t=1.5, sender="R1", receiver="R2", type="Ok", clock=3)])),
+    Judge: st.builds(Judge, NUMBERS, st.dictionaries(TEXTS, NUMBERS)),
+    Said: st.builds(Said, NUMBERS, st.integers(0, LATEST), st.binary(max_size=5)),
+    Task: st.builds(
+        Task,
+        epoch=NUMBERS,
+        protocol=TEXTS,
+        order=SEVERAL,
+        interfaces=st.dictionaries(TEXTS, SEVERAL, max_size=2),
+        domains=DOMAINS,
+        links=st.none() | st.dictionaries(TEXTS, SEVERAL, max_size=2),
+        secretive=SEVERAL,
+        seed=NUMBERS,
+        settings=st.dictionaries(TEXTS, TEXTS, max_size=2),
+        aside=st.none() | st.floats(allow_nan=False),
+        cards=st.lists(st.binary(max_size=5), max_size=2).map(tuple),
+    ),
+}
+
+
+@cache
+def some(kind: type[Word]) -> st.SearchStrategy[Word]:
+    """Words of one kind: what their types allow, as far as it can travel."""
+    return SPECIAL[kind] if kind in SPECIAL else st.from_type(kind).filter(_travels)
+
+
+def _travels(word: Word) -> bool:
+    """Not NaN, which is not equal to itself, nor integers of more than 64 bits."""
+    try:
+        return msgspec.msgpack.decode(msgspec.msgpack.encode(word), type=type(word)) == word
+    except (OverflowError, UnicodeEncodeError):
+        return False
+
+
+@pytest.mark.parametrize("kind", [kind for direction in WORDS for kind in direction], ids=lambda one: one.__name__)
+def test_every_word_comes_as_it_was_sent(kind: type[Word]) -> None:
+    sender, receiver = ("R1", MASTER) if kind in WORDS[0] else (MASTER, "R1") if kind in WORDS[1] else ("R1", "R2")
+
+    @given(word=some(kind))
+    @settings(max_examples=15, deadline=None)
+    def arrives(word: Word) -> None:
+        writer, reader = pair(sender, receiver)
+        opened = reader.read(sender, writer.write(receiver, word))
+        assert opened.word == word
+        assert type(opened.word) is kind
+        assert opened.number == (0 if kind in OUTSIDE else 1)
+
+    arrives()
+
+
+# Numbers
+
+
+def test_letters_are_numbered_by_pair_and_come_once() -> None:
+    writer, reader = pair()
+    contents = [writer.write("R2", said(n)) for n in (1, 2, 3)]
+    assert writer.next_number("R2") == 4
+    assert writer.next_number("R3") == 1
+    for number, content in enumerate(contents, 1):
+        opened = reader.read("R1", content)
+        assert opened == Opened(number, said(number))
+        reader.take("R1", opened.number)
+        with pytest.raises(Refused, match=f"replay: letter {number} has come before"):
+            reader.read("R1", content)
+
+
+def test_what_was_not_taken_may_come_again() -> None:
+    writer, reader = pair()
+    content = writer.write("R2", said(1))
+    assert [reader.read("R1", content) for _ in range(2)] == [(1, said(1))] * 2
+    reader.take("R1", 1)
+    with pytest.raises(Refused, match="replay"):
+        reader.read("R1", content)
+
+
+def test_a_missing_letter_is_missed() -> None:
+    writer, reader = pair()
+    first, second = (writer.write("R2", said(n)) for n in (1, 2))
+    with pytest.raises(Refused, match="letter 1 is missing before letter 2"):
+        reader.read("R1", second)
+    reader.take("R1", reader.read("R1", first).number)
+    assert reader.read("R1", second).word == said(2)
+
+
+def test_senders_do_not_use_up_each_others_numbers() -> None:
+    reader = Letters("R9", "run")
+    for sender in ("R1", "R2"):
+        opened = reader.read(sender, Letters(sender, "run").write("R9", said(1)))
+        reader.take(sender, opened.number)
+    with pytest.raises(Refused, match="letter 2 is missing before letter 3"):
+        reader.read("R2", msgspec.msgpack.encode(Letter("run", 3, said(3))))
+
+
+@pytest.mark.parametrize("number", [0, -1, -(2**63)])
+def test_numbers_begin_at_1(number: int) -> None:
+    with pytest.raises(Refused, match="replay"):
+        pair()[1].read("R1", msgspec.msgpack.encode(Letter("run", number, said(1))))
+
+
+def test_letters_of_another_run_are_replays() -> None:
+    old, reader = Letters("R1", "before"), Letters("R2", "run")
+    content = old.write("R2", said(1))
+    with pytest.raises(Refused, match="another run"):
+        reader.read("R1", content)
+    with pytest.raises(Refused, match="another run"):
+        Letters("R2").read("R1", content)
+    with pytest.raises(Refused, match="another run"):
+        Letters("R2").read("R1", Letters("R1").write("R2", said(1)))  # no run is no run in common
+
+
+def test_a_new_run_begins_at_1() -> None:
+    writer, reader = pair()
+    reader.take("R1", reader.read("R1", writer.write("R2", said(1))).number)
+    for one in (writer, reader):
+        one.begin("next")
+    assert reader.read("R1", writer.write("R2", said(2))) == (1, said(2))
+
+
+def test_another_life_begins_at_1_for_that_robot_only() -> None:
+    master = Letters(MASTER, "run")
+    for name in ("R1", "R2"):
+        master.take(name, master.read(name, Letters(name, "run").write(MASTER, Ready(1))).number)
+        master.write(name, Wave(1))
+    master.forget("R1")
+    master.forget("R7")
+    assert (master.next_number("R1"), master.next_number("R2")) == (1, 2)
+    assert master.read("R1", Letters("R1", "run").write(MASTER, Ready(1))).number == 1
+    with pytest.raises(Refused, match="replay"):
+        master.read("R2", Letters("R2", "run").write(MASTER, Ready(1)))
+
+
+def test_words_before_a_run_have_no_number() -> None:
+    robot, master = Letters("R1"), Letters(MASTER, "run")
+    content = robot.write(MASTER, Register(PROFILE, "visit"))
+    for _ in range(2):
+        opened = master.read("R1", content)
+        assert opened == Opened(0, Register(PROFILE, "visit"))
+        master.take("R1", opened.number)
+    assert robot.next_number(MASTER) == 1
+    answer = master.write("R1", Welcome("visit", "run", (), observed=False, private=False))
+    assert robot.read(MASTER, answer).number == 0
+    assert master.read("R1", Letters("R1", "run").write(MASTER, Ready(1))).number == 1
+
+
+# Sizes
+
+
+def test_a_letter_that_is_too_large_is_not_written_and_uses_no_number() -> None:
+    writer, reader = pair()
+    with pytest.raises(TooLarge, match=r"R1 to R2 has 8,\d\d\d,\d\d\d bytes, more than 8,388,608"):
+        writer.write("R2", Said(1, 0, bytes(LARGEST_LETTER)))
+    assert reader.read("R1", writer.write("R2", said(1))).number == 1
+
+
+def test_a_letter_that_is_too_large_is_not_read() -> None:
+    content = msgspec.msgpack.encode(Letter("run", 1, Said(1, 0, bytes(LARGEST_LETTER))))
+    with pytest.raises(Refused, match="more than 8,388,608"):
+        pair()[1].read("R1", content)
+
+
+def test_the_largest_letter_passes() -> None:
+    writer, reader = pair()
+    spare = len(msgspec.msgpack.encode(Letter("run", 1, Said(1, 0, bytes(70_000))))) - 70_000
+    content = writer.write("R2", Said(1, 0, bytes(LARGEST_LETTER - spare)))
+    assert len(content) == LARGEST_LETTER
+    assert reader.read("R1", content).number == 1
+
+
+# Directions
+
+
+@pytest.mark.parametrize(
+    ("sender", "receiver", "direction"),
+    [("R1", MASTER, 0), (MASTER, "R1", 1), ("R1", "R2", 2)],
+    ids=["to the master", "to a robot", "to a peer"],
+)
+@given(data=st.data())
+@settings(max_examples=3, deadline=None)
+def test_words_of_another_direction_are_refused(
+    sender: str, receiver: str, direction: int, data: st.DataObject
+) -> None:
+    for place, kinds in enumerate(WORDS):
+        for kind in kinds:
+            word = data.draw(some(kind))
+            content = msgspec.msgpack.encode(Letter("run", 1, word))
+            reader = Letters(receiver, "run")
+            if place == direction:
+                assert type(reader.read(sender, content).word) is kind
+            else:
+                with pytest.raises(Refused, match="malformed"):
+                    reader.read(sender, content)
+
+
+# Bytes
+
+
+@pytest.mark.parametrize(("sender", "receiver"), [("R1", MASTER), (MASTER, "R1"), ("R1", "R2")])
+@given(content=st.binary(max_size=200))
+@settings(max_examples=100, deadline=None)
+def test_arbitrary_bytes_are_refused(sender: str, receiver: str, content: bytes) -> None:
+    with pytest.raises(Refused, match="malformed"):
+        Letters(receiver, "run").read(sender, content)
+
+
+LETTERS = [
+    (sender, receiver, msgspec.msgpack.encode(Letter("run", 1, word)))
+    for sender, receiver, word in (
+        ("R1", MASTER, Register(PROFILE, "visit")),
+        ("R1", MASTER, Failed("why", unsupported=True)),
+        ("R1", MASTER, Counters(1, 2, 3, 4)),
+        (MASTER, "R1", Leave("over", failed=False)),
+        ("R1", "R2", Said(1, 3, b"content")),
+        ("R1", "R2", Copies(1, ())),
+    )
+]
+
+
+@given(letter=st.sampled_from(LETTERS), data=st.data())
+@settings(max_examples=300, deadline=None)
+def test_damaged_letters_are_refused_or_read_never_worse(letter: tuple[str, str, bytes], data: st.DataObject) -> None:
+    sender, receiver, content = letter
+    bit = data.draw(st.integers(0, 8 * len(content) - 1))
+    flipped = bytearray(content)
+    flipped[bit // 8] ^= 1 << bit % 8
+    for damaged in (bytes(flipped), content[: bit // 8], content + bytes(flipped[: 1 + bit // 8])):
+        reader = Letters(receiver, "run")
+        try:
+            opened = reader.read(sender, damaged)
+        except Refused:
+            continue
+        assert opened.number in {0, 1}  # a bit of the content can be another
+
+
+@pytest.mark.parametrize("nested", [b"\x91" * 5000, b"\x81" * 5000, b"\x93\xa3run\x01" + b"\x92" * 100_000])
+def test_deep_nesting_is_refused(nested: bytes) -> None:
+    for sender in (MASTER, "R1"):
+        with pytest.raises(Refused, match="malformed"):
+            Letters("R2", "run").read(sender, nested)
+
+
+def test_a_length_that_lies_allocates_nothing() -> None:
+    for lie in (b"\xdd\xff\xff\xff\xff", b"\xc6\xff\xff\xff\xff", b"\xdb\xff\xff\xff\xff"):
+        with pytest.raises(Refused, match="malformed"):
+            pair()[1].read("R1", b"\x93\xa3run\x01\x94\xa4Said\x01\x01" + lie)

@@ -1,0 +1,215 @@
+"""Who is registered: once, in one life, as long as the team is open."""
+
+from __future__ import annotations
+
+from random import Random
+
+import msgspec
+import pytest
+from pkc_problems import random_pkc_team
+from problems import random_team, team_of
+from sparse_teams import profiles_of
+
+from robochoc.communication.network.members import Members, NotTaken
+from robochoc.communication.network.profile import Profile
+from robochoc.formats import PREDEFINED
+from robochoc.problem import Constraint, Kind, Predicate
+from robochoc.protocols.traits import Traits
+from robochoc.solver.part import NO_BRIEF
+
+TRIANGLE = [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in (("A", "B"), ("A", "C"), ("B", "C"))]
+PROFILES = profiles_of(team_of(dict.fromkeys("ABC", (1, 2)), TRIANGLE))
+RA, RB, RC = PROFILES
+
+
+def join(members: Members, *names: str, visit: str = "first") -> None:
+    for name in names:
+        members.register(name, PROFILES[name], visit).joined = True
+
+
+def refused(members: Members, name: str, profile: Profile, visit: str = "first") -> str:
+    before = dict(members.robots)
+    with pytest.raises(NotTaken) as caught:
+        members.register(name, profile, visit)
+    assert members.robots == before
+    return str(caught.value)
+
+
+def test_registering_twice_is_registering_once() -> None:
+    members = Members()
+    first = members.register(RA, PROFILES[RA], "first")
+    assert members.register(RA, PROFILES[RA], "first") is first
+    first.joined = True
+    members.closed = True
+    assert members.register(RA, PROFILES[RA], "first") is first
+
+
+def test_a_name_is_one_robots() -> None:
+    members = Members()
+    join(members, RA)
+    assert refused(members, RA, PROFILES[RA], "second") == f"a robot called {RA} is registered already"
+
+
+def test_who_was_away_may_come_in_another_life_while_the_team_is_open() -> None:
+    members = Members()
+    join(members, RA)
+    members.robots[RA].gone = 12.5
+    now = members.register(RA, PROFILES[RA], "second")
+    assert (now.visit, now.joined, now.gone) == ("second", False, None)
+    now.gone = 13.5
+    assert "start it anew" in refused(members, RA, PROFILES[RA], "first")
+    members.closed = True
+    assert "registered already" in refused(members, RA, PROFILES[RA], "third")
+
+
+def test_who_was_given_up_comes_in_another_life_or_not_at_all() -> None:
+    members = Members()
+    join(members, RA)
+    members.remove([RA, "nobody"])
+    assert "away for too long; start it anew" in refused(members, RA, PROFILES[RA], "first")
+    assert members.register(RA, PROFILES[RA], "second").visit == "second"
+
+
+def test_a_certificate_is_for_one_file() -> None:
+    members = Members()
+    assert refused(members, RB, PROFILES[RA]) == f"its file is '{RA}''s, and its certificate {RB}'s"
+    long = msgspec.structs.replace(PROFILES[RA], name="R" * 5000)
+    assert len(refused(members, RB, long)) < 200
+
+
+def test_strangers_are_not_taken_where_robots_are_expected() -> None:
+    assert refused(Members([RA, RB]), RC, PROFILES[RC]) == "it is not one of the team"
+
+
+def test_nobody_is_taken_once_the_team_is_closed() -> None:
+    members = Members([RA, RB, RC])
+    join(members, RA, RB)
+    members.closed = True
+    assert refused(members, RC, PROFILES[RC]) == "the team is complete without it"
+
+
+def test_absurd_profiles_and_contradictions_are_not_taken() -> None:
+    members = Members()
+    join(members, RA)
+    assert "no name" in refused(members, RB, msgspec.structs.replace(PROFILES[RB], children=("?",)))
+    stranger = msgspec.structs.replace(PROFILES[RB], parents=())
+    assert "does not list it as a parent" in refused(members, RB, stranger)
+    join(members, RB)
+
+
+def test_who_comes_again_is_not_held_against_its_former_life() -> None:
+    members = Members()
+    join(members, RA)
+    members.robots[RA].gone = 1.0
+    other = msgspec.structs.replace(PROFILES[RA], children=(), variables={}, kind=Kind.DISWCSP)
+    assert members.register(RA, other, "second").profile is other
+
+
+# When the team is complete
+
+
+def test_complete_when_all_who_are_expected_are_there() -> None:
+    members = Members([RA, RB, RC])
+    assert members.awaited == {RA, RB, RC}
+    join(members, RC, RA)
+    assert members.awaited == {RB}
+    assert not members.complete
+    join(members, RB)
+    assert members.complete
+
+
+def test_complete_when_all_neighbours_are_there() -> None:
+    members = Members()
+    assert not members.complete
+    join(members, RC)
+    assert members.awaited == {RA, RB}
+    join(members, RA, RB)
+    assert members.complete
+
+
+def test_complete_when_so_many_are_there_and_all_their_neighbours() -> None:
+    lonely = Profile("RZ", Kind.DISCSP, (), (), {}, {}, 1, 0, ())
+    members = Members(number=2)
+    members.register("RZ", lonely, "first").joined = True
+    assert not members.awaited
+    assert not members.complete
+    join(members, RA)
+    assert not members.complete
+    join(members, RB, RC)
+    assert members.complete
+
+
+def test_complete_when_all_have_read_their_welcome() -> None:
+    members = Members()
+    join(members, RA, RB, RC)
+    members.robots[RB].joined = False
+    assert not members.complete
+
+
+def test_an_open_team_misses_who_is_given_up() -> None:
+    members = Members()
+    join(members, RA, RB, RC)
+    members.remove([RB])
+    assert members.awaited == {RB}
+    assert not members.complete
+
+
+# What others want to see
+
+
+def looked_at() -> dict[str, Profile]:
+    upper = Profile("A", Kind.DISCSP, (), ("B",), {"X": ((1, 2),)}, {"B": ("Y", "Z")}, 1, 0, ())
+    lower = Profile("B", Kind.DISCSP, ("A",), (), {"Y": ((1, 2),)}, {}, 1, 0, ())
+    return {"A": upper, "B": lower}
+
+
+def test_variables_that_a_parent_looks_at_are_shown() -> None:
+    members = Members()
+    members.register("A", looked_at()["A"], "first")
+    assert members.unseen() == {}
+    members.register("B", looked_at()["B"], "first")
+    assert members.unseen() == {"B": ("Z",)}
+    members.robots["B"].also["Z"] = ((3, 4),)
+    assert members.unseen() == {}
+    task = members.tasks(1, "abt", Traits(), NO_BRIEF)["A"]
+    assert task.interfaces == {"A": ("X",), "B": ("Y", "Z")}
+    assert task.domains["Z"] == ((3, 4),)
+
+
+def test_who_is_no_child_is_not_asked_to_show_anything() -> None:
+    members = Members()
+    members.register("B", looked_at()["B"], "first")
+    spy = Profile("S", Kind.DISCSP, (), (), {}, {"B": ("Secret",)}, 1, 0, ())
+    assert "looks at variables of B, which is no child" in refused(members, "S", spy)
+    assert members.unseen() == {}
+
+
+# What is told at the end
+
+
+def test_a_neighbourhood_is_what_sharers_of_constraints_show() -> None:
+    any_three = Predicate("any", ("X", "Y", "Z"), PREDEFINED["ne"].body)
+    scope = ("A", "B", "C")
+    team = team_of(dict.fromkeys((*scope, "D"), (1, 2)), [Constraint("C", any_three, scope, scope)])
+    members = Members()
+    for name, profile in profiles_of(team).items():
+        members.register(name, profile, "first")
+    values = {"RA": {"A": 1, "Hidden": 7}, "RB": {"B": 2}, "RC": {"C": 1}, "RD": {"D": 2}, "RX": {"A": 9}}
+    assert members.neighbourhood("RA", values) == {"B": 2, "C": 1}
+    assert members.neighbourhood("RC", values) == {"A": 1, "B": 2}
+    assert members.neighbourhood("RD", values) == {}
+    members.remove(["RB"])
+    assert members.neighbourhood("RA", values) == {"C": 1}
+
+
+def test_all_kinds_of_teams_are_taken_in_any_order() -> None:
+    for seed in range(20):
+        for make in (random_team, random_pkc_team):
+            chance = Random(seed)
+            profiles = list(profiles_of(make(chance)).items())
+            chance.shuffle(profiles)
+            members = Members([name for name, _ in profiles])
+            for name, profile in profiles:
+                assert not members.complete
+                members.register(name, profile, "visit").joined = True
+            assert members.complete

@@ -1,0 +1,117 @@
+"""What the router's log tells of refusals. The lines are a real router's; identifiers are shortened."""
+
+from __future__ import annotations
+
+import os
+import socket
+from itertools import pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robochoc.authority.admission import Household
+from robochoc.communication.network.router import Refusal, Router, refusals
+
+NO_RULE = "no rule of the Authority allows it"
+ACCESS = "rx-0 ThreadId(07) zenoh::net::routing::interceptor::access_control:"
+TLS = "acc-0 ThreadId(04) zenoh_link_tls::unicast:"
+HINT = "Hint: increase the system open file limit."
+WHO = "70be on Interface(lo)+CertCommonName(A)+Transport(Tls)+70be"
+LINES = [
+    f"2026-11-22T01:07:52.349264Z TRACE {ACCESS} ACL (ingress): caching permissions for `rc/msg/A` ...",
+    f"2026-11-22T01:07:52.349305Z TRACE {ACCESS} {WHO} is unauthorized to Put (ingress) on rc/msg/A",
+    f"2026-11-22T01:07:52.349307Z TRACE {ACCESS} {WHO} is unauthorized to Delete (ingress) on rc/msg/A",
+    f"2026-11-22T01:07:52.349317Z TRACE {ACCESS} {WHO} is unauthorized to Declare/Undeclare Queryable (ingress) on rc",
+    f"2026-11-22T01:07:52.349347Z TRACE {ACCESS} {WHO} is unauthorized to Put (egress) on rc/msg/A",
+    f"2026-11-22T01:07:52.349708Z TRACE {ACCESS} {WHO} is authorized to Declare Subscriber (ingress) on rc/msg/A/*",
+    f"2026-11-22T01:07:52.351244Z TRACE {ACCESS} {WHO} is unauthorized to Put (ingress) on rc/msg/MASTER/B",
+    "2026-11-22T01:07:52.351246Z TRACE rx-0 ThreadId(07) zenoh::net::routing::interceptor: Msg intercepted!",
+    f"2026-11-22T01:07:52.351709Z TRACE {ACCESS} {WHO} is unauthorized to Declare Subscriber (ingress) on rc/msg/B/*",
+    "2026-11-22T01:07:52.351711Z TRACE rx-0 ThreadId(07) zenoh::net::routing::interceptor: Msg intercepted!",
+    f"2026-11-22T01:07:53.352165Z TRACE {ACCESS} {WHO} is unauthorized to Query (ingress) on rc/msg/B/MASTER/@adv/**",
+    "2026-11-22T01:07:53.352170Z TRACE rx-0 ThreadId(07) zenoh::net::routing::interceptor: Msg intercepted!",
+    f"2026-11-22T01:07:53.352180Z TRACE {ACCESS} {WHO} is unauthorized to Liveliness Token (egress) on rc/live/B",
+    "2026-11-22T01:07:53.352181Z TRACE rx-0 ThreadId(07) zenoh::net::routing::interceptor: Msg intercepted!",
+    f"2026-11-22T01:07:55.860152Z  WARN {TLS} received corrupt message of type InvalidContentType. {HINT}",
+    f"2026-11-22T01:07:56.000001Z  WARN {TLS} received fatal alert: UnknownCA. {HINT}",
+    f"2026-11-22T01:25:44.147756Z  WARN {TLS} invalid peer certificate: UnknownIssuer. {HINT}",
+    f"2026-11-22T01:25:44.739202Z  WARN {TLS} peer sent no certificates. {HINT}",
+]
+LOG = "".join(f"{line}\n" for line in LINES).encode()
+TOLD = [
+    Refusal("A", "put rc/msg/MASTER/B", NO_RULE),
+    Refusal("A", "declare subscriber rc/msg/B/*", NO_RULE),
+    Refusal("A", "query rc/msg/B/MASTER/@adv/**", NO_RULE),
+    Refusal("", "connect", "received corrupt message of type InvalidContentType"),
+    Refusal("", "connect", "invalid peer certificate: UnknownIssuer"),
+    Refusal("", "connect", "peer sent no certificates"),
+]
+IDENTITY = Household([]).master_identity(("127.0.0.1",))
+
+
+def read_in(pieces: list[bytes]) -> list[Refusal]:
+    """What is told of a log that comes in these pieces, each at once."""
+    told: list[Refusal] = []
+    inward, outward = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with inward, outward, os.fdopen(os.dup(inward.fileno()), "rb") as output:
+        for piece in pieces:
+            outward.send(piece)
+        outward.shutdown(socket.SHUT_WR)
+        Router("127.0.0.1:1", IDENTITY, told.append, 1000)._read(output)  # noqa: SLF001 - without a process
+    return told
+
+
+def test_refusals_are_what_was_intercepted_coming_in() -> None:
+    assert list(refusals(LOG)) == TOLD
+
+
+@pytest.mark.parametrize("line", range(len(LINES)))
+def test_a_line_alone_says_no_more_than_it_can(line: int) -> None:
+    told = list(refusals(f"{LINES[line]}\n".encode()))
+    assert told == [one for one in TOLD if not one.who and one.why in LINES[line]]
+
+
+def test_colours_do_not_matter() -> None:
+    coloured = (
+        LOG.replace(b"TRACE", b"\x1b[35mTRACE\x1b[0m")
+        .replace(b" zenoh", b" \x1b[2mzenoh")
+        .replace(b"r: ", b"r\x1b[0m: ")
+    )
+    assert list(refusals(coloured.replace(b"\x1b[2mzenoh_link", b"zenoh_link"))) == TOLD
+
+
+@given(content=st.binary(max_size=300) | st.lists(st.sampled_from(LINES)).map(lambda lines: "\n".join(lines).encode()))
+@settings(max_examples=60)
+def test_any_bytes_can_be_looked_at(content: bytes) -> None:
+    assert all(refusal.what for refusal in refusals(content))
+
+
+def test_names_that_are_no_text_are_shown_all_the_same() -> None:
+    log = "\n".join(LINES[6:8]).encode() + b"\n"
+    (told,) = refusals(log.replace(b"Name(A)", b"Name(\xff)").replace(b"MASTER/B", b"\xfe\xff"))
+    assert told == Refusal("\ufffd", "put rc/msg/\ufffd\ufffd", NO_RULE)
+
+
+def test_the_log_in_one_piece() -> None:
+    assert sorted(read_in([LOG])) == sorted(TOLD)
+
+
+@given(cuts=st.lists(st.integers(1, len(LOG) - 1), max_size=12))
+@settings(max_examples=60, deadline=None)
+def test_any_split_tells_the_same(cuts: list[int]) -> None:
+    places = [0, *sorted(set(cuts)), len(LOG)]
+    pieces = [LOG[start:end] for start, end in pairwise(places)]
+    assert sorted(read_in(pieces)) == sorted(TOLD)
+
+
+def test_every_single_cut_tells_the_same() -> None:
+    short = "".join(f"{line}\n" for line in LINES[5:9]).encode()
+    expected = list(refusals(short))
+    assert len(expected) == 1
+    for cut in range(1, len(short)):
+        assert read_in([short[:cut], short[cut:]]) == expected
+
+
+def test_line_by_line_tells_the_same() -> None:
+    assert read_in(LOG.splitlines(keepends=True)) == TOLD
