@@ -43,7 +43,7 @@ format: $(READY)
 	$(BIN)/ruff format .
 
 # The long parts (sweep, variants, dynamic: about 40 minutes of one core) are not among them, and their sections
-# stay as they are: .venv/bin/python benchmarks/run.py --write sweep variants dynamic optimum local_search
+# stay as they are: .venv/bin/python benchmarks/run.py --write sweep variants dynamic optimum local_search channels network
 bench: $(READY)  ## figures into benchmarks/RESULTS.md
 	$(BIN)/python benchmarks/run.py
 

@@ -16,6 +16,7 @@ import channels
 import dynamic
 import flagship
 import local_search
+import network
 import optimum
 import peers
 import simulated
@@ -44,6 +45,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "optimum": optimum.measured,
     "local_search": local_search.measured,
     "channels": channels.measured,
+    "network": network.measured,
 }
 """Parts that take longer than all others together: only when they are named."""
 ALL = {**PARTS, **LONG}

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from robochoc.communication.network.letters import MASTER
+from robochoc.formats.constraints import is_name
 
 ALL = "*"
 """Whoever there is."""
@@ -33,7 +34,13 @@ def name_in(key: str) -> str:
 
 
 def access_control(reach: Mapping[str, Sequence[str]]) -> dict[str, Any]:
-    """Zenoh's `access_control`: those in `reach` may take part, and each may write to the master and whom it lists."""
+    """Zenoh's `access_control`: those in `reach` may take part, and each may write to the master and whom it lists.
+
+    Raises `ValueError` for names that would be more than names in a key: `*` writes in everybody's name.
+    """
+    strange = next((name for name in reach if not is_name(name) or name == MASTER), None)
+    if strange is not None:
+        raise ValueError(f"{strange!r} is no name of a robot on a network: a letter, then letters, digits, '.' and '_'")
     rules: list[dict[str, Any]] = []
     policies = []
     for name, others in {**reach, MASTER: [ALL]}.items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from types import MappingProxyType
 
 from robochoc.authority.admission import Admission
 from robochoc.authority.identity import Identity
@@ -14,18 +15,27 @@ Reach = Mapping[str, tuple[str, ...]]
 
 
 class Gate:
-    """The router at `endpoint`, with rules that follow `admission`. Whoever opens it closes it."""
+    """The router at `endpoint`, with rules that follow `admission`. Whoever opens it closes it.
+
+    `ways` are the team's, if it is known before anybody comes: then the router need not be opened anew for it.
+    """
 
     def __init__(
-        self, admission: Admission, identity: Identity, endpoint: str, refused: RefusalObserver, lease_ms: int
+        self,
+        admission: Admission,
+        identity: Identity,
+        endpoint: str,
+        refused: RefusalObserver | None,
+        lease_ms: int,
+        ways: Reach = MappingProxyType({}),
     ) -> None:
         self._admission = admission
         self._router = Router(endpoint, identity, refused, lease_ms)
-        self._ways: Reach = {}
+        self._ways = ways
         self._admitted: dict[str, tuple[str, ...]] | None = None
 
     def open(self) -> None:
-        """Let in all whom the Authority has certified; they may write to the master."""
+        """Let in all whom the Authority has certified; they may write to the master, and where the ways lead."""
         self.follow()
 
     def open_ways(self, ways: Reach) -> None:

@@ -6,34 +6,31 @@ zenoh hangs. Certificates are made for this one run, and are nowhere but in memo
 
 from __future__ import annotations
 
-import ctypes
 import multiprocessing
-import os
-import signal
+import multiprocessing.forkserver
 import socket
-import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
 from multiprocessing.connection import wait
+from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
 from types import MappingProxyType
-from typing import NamedTuple, cast
+from typing import cast
 
 from robochoc.authority.admission import Household
-from robochoc.authority.identity import Identity, IdentityTexts
 from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.master import Master
-from robochoc.communication.network.members import Members
-from robochoc.communication.network.post import CannotConnect, Post
-from robochoc.communication.network.robot import Manner, NetworkRobot
+from robochoc.communication.network.members import Members, reach
+from robochoc.communication.network.profile import profile_of
+from robochoc.communication.network.robot_process import START_S, Given, robot_process
 from robochoc.communication.network.router import RouterFailed
 from robochoc.communication.robot_link import fate_of
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.communication.system import signals_held
 from robochoc.observers.events import Observer
-from robochoc.problem import Robot, Team
+from robochoc.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.encoding import Unsupported
@@ -42,24 +39,11 @@ from robochoc.solver.part import NO_BRIEF, Brief
 LOOPBACK = "127.0.0.1"
 GRACE_S = 2.0
 """How long robots that were sent home get to end by themselves."""
-START_S = 60.0
-"""How long robots may take to come."""
 _ATTEMPTS = 5
-_LOWEST_NICE = 19
-_PRELOAD = ["robochoc.communication.network.robot"]
-_PR_SET_PDEATHSIG = 1
-_PR_SET_NAME = 15
-
-
-class Given(NamedTuple):
-    """With what a robot's process begins."""
-
-    robot: Robot
-    domain: CompiledDomain | None
-    identity: IdentityTexts
-    endpoint: str
-    protocol: type[Protocol]
-    patience_s: float
+_PRELOAD = ("__main__", "robochoc.communication.network.robot_process")
+"""What the fork server imports once for all robots; without the program's own file each of them would."""
+_OURS = "robochoc."
+"""Modules that are sure to be importable there."""
 
 
 class LocalNetwork(Session):
@@ -87,12 +71,15 @@ class LocalNetwork(Session):
         self._household = Household(team.order)
         self._waiting = [(robot, domains.get(robot.name)) for robot in team.robots]
         watched = observer is not None
+        self._context = _fork_server(protocol)
+        profiles = {robot.name: profile_of(robot) for robot in team.robots}
+        ways = reach(profiles, beyond=protocol.traits.beyond)
         self._master = self._opened(
             lambda endpoint: Master(
                 self._household,
                 self._household.master_identity((LOOPBACK,)),
                 endpoint,
-                Members(team.order, order=team.order),
+                Members(team.order, order=team.order, ways=ways),
                 conditions,
                 observer=observer,
                 watched=watched,
@@ -108,9 +95,9 @@ class LocalNetwork(Session):
                 port = trial.getsockname()[1]
             try:
                 return make(f"{LOOPBACK}:{port}").__enter__()
-            except RouterFailed:
+            except RouterFailed as failed:
                 if attempt == _ATTEMPTS - 1:
-                    raise
+                    raise Unsupported(f"the router {failed}") from failed
         raise AssertionError
 
     @property
@@ -161,12 +148,10 @@ class LocalNetwork(Session):
         waiting, self._waiting = self._waiting, []
         if not waiting:
             return
-        context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(_PRELOAD)
         for robot, domain in waiting:
             texts = self._household.identity(robot.name).texts
             given = Given(robot, domain, texts, self._master.endpoint, self._protocol, self._patience_s)
-            process = context.Process(target=robot_process, name=robot.name, args=(given,), daemon=True)
+            process = self._context.Process(target=robot_process, name=robot.name, args=(given,), daemon=True)
             process.start()
             self._processes[robot.name] = process
         threading.Thread(target=self._watch, args=[dict(self._processes)], daemon=True).start()
@@ -192,25 +177,10 @@ class LocalNetwork(Session):
         self._processes = {}
 
 
-def robot_process(given: Given) -> None:
-    """What a robot's process runs. Ctrl-C reaches the whole process group, and is left to the parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
-    if sys.platform == "linux":
-        libc = ctypes.CDLL(None)
-        libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        libc.prctl(_PR_SET_NAME, given.robot.name.encode())
-    identity = Identity.of(given.identity)
-
-    def take_place(rank: int, size: int) -> None:
-        """As in `robot_process.py`: who comes earlier in the order goes first."""
-        wanted = _LOWEST_NICE * rank // size
-        os.setpriority(os.PRIO_PROCESS, 0, max(wanted, os.getpriority(os.PRIO_PROCESS, 0)))
-
-    try:
-        with Post(given.endpoint, identity, watch=(), patience_s=START_S) as post:
-            manner = Manner(given.patience_s, place=take_place)
-            NetworkRobot(given.robot, given.domain, identity, post, lambda _name: given.protocol, manner).run()
-    except CannotConnect as error:
-        sys.exit(str(error))
+def _fork_server(protocol: type[Protocol]) -> ForkServerContext:
+    """Start the fork server, if it does not run yet: while it imports, the router is opened."""
+    context = multiprocessing.get_context("forkserver")
+    own = [protocol.__module__] if protocol.__module__.startswith(_OURS) else []
+    context.set_forkserver_preload([*_PRELOAD, *own])
+    multiprocessing.forkserver.ensure_running()
+    return context

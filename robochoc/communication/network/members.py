@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 from robochoc.communication.network.access import ALL
 from robochoc.communication.network.profile import (
@@ -21,6 +22,14 @@ from robochoc.communication.network.words import Task
 from robochoc.problem import Robot
 from robochoc.protocols.traits import Traits
 from robochoc.solver.part import Brief
+
+
+def reach(profiles: Mapping[str, Profile], *, beyond: bool) -> dict[str, tuple[str, ...]]:
+    """To whom each of a team may write besides the master. See `Members.reach`."""
+    if beyond:
+        return dict.fromkeys(profiles, (ALL,))
+    met = acquaintances(profiles)
+    return {name: tuple(sorted(profiles.keys() & others)) for name, others in met.items()}
 
 
 class NotTaken(ValueError):  # noqa: N818 - named for the answer
@@ -50,13 +59,18 @@ class Members:
 
     `expected` names who alone may come (None: whoever the Authority lets in), `number` says how many do. Without either
     the team is complete when every neighbour that a robot names is there. `order` is the priority order, where it is
-    known before; parents come before their children in it.
+    known before; parents come before their children in it. `ways` are those that it will have (`reach`), likewise.
     """
 
     def __init__(
-        self, expected: Collection[str] | None = None, number: int | None = None, order: Sequence[str] | None = None
+        self,
+        expected: Collection[str] | None = None,
+        number: int | None = None,
+        order: Sequence[str] | None = None,
+        ways: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
     ) -> None:
         self.expected = expected
+        self.ways = ways
         self._order = order
         self.number = number
         self.robots: dict[str, Member] = {}
@@ -133,11 +147,7 @@ class Members:
 
     def reach(self, *, beyond: bool) -> dict[str, tuple[str, ...]]:
         """To whom each may write: everybody, if the protocol goes beyond those it may share constraints with."""
-        if beyond:
-            return dict.fromkeys(self.robots, (ALL,))
-        here = self.profiles
-        met = acquaintances(here)
-        return {name: tuple(other for other in others if other in here) for name, others in met.items()}
+        return reach(self.profiles, beyond=beyond)
 
     def tasks(self, epoch: int, protocol: str, traits: Traits, brief: Brief) -> dict[str, Task]:
         """What each robot is told for a search, in priority order."""

@@ -1,9 +1,9 @@
 """The router: the one process that all connect to. It checks certificates and who may write to whom.
 
-It is a process of its own (`python -m robochoc.communication.network.router`) that takes its configuration from
-standard input and holds no letters but those under way. zenoh's access control cannot be changed while it runs: to
-register or revoke somebody, the router is closed and opened anew with other rules, in a fraction of a second; what was
-sent meanwhile is recovered (`post.py`). What it refuses it tells in its log only, so that is read (`Refusals`).
+It is a process of its own (`router_process.py`) that holds no letters but those under way. zenoh's access control
+cannot be changed while it runs: to register or revoke somebody, the router is closed and opened anew with other rules,
+in a fraction of a second; what was sent meanwhile is recovered (`post.py`). What it refuses it tells in its log only,
+so that is read (`refusals`).
 """
 
 from __future__ import annotations
@@ -11,29 +11,29 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import IO, NamedTuple
 
-import zenoh
-
 from robochoc.authority.identity import Identity
 from robochoc.communication.network.access import access_control
-from robochoc.communication.network.post import config, encoded
+from robochoc.communication.network.post import encoded
 
 START_S = 10.0
 """How long the router may take to listen."""
+_PROCESS = "robochoc.communication.network.router_process"
 _READY = "listening"
-_LOG = "warn,zenoh::net::routing::interceptor=trace,zenoh_link_tls=warn"
+_LOG = "warn"
+_LOG_OF_REFUSALS = "warn,zenoh::net::routing::interceptor=trace"
+"""With what is allowed as well, several lines for each letter: that costs more than the letters themselves."""
 _CHUNK = 65536
 _DENIED = re.compile(
     rb"CertCommonName\(([^)]*)\)\S* is unauthorized to ([A-Za-z/ ]+?) \(ingress\) on (\S+)[^\n]*\n"
     rb"[^\n]*interceptor: Msg intercepted!"
 )
+_TELLING = re.compile(rb"unauthorized|zenoh_link_tls")
 _TLS = re.compile(rb"zenoh_link_tls::unicast: ((?:invalid peer certificate|received corrupt message|peer )[^\n]*)")
 _HINT = re.compile(r"\. Hint: .*$")
 _COLOURS = re.compile(rb"\x1b\[[0-9;]*m")
@@ -57,10 +57,11 @@ RefusalObserver = Callable[[Refusal], None]
 class Router:
     """Runs the router's process with the master's `identity`, on `endpoint` (`HOST:PORT`).
 
-    `refused` is told of refusals, from a thread of its own. Whoever opens it closes it.
+    `refused` is told of refusals, from a thread of its own (None: nobody wants to know, which is much faster). Whoever
+    opens it closes it.
     """
 
-    def __init__(self, endpoint: str, identity: Identity, refused: RefusalObserver, lease_ms: int) -> None:
+    def __init__(self, endpoint: str, identity: Identity, refused: RefusalObserver | None, lease_ms: int) -> None:
         self.endpoint = endpoint
         self._identity = identity
         self._refused = refused
@@ -71,12 +72,12 @@ class Router:
     def open(self, reach: Mapping[str, Sequence[str]]) -> None:
         """Listen, with these rules (see `access_control`) instead of those before. Raises `RouterFailed`."""
         self.close()
-        process = subprocess.Popen(  # noqa: S603 - this file, with this interpreter
-            [sys.executable, "-m", __name__],
+        process = subprocess.Popen(  # noqa: S603 - our own module, with this interpreter
+            [sys.executable, "-P", "-m", _PROCESS],  # -P: not what stands in the working directory
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-            env={**os.environ, "RUST_LOG": _LOG, "NO_COLOR": "1"},
+            env={**os.environ, "RUST_LOG": _LOG_OF_REFUSALS if self._refused else _LOG, "NO_COLOR": "1"},
             start_new_session=True,
         )
         self._process = process
@@ -151,8 +152,9 @@ class Router:
             last = text.rfind(b"\n", 0, max(0, whole - 1)) + 1
             if b"unauthorized" in text[last:whole]:  # what becomes of it stands in the next line
                 whole = last
-            for refusal in refusals(text[:whole]):
-                self._refused(refusal)
+            if self._refused and _TELLING.search(text, 0, whole):
+                for refusal in refusals(text[:whole]):
+                    self._refused(refusal)
             rest = text[whole:]
 
 
@@ -164,19 +166,3 @@ def refusals(log: bytes) -> Iterator[Refusal]:
         yield Refusal(who.decode(errors="replace"), action, "no rule of the Authority allows it")
     for why in _TLS.findall(plain):
         yield Refusal("", "connect", _HINT.sub("", why.decode(errors="replace")))
-
-
-def main() -> None:
-    """The router's process: it ends when standard input does, so never later than the master."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    zenoh.init_log_from_env_or("error")
-    settings = json.loads(sys.stdin.readline())
-    with zenoh.open(config(settings)):
-        sys.stdout.write(f"{_READY}\n")
-        sys.stdout.flush()
-        while sys.stdin.read(1):
-            time.sleep(0)
-
-
-if __name__ == "__main__":
-    main()

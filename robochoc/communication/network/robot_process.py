@@ -1,0 +1,57 @@
+"""A robot's process of `--runtime network`: all that the fork server imports, so without the master."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+from typing import NamedTuple
+
+from robochoc.authority.identity import Identity, IdentityTexts
+from robochoc.communication.network.post import CannotConnect, Post
+from robochoc.communication.network.robot import Manner, NetworkRobot
+from robochoc.problem import Robot
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.domain import CompiledDomain
+
+START_S = 60.0
+"""How long robots may take to come."""
+_LOWEST_NICE = 19
+_PR_SET_PDEATHSIG = 1
+_PR_SET_NAME = 15
+
+
+class Given(NamedTuple):
+    """With what a robot's process begins."""
+
+    robot: Robot
+    domain: CompiledDomain | None
+    identity: IdentityTexts
+    endpoint: str
+    protocol: type[Protocol]
+    patience_s: float
+
+
+def robot_process(given: Given) -> None:
+    """What a robot's process runs. Ctrl-C reaches the whole process group, and is left to the parent."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    if sys.platform == "linux":
+        libc = ctypes.CDLL(None)
+        libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        libc.prctl(_PR_SET_NAME, given.robot.name.encode())
+    identity = Identity.of(given.identity)
+
+    def take_place(rank: int, size: int) -> None:
+        """As in `robot_process.py`: who comes earlier in the order goes first."""
+        wanted = _LOWEST_NICE * rank // size
+        os.setpriority(os.PRIO_PROCESS, 0, max(wanted, os.getpriority(os.PRIO_PROCESS, 0)))
+
+    try:
+        with Post(given.endpoint, identity, watch=(), patience_s=START_S) as post:
+            manner = Manner(given.patience_s, place=take_place)
+            NetworkRobot(given.robot, given.domain, identity, post, lambda _name: given.protocol, manner).run()
+    except CannotConnect as error:
+        sys.exit(str(error))

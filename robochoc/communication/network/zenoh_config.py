@@ -1,0 +1,26 @@
+"""What every process of a run tells zenoh. Imports little, as the router's process starts with it, and fast."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+
+import zenoh
+
+RX_BYTES = 32 * 2**20
+"""What zenoh takes from the network at once: more than a letter, so that one that is too large is refused aloud."""
+
+
+def config(settings: Mapping[str, object]) -> zenoh.Config:
+    """A configuration of zenoh: `settings`, and nothing that looks for others or listens where it was not told to."""
+    made = zenoh.Config()
+    common = {
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "scouting/delay": 0,  # a router that may not look for others would still wait half a second for them
+        "transport/link/rx/max_message_size": RX_BYTES,
+        "transport/shared_memory/enabled": False,
+    }
+    for key, value in {**common, **settings}.items():
+        made.insert_json5(key, json.dumps(value))
+    return made
