@@ -75,6 +75,8 @@ class Members:
         self.number = number
         self.robots: dict[str, Member] = {}
         self.closed = False
+        self._known: frozenset[tuple[str, str]] = frozenset()
+        self._acquainted: dict[str, tuple[str, ...]] = {}
         self._over: set[str] = set()
         """Lives that have ended. In one that goes on after all, letters are numbered as nobody expects."""
 
@@ -178,11 +180,18 @@ class Members:
     def neighbourhood(self, name: str, values: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
         """Of the decided `values`, by robot, those that all whom `name` may share a constraint with show."""
         found: dict[str, int] = {}
-        for other in acquaintances(self.profiles)[name]:
+        for other in self._met()[name]:
             if other in self.robots:
                 interface = self.robots[other].robot.interface
                 found.update({v: value for v, value in values.get(other, {}).items() if v in interface})
         return found
+
+    def _met(self) -> dict[str, tuple[str, ...]]:
+        """See `acquaintances`; worked out once for all who are there."""
+        there = frozenset((name, member.visit) for name, member in self.robots.items())
+        if self._known != there:
+            self._known, self._acquainted = there, acquaintances(self.profiles)
+        return self._acquainted
 
     def _links(self, name: str) -> tuple[str, ...]:
         return tuple(parent for parent in self.robots[name].profile.parents if parent in self.robots)
