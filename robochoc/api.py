@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robochoc.defaults import MINIMISES
-from robochoc.formats import read_team
+from robochoc.formats import read_robot, read_team
 from robochoc.observers.events import Observer
 from robochoc.options import Options, Runtime, Withdrawal
 from robochoc.orders import Order
@@ -176,9 +176,10 @@ class AgentsContainer:
         file, sniff = self._agents[name]
         if file is None or file.stem != name:
             raise ValueError(f"{name} needs its file, {name}.xml")
+        robot = read_robot(file)
         identity = identity_of(name, main, *self._identities.get(name, (None, None)))
         with Compiler() as compiler:
-            return join(file, main, identity, Manner(PATIENCE_S, sniffed=sniff), compiler)
+            return join(robot, main, identity, Manner(PATIENCE_S, sniffed=sniff), compiler)
 
 
 def protocol_called(word: str) -> str:

@@ -160,7 +160,7 @@ class Authority:
         """
         names = list(names)
         for name in names:
-            _check_name(name, role)
+            check_name(name, role)
         tokens = {name: Token.new(fingerprint(self.certificate)) for name in names}
         with self._registry.change() as members:
             for name, token in tokens.items():
@@ -318,7 +318,7 @@ def default_folder() -> Path:
     return user_data_path("robochoc") / "authority"
 
 
-def _check_name(name: str, role: Role) -> None:
+def check_name(name: str, role: Role = Role.ROBOT) -> None:
     """Raises `BadName` if `name` cannot take part as `role`."""
     shown = on_one_line(shortened(name))
     if not is_name(name):

@@ -53,6 +53,10 @@ class EnrolmentFailed(Exception):  # noqa: N818 - named for what happened
     """There is no certificate; the message says why, and what to do."""
 
 
+class NobodyThere(EnrolmentFailed):
+    """Nobody listens at that address (yet). Nothing was sent, so the same token can be tried again."""
+
+
 class NotTrusted(EnrolmentFailed):
     """Whoever answers is not who the token, or the identity, is from. Nothing secret was sent."""
 
@@ -63,7 +67,7 @@ def enrol(
     """Make a key in `folder`, and have the Authority at `host` and `port` certify that it is the key of `name`.
 
     An identity in `folder` is replaced when the Authority has said yes. Raises `BadToken`, `NotTrusted`,
-    `EnrolmentFailed` (refused, or nobody there), `OSError` (the folder).
+    `NobodyThere`, `EnrolmentFailed` (refused), `OSError` (the folder).
     """
     token = token if isinstance(token, Token) else Token.parse(token)
     folder = Path(folder)
@@ -122,7 +126,11 @@ def _believing(ca: x509.Certificate) -> ssl.SSLContext:
 def _ask(place: tuple[str, int], question: Question, context: ssl.SSLContext, patience_s: float) -> Answer:
     """The answer of whoever is at `place` and passes `context`."""
     try:
-        with socket.create_connection(place, patience_s) as raw:
+        raw = socket.create_connection(place, patience_s)
+    except OSError as error:
+        raise NobodyThere(_unanswered(place, error)) from error
+    try:
+        with raw:
             Exchange(raw, patience_s).wait()
             # The name in the certificate is the master's, wherever it listens.
             with context.wrap_socket(raw, server_hostname=MASTER) as connection:
@@ -140,10 +148,12 @@ def _ask(place: tuple[str, int], question: Question, context: ssl.SSLContext, pa
             "is the certificate that was shown still good?"
         ) from error
     except (OSError, BadFrame) as error:
-        why = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise EnrolmentFailed(
-            f"no answer from the Authority at {_shown(place)}: {why}; is 'robochoc master' running there?"
-        ) from error
+        raise EnrolmentFailed(_unanswered(place, error)) from error
+
+
+def _unanswered(place: tuple[str, int], error: Exception) -> str:
+    why = error.strerror if isinstance(error, OSError) and error.strerror else error
+    return f"no answer from the Authority at {_shown(place)}: {why}; is 'robochoc master' running there?"
 
 
 def _certified(answer: Answer, ca: x509.Certificate, key: ec.EllipticCurvePrivateKey, name: str) -> x509.Certificate:

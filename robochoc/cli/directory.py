@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -36,6 +36,15 @@ if TYPE_CHECKING:
     metavar="SLOT=VALUE",
     help="Only who matches: protocol=abt, variable=V3.1, topic=..., name=Robot3.1, ontology=..., language=...",
 )
+@click.option(
+    "--patience",
+    "patience_s",
+    type=click.FloatRange(0, min_open=True),
+    default=10.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="How long the master may be out of reach.",
+)
 @click.option("--at-most", type=click.IntRange(1), metavar="N", help="At most so many agents.")
 @click.option("--sl", is_flag=True, help="Print the answer as it comes: FIPA-SL0.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object an agent.")
@@ -44,11 +53,10 @@ def directory(
     name: str,
     token: str | None,
     identity: Path | None,
-    slots: tuple[str, ...],
-    at_most: int | None,
     *,
     sl: bool,
     as_json: bool,
+    **given: Any,  # noqa: ANN401 - what to ask for, and how long to wait
 ) -> None:
     """List the agents that a running master's Directory Facilitator knows: their protocols, variables and topics.
 
@@ -60,8 +68,9 @@ def directory(
         from robochoc.machines.consult import consult, found, search_words
         from robochoc.machines.join import identity_of
 
-        words = search_words(place, slots, at_most)
-        answer = consult(place, identity_of(name, place, identity, token), words)
+        words = search_words(place, given["slots"], given["at_most"])
+        patience_s = given["patience_s"]
+        answer = consult(place, identity_of(name, place, identity, token, patience_s), words, patience_s)
         if sl:
             click.echo(answer)
             return

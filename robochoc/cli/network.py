@@ -37,6 +37,7 @@ class PlaceType(click.ParamType["Place"]):
 def network_failures_told(place: object) -> Iterator[None]:
     """Whatever ends a run across machines becomes one line, and an exit status."""
     try:
+        from robochoc.authority.authority import BadName
         from robochoc.authority.certificates import BadHost
         from robochoc.authority.enrolment import EnrolmentFailed
         from robochoc.authority.identity import BadIdentity
@@ -46,15 +47,16 @@ def network_failures_told(place: object) -> Iterator[None]:
         from robochoc.communication.network.router import RouterFailed
         from robochoc.machines.consult import BadTemplate, NoAnswer
     except ModuleNotFoundError as missing:
-        if missing.name is None or missing.name.partition(".")[0] not in _EXTRA:
+        package = (missing.name or "").partition(".")[0]
+        if package not in _EXTRA:
             raise
-        message = f"this needs {missing.name}, which is an extra; say: pip install 'robochoc[network]'"
+        message = f"this needs {package}, which is an extra; say: pip install 'robochoc[network]'"
         raise Failure(USAGE, message) from missing
     from robochoc.formats import on_one_line
 
     statuses: dict[int, tuple[type[Exception], ...]] = {
         INVALID: (BadIdentity, BadAuthority, BadToken),
-        USAGE: (BadHost, RouterFailed, BadTemplate),
+        USAGE: (BadHost, BadName, RouterFailed, BadTemplate),
         LOST: (CannotConnect, EnrolmentFailed, NoAnswer),
     }
     with failures_told(place):

@@ -60,6 +60,7 @@ def robot(
     with network_failures_told(file):
         from robochoc.communication.network.robot import Manner
         from robochoc.communication.run_result import Progress
+        from robochoc.formats import read_robot
         from robochoc.machines.join import identity_of, join
         from robochoc.solver.cache import SolutionCache
         from robochoc.solver.compile import Compiler
@@ -71,11 +72,13 @@ def robot(
                 if progress:
                     progress(Progress(0, _seconds() - began, words))
 
-            proof = identity_of(file.stem, place, identity, token)
+            itself = read_robot(file)  # before its token is spent
+            stage(f"looking for the master at {place}")
+            proof = identity_of(file.stem, place, identity, token, given["patience"])
             manner = Manner(given["patience"], sniffed=given["sniff"], stage=stage)
             cache = None if given["no_cache"] else SolutionCache()
             with Compiler(limits(given["local_solutions"], given["local_timeout"]), cache) as compiler:
-                ending = join(file, place, proof, manner, compiler)
+                ending = join(itself, place, proof, manner, compiler)
         if ending.failed:
             raise Failure(LOST, f"{file.stem}: {ending.why}")
         if as_json:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 import time
 from collections.abc import Sequence
 from queue import Empty
@@ -13,11 +14,11 @@ from robochoc.communication.network.words import Ask, Told
 from robochoc.machines.place import Place
 from robochoc.services.communicative_acts import Performative
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
-from robochoc.services.identifier import identifier_on
 from robochoc.services.sl import Function, descriptions_in, df_on, request
 
 ANSWER_S = 5.0
 ASK_AGAIN_S = 1.0
+_NUMBER_BITS = 32
 SLOTS = ("name", "protocol", "variable", "topic", "ontology", "language")
 
 
@@ -29,8 +30,11 @@ class BadTemplate(ValueError):  # noqa: N818 - named for what was given
     """That is nothing to search for."""
 
 
-def template_of(slots: Sequence[str], platform: str) -> AgentDescription:
-    """The template that `slot=value` words describe: all of them have to match. Raises `BadTemplate`."""
+def template_of(slots: Sequence[str]) -> AgentDescription:
+    """The template that `slot=value` words describe: all of them have to match. Raises `BadTemplate`.
+
+    Names may go without their platform, which may call itself otherwise than whoever asks does.
+    """
     given: dict[str, list[str]] = {slot: [] for slot in SLOTS}
     for word in slots:
         slot, equals, value = word.partition("=")
@@ -42,7 +46,7 @@ def template_of(slots: Sequence[str], platform: str) -> AgentDescription:
     services = [ServiceDescription(name=one, type=kind) for kind in ("variable", "topic") for one in given[kind]]
     name = given["name"][0] if given["name"] else ""
     return AgentDescription(
-        name=identifier_on(platform, name).name if name and "@" not in name else name,
+        name=name,
         services=tuple(services),
         protocols=tuple(given["protocol"]),
         ontologies=tuple(given["ontology"]),
@@ -58,25 +62,26 @@ def platform_at(place: Place) -> str:
 def search_words(place: Place, slots: Sequence[str], at_most: int | None = None) -> str:
     """The search as the directory is asked: an action in SL0. Raises `BadTemplate`."""
     platform = platform_at(place)
-    return request(df_on(platform), Function.SEARCH, template_of(slots, platform), at_most)
+    return request(df_on(platform), Function.SEARCH, template_of(slots), at_most)
 
 
 def consult(place: Place, identity: Identity, words: str, patience_s: float = 10.0) -> str:
     """What the directory answers to `words`, in SL0. Raises `CannotConnect` and `NoAnswer`."""
     letters = Letters(identity.name)
+    number = secrets.randbits(_NUMBER_BITS)  # answers to earlier questions may still come
     with Post(str(place), identity, watch=(), patience_s=patience_s) as post:
         until = time.monotonic() + ANSWER_S
         asked = 0.0
         while time.monotonic() < until:
             if time.monotonic() - asked > ASK_AGAIN_S:
                 asked = time.monotonic()
-                post.send(MASTER, letters.write(MASTER, Ask(1, words)))
+                post.send(MASTER, letters.write(MASTER, Ask(number, words)))
             try:
                 item = post.inbox.get(timeout=0.1)
             except Empty:
                 continue
             told = _told(letters, item) if isinstance(item, Arrived) and item.sender == MASTER else None
-            if told:
+            if told and told.number == number:
                 if told.performative != Performative.INFORM:
                     raise NoAnswer(f"the directory answers {told.performative}: {told.content}")
                 return told.content

@@ -1,30 +1,37 @@
-"""A robot's side of a run: read its file, compile it, prove who it is, register, search."""
+"""A robot's side of a run: prove who it is, compile what its file says, register, search."""
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
-from robochoc.authority.enrolment import EnrolmentFailed, enrol, renew
+from robochoc.authority.authority import check_name
+from robochoc.authority.enrolment import EnrolmentFailed, NobodyThere, enrol, renew
 from robochoc.authority.identity import BadIdentity, Identity, default_folder
 from robochoc.communication.network.post import Post
 from robochoc.communication.network.robot import Ending, Manner, NetworkRobot
-from robochoc.formats import read_robot
 from robochoc.machines.place import Place
 from robochoc.machines.speaking import spoken
+from robochoc.problem import Robot
 from robochoc.solver.compile import Compiler
 
 PATIENCE_S = 30.0
 """How long the master may be out of reach."""
+_TRY_AGAIN_S = 0.5
 
 
-def identity_of(name: str, place: Place, folder: Path | None = None, token: str | None = None) -> Identity:
+def identity_of(
+    name: str, place: Place, folder: Path | None = None, token: str | None = None, patience_s: float = PATIENCE_S
+) -> Identity:
     """The identity of `name` in `folder`: enrolled now, if there is a `token`; renewed, if half of its life is over.
 
-    Raises `BadIdentity`, `BadToken`, `NotTrusted`, `EnrolmentFailed`, `OSError`.
+    With a token it waits for a master that does not listen yet, for at most `patience_s` seconds. Raises `BadName`,
+    `BadIdentity`, `BadToken`, `NotTrusted`, `EnrolmentFailed`, `OSError`.
     """
+    check_name(name)
     folder = folder or default_folder(name)
     if token:
-        return enrol(place.host, place.enrolment_port, token, folder, name)
+        return _enrolled(name, place, folder, token, patience_s)
     identity = Identity.load(folder)
     if identity.name != name:
         raise BadIdentity(f"{folder} is the identity of {identity.name}, not of {name}; say --identity")
@@ -36,12 +43,22 @@ def identity_of(name: str, place: Place, folder: Path | None = None, token: str 
         return identity  # it is good for a while yet
 
 
-def join(file: Path, place: Place, identity: Identity, manner: Manner, compiler: Compiler) -> Ending:
-    """Be the robot of `file` in one run of the master at `place`. `compiler` compiles its domain.
+def _enrolled(name: str, place: Place, folder: Path, token: str, patience_s: float) -> Identity:
+    until = time.monotonic() + patience_s
+    while True:
+        try:
+            return enrol(place.host, place.enrolment_port, token, folder, name, max(patience_s, _TRY_AGAIN_S))
+        except NobodyThere:
+            if time.monotonic() + _TRY_AGAIN_S > until:
+                raise
+            time.sleep(_TRY_AGAIN_S)
 
-    Raises `InvalidInput`, `CannotConnect`, and what compiling raises.
+
+def join(robot: Robot, place: Place, identity: Identity, manner: Manner, compiler: Compiler) -> Ending:
+    """Be `robot` in one run of the master at `place`. `compiler` compiles its domain.
+
+    Raises `CannotConnect`, and what compiling raises.
     """
-    robot = read_robot(file)
     manner.stage("compiling")
     domain = compiler.compile(robot).domain
     manner.stage(f"looking for the master at {place}")

@@ -6,7 +6,8 @@ Section 5.2: "The master waits for the confirmation of creation all agents befor
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -15,10 +16,12 @@ from robochoc.answers import Refuted
 from robochoc.anytime import bound_of, joined, tree_of
 from robochoc.authority.authority import Authority
 from robochoc.authority.enrolment_server import EnrolmentServer
+from robochoc.authority.identity import Identity
 from robochoc.communication.host import BadSettings, settings_of
 from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
+from robochoc.communication.network.router import RouterFailed
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.defaults import MINIMISES, SATISFIES
@@ -79,25 +82,38 @@ def lead(
 ) -> Led:
     """Be the master of one run. `listening` is called once robots can come.
 
-    Raises `BadAuthority`, `BadHost`, `RouterFailed`, `RobotsLost`, `Unsupported`, `UnknownProtocol`, `Refuted`, and
-    `OSError` when the enrolment service cannot listen.
+    Raises `BadAuthority`, `BadHost`, `RouterFailed`, `RobotsLost`, `Unsupported`, `UnknownProtocol`, `Refuted`.
     """
-    if plan.protocol:
-        _check_settings(plan.protocol, plan.settings)
+    _check_settings_early(plan)
     authority = Authority.open(plan.authority, observer=observer or (lambda _event: None))
     hosts = [*([] if plan.place.anywhere else [plan.place.host]), *plan.hosts]
-    if not hosts:
-        raise Unsupported(f"{plan.place} is every address and the name of none; say how robots call it: --host NAME")
+    called = [host for host in hosts if ":" not in host]
+    if not called:
+        why = "every address and the name of none" if plan.place.anywhere else "an address that zenoh checks no name of"
+        raise Unsupported(f"{plan.place} is {why}; say how robots call it: --host NAME")
+    endpoint = str(plan.place._replace(host=called[0]))
     identity = authority.master_identity(hosts)
-    conditions = replace(plan.conditions, protocol=plan.protocol or "")
+    conditions = replace(plan.conditions, protocol=plan.protocol or "", listen=str(plan.place))
     members = Members(plan.names, plan.number)
     master = Master(
-        authority, identity, str(plan.place), members, conditions, observer=observer, watched=watched, progress=progress
+        authority, identity, endpoint, members, conditions, observer=observer, watched=watched, progress=progress
     )
-    service = EnrolmentServer(authority, identity, plan.place.host, plan.place.enrolment_port)
-    with service, master:
+    with _enrolling(authority, identity, plan.place), master:
         listening()
         return _Lead(plan, master).run()
+
+
+@contextmanager
+def _enrolling(authority: Authority, identity: Identity, place: Place) -> Iterator[None]:
+    """Redeem tokens. Raises `RouterFailed`."""
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(EnrolmentServer(authority, identity, place.host, place.enrolment_port))
+        except OSError as error:
+            where = place._replace(port=place.enrolment_port)
+            why = error.strerror or error
+            raise RouterFailed(f"cannot listen on {where}, where tokens are redeemed: {why}") from error
+        yield
 
 
 class _Lead:
@@ -208,6 +224,17 @@ class _Lead:
     def _team(self) -> Team:
         members = self._master.members
         return Team(self._plan.name, tuple(members.robots[name].robot for name in members.order))
+
+
+def _check_settings_early(plan: Plan) -> None:
+    """Before anybody comes: do not have a team gather for settings that no protocol of this plan has."""
+    if plan.protocol:
+        _check_settings(plan.protocol, plan.settings)
+        return
+    try:
+        _check_settings(SATISFIES, plan.settings)
+    except Unsupported:
+        _check_settings(MINIMISES, plan.settings)
 
 
 def _check_settings(protocol: str, settings: Mapping[str, str]) -> None:

@@ -10,6 +10,7 @@ DEFAULT_PORT = 7447
 """Zenoh's own."""
 LOOPBACK = "127.0.0.1"
 _LARGEST_PORT = 65_534
+_BRACKETED = re.compile(r"\[([^]]*)](?::(.+))?")
 _HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]*[A-Za-z0-9])?")
 
 
@@ -27,9 +28,8 @@ class Place(NamedTuple):
     def parse(cls, text: str) -> Place:
         """The place that `HOST`, `HOST:PORT` or `[IPv6]:PORT` names. Raises `BadPlace`."""
         host, port = text, ""
-        if text.startswith("["):
-            host, _, port = text[1:].partition("]")
-            port = port.removeprefix(":")
+        if found := _BRACKETED.fullmatch(text):
+            host, port = found[1], found[2] or ""
         elif text.count(":") <= 1:
             host, _, port = text.partition(":")
         if not _is_host(host) or (port and not (port.isdecimal() and 0 < int(port) <= _LARGEST_PORT)):

@@ -81,11 +81,11 @@ class AgentDescription(msgspec.Struct, frozen=True):
 def matches(template: AgentDescription, description: AgentDescription) -> bool:
     """Whether `description` has all that `template` gives (FIPA00023, the search function).
 
-    Equal names; of sets all that the template has; for each service of the template one that matches it in turn.
-    The lease is nothing to look for.
+    Equal names, or equal parts before `@` where the template has no more; of sets all that the template has; for each
+    service of the template one that matches it in turn. The lease is nothing to look for.
     """
     return (
-        template.name in {"", description.name}
+        template.name in {"", description.name, description.name.partition("@")[0]}
         and _has_all(template, description, ("protocols", "ontologies", "languages", "addresses"))
         and all(any(_fits(asked, offered) for offered in description.services) for asked in template.services)
     )

@@ -95,7 +95,7 @@ class Directory:
         check_bounds(template)
         self._lapse(now)
         known = self._registered
-        names = sorted(known) if not template.name else [template.name] if template.name in known else []
+        names = [template.name] if template.name in known else sorted(known)
         found = tuple(known[name].description for name in names if matches(template, known[name].description))
         return found if max_results is None or max_results < 0 else found[:max_results]
 

@@ -94,9 +94,9 @@ class Master:
         self._began = time.monotonic()
         self._letters = Letters(MASTER, self.run)
         self._facilitator = DirectoryFacilitator(endpoint, conditions.protocol)
-        self._gate = Gate(
-            admission, identity, endpoint, self._note_refusal if observer else None, conditions.lease_ms, members.ways
-        )
+        told = self._note_refusal if observer else None
+        place = conditions.listen or endpoint
+        self._gate = Gate(admission, identity, place, told, conditions.lease_ms, members.ways)
         self._dead: dict[str, str] = {}
         self._shown = self._looked = self._read_registry = 0.0
 

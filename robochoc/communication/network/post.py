@@ -8,6 +8,7 @@ zenoh. Its callbacks run in threads of its own, and only put what comes into `in
 from __future__ import annotations
 
 import base64
+import time
 from collections.abc import Iterable
 from queue import SimpleQueue
 from types import TracebackType
@@ -29,6 +30,8 @@ Each pair that has ever spoken has its own, at about 0.2 ms of CPU: 121 robots a
 outage does not wait for it: a receiver asks for that as soon as it sees the sender again.
 """
 KEPT_LETTERS = 100_000
+_FIRST_ATTEMPT_S, _LONGEST_ATTEMPT_S = 2.0, 10.0
+"""So long are attempts to connect; a busy router may take its time for a handshake."""
 
 
 class CannotConnect(Exception):  # noqa: N818 - named for what happened
@@ -81,10 +84,7 @@ class Post:
         self.name = identity.name
         self.inbox: SimpleQueue[Item] = SimpleQueue()
         self._publishers: dict[str, zenoh.ext.AdvancedPublisher] = {}
-        try:
-            self._session = zenoh.open(client_config(endpoint, identity, patience_s, lease_ms))
-        except zenoh.ZError as error:
-            raise CannotConnect(f"no master answers at {endpoint}, or it does not let {self.name} in") from error
+        self._session = _opened(endpoint, identity, patience_s, lease_ms)
         self._subscriber = zenoh.ext.declare_advanced_subscriber(
             self._session,
             letter_key(self.name, ALL),
@@ -145,6 +145,26 @@ class Post:
 
     def _note_presence(self, sample: zenoh.Sample) -> None:
         self.inbox.put(Presence(name_in(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT))
+
+
+def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Session:
+    """A session. zenoh does not hear Ctrl-C while it connects, so it is not left to that for long."""
+    if endpoint.startswith("["):
+        raise CannotConnect(
+            f"{endpoint}: zenoh cannot check whose IPv6 address that is; call the master by a host name"
+        )
+    until = time.monotonic() + patience_s
+    attempt_s = _FIRST_ATTEMPT_S
+    while True:
+        left = until - time.monotonic()
+        try:
+            return zenoh.open(client_config(endpoint, identity, min(attempt_s, left), lease_ms))
+        except zenoh.ZError as error:
+            if time.monotonic() >= until:
+                raise CannotConnect(
+                    f"no master answers at {endpoint}, or it does not let {identity.name} in"
+                ) from error
+        attempt_s = min(2 * attempt_s, _LONGEST_ATTEMPT_S)
 
 
 def client_config(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Config:

@@ -212,8 +212,9 @@ class Searcher:
             return
         protocol, private = self._host.protocol, self._around.private
         metrics = replace(self._host.metrics(), memory=own_memory())
+        assigned = bool(protocol.assignment)  # who steps aside has a value, and none of its variables has
         assignment, findings = ({}, NOTHING) if private else (protocol.assignment, protocol.findings)
-        self._around.say(Account(self.epoch, protocol.value is not None, assignment, metrics, findings))
+        self._around.say(Account(self.epoch, assigned, assignment, metrics, findings))
 
     def judged(self, told: Mapping[str, int]) -> Checked:
         """Hold all own constraints against what everybody has decided; of robots that stepped aside nothing is asked.
