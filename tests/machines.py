@@ -68,6 +68,10 @@ class Program:
 
         wait_until(said, lambda: f"{words!r} was never said: {self.errors}")
 
+    def wait_to_print(self, words: str) -> None:
+        """Wait until `words` stand on its standard output."""
+        wait_until(lambda: words in self.output, lambda: f"{words!r} was never printed: {self.output} {self.errors}")
+
     def status(self, within_s: float = LONG_S) -> int:
         """Its exit status, once it has ended; no program ends with a traceback."""
         status = self._process.wait(within_s)

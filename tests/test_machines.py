@@ -159,9 +159,13 @@ def test_whom_the_directory_knows_while_the_master_waits(site: Site) -> None:
     table = asked("--search", "topic=/nowhere")
     assert (table.status(), table.output) == (0, "nobody that matches\n")
 
+    watcher = asked("--watch", "--patience", 1)
+    watcher.wait_to_print("RB@")
     last = site.robot(files / "RC.xml", "--token", late)
     assert master.status() == 0, master.errors
     assert (master.object["verdict"], len(master.object["withdrawn"])) == ("optimal", 1)
+    assert (watcher.status(), "is gone" in watcher.errors) == (4, True)
+    assert [line.partition("@")[0] for line in watcher.output.splitlines()] == ["RA", "RB", "RC"]
     ended({**robots, "RC": last})
 
 

@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     help="How long the master may be out of reach.",
 )
 @click.option("--at-most", type=click.IntRange(1), metavar="N", help="At most so many agents.")
+@click.option("--watch", "watching", is_flag=True, help="Go on, and tell who comes and goes, until Ctrl-C.")
 @click.option("--sl", is_flag=True, help="Print the answer as it comes: FIPA-SL0.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object an agent.")
 def directory(
@@ -56,6 +57,7 @@ def directory(
     *,
     sl: bool,
     as_json: bool,
+    watching: bool,
     **given: Any,  # noqa: ANN401 - what to ask for, and how long to wait
 ) -> None:
     """List the agents that a running master's Directory Facilitator knows: their protocols, variables and topics.
@@ -65,23 +67,39 @@ def directory(
     if sl and as_json:
         raise click.UsageError("--sl and --json are two forms of one answer; drop one")
     with network_failures_told(place):
-        from robochoc.machines.consult import consult, found, search_words
+        from robochoc.machines.consult import consult, found, search_words, watch
         from robochoc.machines.join import identity_of
 
         words = search_words(place, given["slots"], given["at_most"])
         patience_s = given["patience_s"]
-        answer = consult(place, identity_of(name, place, identity, token, patience_s), words, patience_s)
-        if sl:
-            click.echo(answer)
+        proof = identity_of(name, place, identity, token, patience_s)
+        if watching:
+            for answer in watch(place, proof, words, patience_s):
+                _tell(answer, sl=sl, as_json=as_json)
             return
-        agents = found(answer)
-        if as_json:
-            import msgspec
-
-            for agent in agents:
-                click.echo(msgspec.json.encode(agent).decode())
+        answer = consult(place, proof, words, patience_s)
+        if sl or as_json:
+            _tell(answer, sl=sl, as_json=as_json)
         else:
-            _print_table(agents)
+            _print_table(found(answer))
+
+
+def _tell(answer: str, *, sl: bool, as_json: bool) -> None:
+    """One answer, line by line; of one who has gone the name is all that is left."""
+    import msgspec
+
+    from robochoc.machines.consult import about, found
+
+    if sl:
+        click.echo(answer)
+        return
+    agents = found(answer)
+    for agent in agents:
+        kinds = ", ".join(f"{one.type} {one.name}" for one in agent.services)
+        click.echo(msgspec.json.encode(agent).decode() if as_json else f"{agent.name}: {kinds}")
+    gone = "" if agents else about(answer)
+    if gone:
+        click.echo(msgspec.json.encode({"name": gone, "gone": True}).decode() if as_json else f"{gone} has gone")
 
 
 def _print_table(agents: tuple[AgentDescription, ...]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from queue import Empty
 
 from robochoc.authority.identity import Identity
@@ -14,7 +14,7 @@ from robochoc.communication.network.words import Ask, Told
 from robochoc.machines.place import Place
 from robochoc.services.communicative_acts import Performative
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
-from robochoc.services.sl import Function, descriptions_in, df_on, request
+from robochoc.services.sl import Function, descriptions_in, df_on, request, searched_in
 
 ANSWER_S = 5.0
 ASK_AGAIN_S = 1.0
@@ -67,30 +67,80 @@ def search_words(place: Place, slots: Sequence[str], at_most: int | None = None)
 
 def consult(place: Place, identity: Identity, words: str, patience_s: float = 10.0) -> str:
     """What the directory answers to `words`, in SL0. Raises `CannotConnect` and `NoAnswer`."""
-    letters = Letters(identity.name)
-    number = secrets.randbits(_NUMBER_BITS)  # answers to earlier questions may still come
     with Post(str(place), identity, watch=(), patience_s=patience_s) as post:
-        until = time.monotonic() + ANSWER_S
-        asked = 0.0
+        return _Asking(place, identity, post).asked(words, Performative.INFORM)
+
+
+def watch(place: Place, identity: Identity, words: str, patience_s: float = 10.0) -> Iterator[str]:
+    """What the directory tells whoever subscribes to what `words` search for, now and whenever it changes, in SL0.
+
+    It ends with `NoAnswer` when the master is gone for `patience_s`. Raises `CannotConnect` as well.
+    """
+    with Post(str(place), identity, watch=(), patience_s=patience_s) as post:
+        asking = _Asking(place, identity, post)
+        asking.asked(words, Performative.AGREE, subscribe=True)
+        heard = time.monotonic()
+        while time.monotonic() - heard < patience_s:
+            told = asking.told()
+            if told:
+                yield told.content
+            if told or post.connected:
+                heard = time.monotonic()
+    raise NoAnswer(f"the master at {place} is gone")
+
+
+class _Asking:
+    """One who asks; answers to others' questions, and to earlier ones, are none."""
+
+    def __init__(self, place: Place, identity: Identity, post: Post) -> None:
+        self._place = place
+        self._name = identity.name
+        self._post = post
+        self._letters = Letters(identity.name)
+        self._number = secrets.randbits(_NUMBER_BITS)
+        self._early: list[Told] = []
+
+    def asked(self, words: str, wanted: Performative, *, subscribe: bool = False) -> str:
+        """Ask until there is an answer; its content. Raises `NoAnswer`."""
+        until, asked = time.monotonic() + ANSWER_S, 0.0
         while time.monotonic() < until:
             if time.monotonic() - asked > ASK_AGAIN_S:
                 asked = time.monotonic()
-                post.send(MASTER, letters.write(MASTER, Ask(number, words)))
-            try:
-                item = post.inbox.get(timeout=0.1)
-            except Empty:
+                self._post.send(MASTER, self._letters.write(MASTER, Ask(self._number, words, subscribe)))
+            told = self._next()
+            if told is None:
                 continue
-            told = _told(letters, item) if isinstance(item, Arrived) and item.sender == MASTER else None
-            if told and told.number == number:
-                if told.performative != Performative.INFORM:
-                    raise NoAnswer(f"the directory answers {told.performative}: {told.content}")
+            if told.performative == wanted:
                 return told.content
-    raise NoAnswer(f"the master at {place} does not answer {identity.name}; is it enrolled with its Authority?")
+            if told.performative != Performative.INFORM:
+                raise NoAnswer(f"the directory answers {told.performative}: {told.content}")
+            self._early.append(told)
+        raise NoAnswer(f"the master at {self._place} does not answer {self._name}; is it enrolled with its Authority?")
+
+    def told(self) -> Told | None:
+        """The next INFORM; None: for a moment there was none."""
+        if self._early:
+            return self._early.pop(0)
+        told = self._next()
+        return told if told and told.performative == Performative.INFORM else None
+
+    def _next(self) -> Told | None:
+        try:
+            item = self._post.inbox.get(timeout=0.1)
+        except Empty:
+            return None
+        told = _told(self._letters, item) if isinstance(item, Arrived) and item.sender == MASTER else None
+        return told if told and told.number == self._number else None
 
 
 def found(answer: str) -> tuple[AgentDescription, ...]:
     """The agents in an answer."""
     return descriptions_in(answer)
+
+
+def about(answer: str) -> str:
+    """The name of the agent that an answer to a subscriber is about; empty where a search was for no name."""
+    return searched_in(answer).name
 
 
 def _told(letters: Letters, item: Arrived) -> Told | None:
@@ -101,4 +151,4 @@ def _told(letters: Letters, item: Arrived) -> Told | None:
     return word if isinstance(word, Told) else None
 
 
-__all__ = ["BadTemplate", "CannotConnect", "NoAnswer", "consult", "found", "search_words"]
+__all__ = ["BadTemplate", "CannotConnect", "NoAnswer", "about", "consult", "found", "search_words", "watch"]

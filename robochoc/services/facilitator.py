@@ -42,8 +42,8 @@ def handle(directory: Directory, requester: str, content: str, now: float) -> tu
     return Performative.INFORM, content_of(answer)
 
 
-def subscribe(directory: Directory, requester: str, content: str, now: float) -> tuple[Performative, str] | None:
-    """From now on tell `requester` of what a SUBSCRIBE's `content` searches for (see `told`); None: granted.
+def subscribe(directory: Directory, requester: str, content: str, now: float) -> tuple[Performative, str]:
+    """From now on tell `requester` of what a SUBSCRIBE's `content` searches for (see `told`), and say AGREE.
 
     By fipa-subscribe (FIPA00035), where the content would be an `iota` expression, which SL0 does not have: here it is
     the search action that would find the same. What is refused comes as from `handle`.
@@ -58,7 +58,7 @@ def subscribe(directory: Directory, requester: str, content: str, now: float) ->
             return Performative.REFUSE, content_of(action.whole, _proposition(refused.reason, refused.about))
     except BadExpression as bad:
         return Performative.NOT_UNDERSTOOD, content_of(listed("unsupported-value", String(f"{bad} (at {bad.at})")))
-    return None
+    return Performative.AGREE, content_of(action.whole, Word("true"))
 
 
 def told(df: AgentIdentifier, notice: Notice) -> str:

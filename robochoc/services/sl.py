@@ -100,6 +100,14 @@ def descriptions_in(content: str) -> tuple[AgentDescription, ...]:
     return tuple(map(description_of, _members(parts[1], "the result of a search")))
 
 
+def searched_in(content: str) -> AgentDescription:
+    """What the search was for whose result `content` tells. Raises `BadExpression`, and `Refused`."""
+    (whole,) = _content(content, ANSWER_CAPS)
+    action = items_of(whole, ("result",), "the answer to a search")[0]
+    _, act = items_of(action, ("action",), "an action")
+    return description_of(items_of(act, (Function.SEARCH,), "a search")[0])
+
+
 def content_of(*expressions: Expression) -> str:
     """The content of a message: SL puts all that it says between parentheses."""
     return written(List(expressions))

@@ -56,8 +56,8 @@ class DirectoryFacilitator:
         """Forget those whose lease has ended."""
         self._directory.expire(time.time())
 
-    def answer(self, requester: str, ask: Ask) -> Told | None:
-        """What `requester` asks for in SL0, answered; None: `notices` will have it. Raises `TooOften`."""
+    def answer(self, requester: str, ask: Ask) -> Told:
+        """The answer to what `requester` asks in SL0; `notices` has what it subscribes to. Raises `TooOften`."""
         now = time.time()
         recent = [t for t in self._asked.get(requester, []) if now - t < 1]
         self._asked[requester] = [*recent, now]
@@ -67,8 +67,7 @@ class DirectoryFacilitator:
         if not ask.subscribe:
             return _told(ask.number, handle(self._directory, aid, ask.content, now))
         self._numbers[aid] = ask.number
-        refusal = subscribe(self._directory, aid, ask.content, now)
-        return _told(ask.number, refusal) if refusal else None
+        return _told(ask.number, subscribe(self._directory, aid, ask.content, now))
 
     def notices(self) -> Iterator[tuple[str, Told]]:
         """What subscribers are to be told, each with the subscriber's name."""

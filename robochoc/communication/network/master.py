@@ -227,7 +227,8 @@ class Master:
         if now - self._read_registry >= REGISTRY_S:
             self._read_registry = now
             self._facilitator.expire()
-            self._tell_subscribers()
+            for subscriber, told in self._facilitator.notices():
+                self._tell(subscriber, told)
             self._follow_registry()
 
     def _ask_around(self, tally: Tally, now: float) -> None:
@@ -319,17 +320,9 @@ class Master:
 
     def _answer(self, sender: str, ask: Ask) -> None:
         try:
-            told = self._facilitator.answer(sender, ask)
+            self._tell(sender, self._facilitator.answer(sender, ask))
         except TooOften as often:
             self._refuse(sender, "ask the Directory Facilitator", str(often))
-            return
-        if told:
-            self._tell(sender, told)
-        self._tell_subscribers()
-
-    def _tell_subscribers(self) -> None:
-        for subscriber, told in self._facilitator.notices():
-            self._tell(subscriber, told)
 
     # Who is there
 
