@@ -41,7 +41,7 @@ class Scripted:
     `heard` holds these words; what it sends to others stands in `sent`.
     """
 
-    connected = True
+    router = "here"
 
     def __init__(self, name: str, script: Callable[[Word], Iterable[Item]]) -> None:
         self.inbox: SimpleQueue[Item] = SimpleQueue()
@@ -184,7 +184,7 @@ class Office:
 class Desk:
     """One robot's post in the office."""
 
-    connected = True
+    router = "here"
 
     def __init__(self, office: Office, name: str) -> None:
         self.inbox = office.inboxes[name]

@@ -25,7 +25,6 @@ from robochoc.communication.network.words import (
     Judge,
     Leave,
     Register,
-    Said,
     Search,
     Welcome,
     Word,
@@ -62,13 +61,6 @@ def test_an_unknown_protocol_is_told() -> None:
 def test_lost_letters_are_told() -> None:
     _, failed = failing(Missed(3))
     assert (failed.why, failed.unsupported) == ("3 letters to RB were lost for good", True)
-
-
-def test_what_is_no_message_is_told() -> None:
-    said = Arrived("RA", Letters("RA", RUN).write("RB", Said(1, 0, b"no message")))
-    _, failed = failing(task(), Search(1), said)
-    assert failed.why.startswith("RA sent RB what is no message")
-    assert not failed.unsupported
 
 
 def copy(scope: tuple[str, ...] = ("B", "C"), body: str = "ne(X, Y)") -> SharedRecord:
@@ -171,7 +163,7 @@ def test_another_master_ends_the_run_the_same_one_does_not() -> None:
 def test_a_master_that_is_gone_ends_the_run() -> None:
     def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
         if isinstance(word, Joined):
-            post.connected = False
+            post.router = ""
         yield from ()
 
     ending, _ = played(script, patience_s=0.1)
@@ -183,6 +175,6 @@ def test_who_fails_does_not_wait_for_a_master_that_is_gone() -> None:
         if isinstance(word, Joined):
             yield Missed(1)
         elif isinstance(word, Failed):
-            post.connected = False
+            post.router = ""
 
     assert played(script)[0].failed

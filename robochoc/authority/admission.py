@@ -51,6 +51,11 @@ class Household:
         """Whether `who` is none of the household, or was revoked."""
         return who not in self._robots or who in self._turned_away
 
+    def enrol(self, name: str) -> None:
+        """Let `name` take part from now on, as well."""
+        self._turned_away.discard(name)
+        self._robots = tuple(sorted({*self._robots, name}))
+
     def revoke(self, name: str) -> None:
         """Turn `name` away from now on."""
         self._turned_away.add(name)

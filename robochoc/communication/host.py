@@ -131,7 +131,7 @@ class Host:
     def _receive(self, envelope: Envelope) -> None:
         try:
             message: Message = self._decoder.decode(envelope.content)
-        except msgspec.MsgspecError as error:
+        except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
             raise BadMessage(f"{envelope.sender} sent {self.name} what is no message: {error}") from error
         self.clock = max(self.clock, envelope.clock)
         self.protocol.receive(envelope.sender, message)

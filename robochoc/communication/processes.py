@@ -38,7 +38,7 @@ from robochoc.communication.quiescence import Counts, FourCounters
 from robochoc.communication.robot_link import RobotLink, RobotsLost
 from robochoc.communication.robot_process import Beginning
 from robochoc.communication.run_result import Progress, RunResult
-from robochoc.communication.session import Epoch, Session
+from robochoc.communication.session import Epoch, Session, over
 from robochoc.communication.system import garbage_frozen
 from robochoc.observers.events import AnyEvent, Lost, Observer, Registered
 from robochoc.outcome import Verdict
@@ -117,7 +117,7 @@ class ProcessesRun(Session):
                 self._searching = True
                 self._wait_until(lambda: self._verdict is not None or self._broken_off, deadline)
                 self._searching, self._quiet = False, self._counters.quiescent and not self._broken_off
-            return self._finish(began, late=_over(deadline))
+            return self._finish(began, late=over(deadline))
         except RobotsLost as lost:
             for name, why in lost.robots.items():
                 self._observe(Lost(t=self._now(), robot=name, why=why))
@@ -163,7 +163,7 @@ class ProcessesRun(Session):
         self._crew.make_room(len(waiting) + len(self._crew.robots))
         with garbage_frozen():
             for part in waiting.values():
-                if _over(deadline):
+                if over(deadline):
                     break
                 self._start(part)
                 self._see_ends()
@@ -184,13 +184,13 @@ class ProcessesRun(Session):
         """Serve the robots until `done()` or the deadline; raises `RobotsLost` as soon as one is lost for good."""
         while not done():
             now = time.monotonic()
-            if _over(deadline):
+            if over(deadline):
                 return
             for robot in self._crew.speakers(TICK_S if deadline is None else min(TICK_S, deadline - now)):
                 for word in self._crew.words(robot):
                     self._hear(robot, word)
                 self._see_ends()  # after each, as robots may have much to say, and the machine may be busy
-                if _over(deadline):
+                if over(deadline):
                     return
             self._see_ends()
             if now - self._looked >= TICK_S:
@@ -288,7 +288,7 @@ class ProcessesRun(Session):
         self._tell_all(Pause())
         self._await_reports(late=late)
         silent = self._silent()
-        if silent and not late and not (self._verdict is None and _over(self._deadline)):
+        if silent and not late and not (self._verdict is None and over(self._deadline)):
             if not self._survive:
                 raise RobotsLost(dict.fromkeys(silent, "it did not report at the end"))
             for name in silent:
@@ -313,7 +313,7 @@ class ProcessesRun(Session):
                 patience = min(patience, max(self._deadline, now + LATE_WORDS_S))
             self._wait_until(lambda: not self._silent(), patience)
             busy = any(self._crew.robots[name].is_computing for name in self._silent())
-            if late or self._verdict is not None or not busy or _over(self._deadline):
+            if late or self._verdict is not None or not busy or over(self._deadline):
                 return
 
     def _silent(self) -> list[str]:
@@ -339,7 +339,3 @@ class ProcessesRun(Session):
 
     def _now(self) -> float:
         return time.monotonic() - self._began
-
-
-def _over(deadline: float | None) -> bool:
-    return deadline is not None and time.monotonic() >= deadline

@@ -51,6 +51,11 @@ class FourCounters:
         )
 
     @property
+    def total(self) -> Counts | None:
+        """Messages sent and taken in by all together; None while somebody has not been heard."""
+        return None if self._unheard else self._total
+
+    @property
     def due(self) -> bool:
         """Whether a wave is worth its cost: all have been heard, the sums balance, and none is under way."""
         return not self._unanswered and not self._unheard and self._total.sent == self._total.received

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from types import MappingProxyType, TracebackType
@@ -66,3 +67,8 @@ class Session(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def over(deadline: float | None) -> bool:
+    """Whether `deadline` (on the monotonic clock; None: there is none) has come."""
+    return deadline is not None and time.monotonic() >= deadline

@@ -84,7 +84,7 @@ def watch(place: Place, identity: Identity, words: str, patience_s: float = 10.0
             told = asking.told()
             if told:
                 yield told.content
-            if told or post.connected:
+            if told or post.router:
                 heard = time.monotonic()
     raise NoAnswer(f"the master at {place} is gone")
 

@@ -9,7 +9,7 @@ from contextlib import suppress
 from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.words import Ask, Told
 from robochoc.services.communicative_acts import Performative
-from robochoc.services.descriptions import AgentDescription, Refused, ServiceDescription
+from robochoc.services.descriptions import MAX_SERVICES, AgentDescription, Refused, ServiceDescription
 from robochoc.services.directory import Directory
 from robochoc.services.facilitator import handle, subscribe, told
 from robochoc.services.sl import df_on
@@ -34,18 +34,25 @@ class DirectoryFacilitator:
         self._numbers: dict[str, int] = {}
         """The number under which each subscriber has asked last."""
 
-    def enter(self, profile: Profile) -> None:
-        """The robot of `profile` can be found: by its protocol, its variables, its topics. Raises `Refused`."""
+    def enter(self, profile: Profile) -> str:
+        """The robot of `profile` can be found: by its protocol, its variables, its topics.
+
+        By as many of them as a description holds. Returns why it cannot be found, if so; it takes part all the same.
+        """
         services = (
             *(ServiceDescription(name=topic, type="topic") for topic in profile.topics),
             *(ServiceDescription(name=variable, type="variable") for variable in profile.variables),
-        )
+        )[:MAX_SERVICES]
         self.leave(profile.name)
         name = self._aid(profile.name)
         protocols = (self._protocol,) if self._protocol else ()
         addresses = (f"tls/{self._endpoint}",)
         description = AgentDescription(name, services, protocols, ("robochoc",), addresses=addresses)
-        self._directory.register(description, time.time(), requester=name)
+        try:
+            self._directory.register(description, time.time(), requester=name)
+        except Refused as refused:
+            return str(refused)
+        return ""
 
     def leave(self, name: str) -> None:
         """The robot called `name` cannot be found any more."""

@@ -65,7 +65,7 @@ class LocalNetwork(Session):
     ) -> None:
         self._protocol = protocol
         self._brief = brief
-        self._patience_s = conditions.patience_s
+        self._conditions = conditions
         self._processes: dict[str, BaseProcess] = {}
         self._sent_home = False
         self._household = Household(team.order)
@@ -150,7 +150,8 @@ class LocalNetwork(Session):
             return
         for robot, domain in waiting:
             texts = self._household.identity(robot.name).texts
-            given = Given(robot, domain, texts, self._master.endpoint, self._protocol, self._patience_s)
+            limits = (self._conditions.patience_s, self._conditions.lease_ms)
+            given = Given(robot, domain, texts, self._master.endpoint, self._protocol, *limits)
             process = self._context.Process(target=robot_process, name=robot.name, args=(given,), daemon=True)
             process.start()
             self._processes[robot.name] = process
@@ -182,5 +183,8 @@ def _fork_server(protocol: type[Protocol]) -> ForkServerContext:
     context = multiprocessing.get_context("forkserver")
     own = [protocol.__module__] if protocol.__module__.startswith(_OURS) else []
     context.set_forkserver_preload([*_PRELOAD, *own])
-    multiprocessing.forkserver.ensure_running()
+    try:
+        multiprocessing.forkserver.ensure_running()
+    except OSError as error:  # such as a temporary folder whose path is too long for a socket
+        raise Unsupported(f"robots' processes cannot be started: {error} (see TMPDIR)") from error
     return context

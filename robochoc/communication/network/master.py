@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from queue import Empty
 from types import TracebackType
@@ -27,8 +27,8 @@ from robochoc.communication.network.letters import MASTER, Letters, Refused, Too
 from robochoc.communication.network.members import Member, Members, NotTaken
 from robochoc.communication.network.post import Arrived, Missed, Post, Presence, Woken
 from robochoc.communication.network.profile import BadProfile, Profile, Ranges, domain_of
-from robochoc.communication.network.router import Refusal
-from robochoc.communication.network.tally import Tally
+from robochoc.communication.network.refusals import Refusals
+from robochoc.communication.network.tally import Tally, is_of
 from robochoc.communication.network.words import (
     Ask,
     Bye,
@@ -48,6 +48,7 @@ from robochoc.communication.network.words import (
 )
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress, RunResult
+from robochoc.communication.session import over
 from robochoc.observers import events
 from robochoc.observers.events import AnyEvent, Observer
 from robochoc.outcome import Verdict
@@ -94,9 +95,9 @@ class Master:
         self._began = time.monotonic()
         self._letters = Letters(MASTER, self.run)
         self._facilitator = DirectoryFacilitator(endpoint, conditions.protocol)
-        told = self._note_refusal if observer else None
-        place = conditions.listen or endpoint
-        self._gate = Gate(admission, identity, place, told, conditions.lease_ms, members.ways)
+        self._refuse = Refusals(self._tell_of_refusal).note
+        told = (lambda one: self._refuse(*one)) if observer else None
+        self._gate = Gate(admission, identity, conditions.listen or endpoint, told, conditions.lease_ms, members.ways)
         self._dead: dict[str, str] = {}
         self._shown = self._looked = self._read_registry = 0.0
 
@@ -124,7 +125,7 @@ class Master:
         """Wait until all robots are registered; False when the deadline came first (on the monotonic clock)."""
         self._wait_until(lambda: self.members.complete, deadline)
         unseen = self.members.unseen()
-        while unseen and not _over(deadline):
+        while unseen and not over(deadline):
             for name, variables in unseen.items():
                 self._tell(name, Show(variables))
             self._wait_until(lambda before=unseen: self.members.unseen() != before, deadline)  # type: ignore[misc]
@@ -151,7 +152,7 @@ class Master:
         for name, task in self.members.tasks(tally.epoch, protocol, traits, brief).items():
             self._tell(name, task)
         self._wait_until(lambda: tally.broken_off or tally.ready, deadline)
-        if tally.verdict is None and not tally.broken_off and not _over(deadline):
+        if tally.verdict is None and not tally.broken_off and not over(deadline):
             self._tell_all(Search(tally.epoch))
             tally.searching = True
             self._wait_until(lambda: tally.verdict is not None or tally.broken_off, deadline)
@@ -189,7 +190,7 @@ class Master:
         """Serve everybody until `done()` or the deadline; raises `RobotsLost` as soon as one is lost for good."""
         while not done():
             now = time.monotonic()
-            if _over(deadline):
+            if over(deadline):
                 return
             with suppress(Empty):
                 self._serve(TICK_S if deadline is None else min(TICK_S, deadline - now))
@@ -200,7 +201,8 @@ class Master:
                 self._ask_around(self.tally, now)
 
     def _serve(self, patience_s: float) -> None:
-        """Deal with what has come. Raises `Empty` when nothing is left."""
+        """Deal with what has come, for a while at most. Raises `Empty` when nothing is left."""
+        until = time.monotonic() + TICK_S
         item = self._post.inbox.get(timeout=max(patience_s, 0.001))
         while True:
             match item:
@@ -212,6 +214,8 @@ class Master:
                     raise RobotsLost({MASTER: f"{letters} letters to it were lost for good"})
                 case Woken():
                     return
+            if time.monotonic() >= until:
+                return
             item = self._post.inbox.get_nowait()
 
     def _look_around(self, now: float) -> None:
@@ -219,7 +223,7 @@ class Master:
         if self._gate.broken:
             raise RobotsLost({MASTER: "the router's process has ended"})
         while self._dead:
-            self._lose(*self._dead.popitem())
+            self._lose(*self._dead.popitem(), for_good=True)
         patience_s = self._conditions.patience_s
         for name, member in list(self.members.robots.items()):
             if member.gone is not None and now - member.gone > patience_s and not member.left:
@@ -234,6 +238,8 @@ class Master:
     def _ask_around(self, tally: Tally, now: float) -> None:
         """Begin a wave when it could show that all is quiet, or when somebody waits for news."""
         counters = tally.counters
+        if missing := tally.missing(now, self._conditions.patience_s):
+            raise RobotsLost({MASTER: f"{missing} messages between robots were lost for good"})
         if counters.quiescent:
             tally.verdict = tally.verdict or Verdict.SOLUTION
         elif tally.wave_due:
@@ -293,17 +299,25 @@ class Master:
             case Shown(variables):
                 self._note_shown(name, member, variables)
             case Events(told):
-                for event in told:
-                    self._observe(event)
+                self._note_events(name, told)
             case Failed(why, unsupported, elsewhere):
-                refusal = TooMuch if elsewhere else Unsupported
-                raise refusal(why) if unsupported else RobotsLost({name: why})
+                if unsupported:
+                    raise (TooMuch if elsewhere else Unsupported)(why)
+                self._lose(name, why)
             case Objection(who, what, why):
                 self._refuse(who, what, f"{why} ({name} says so)")
             case Bye():
                 member.left = True
             case _:
                 raise AssertionError(word)  # `Letters` decodes nothing else
+
+    def _note_events(self, name: str, told: Sequence[AnyEvent]) -> None:
+        """What a robot tells of itself, as it is watched or wants to be; of others it may not tell."""
+        for event in told:
+            if is_of(event, name):
+                self._observe(event)
+            else:
+                self._refuse(name, f"tell of {type(event).__name__}", "it is not about itself")
 
     def _note_shown(self, name: str, member: Member, variables: Mapping[str, Ranges]) -> None:
         """Variables that others look at, though the robot's own file does not say so."""
@@ -336,7 +350,8 @@ class Master:
             return
         if member is not known:
             self._letters.forget(name)
-            self._facilitator.enter(profile)
+            if unfit := self._facilitator.enter(profile):
+                self._refuse(name, "be in the directory", unfit)
             self._observe(events.Registered(t=self._now(), robot=name))
             if self._progress:
                 self._progress(Progress(0, self._now(), f"{len(self.members.robots)} robots registered"))
@@ -358,27 +373,23 @@ class Master:
                 self._lose(name, "its certificate was revoked")
         self._gate.follow()
 
-    def _lose(self, name: str, why: str) -> None:
-        """The robot is lost: before the search it may come back, in it that ends the run, or the search."""
+    def _lose(self, name: str, why: str, *, for_good: bool = False) -> None:
+        """The robot is lost: before the search it may come back, unless `for_good`; in it that ends the run."""
         member = self.members.robots.get(name)
-        if member is None or member.left or name in self.tally.lost:
+        if name in self.tally.lost or (member.left if member else not for_good or self.members.closed):
             return
         self._facilitator.leave(name)
-        if not self.members.closed:
+        if not self.members.closed and not for_good:
             self.members.remove([name])
             return
         self._observe(events.Lost(t=self._now(), robot=name, why=why))
-        if not self._conditions.survive:
+        if not self._conditions.survive or not self.members.closed:
             raise RobotsLost({name: why})
         self.tally.lose(name, why)
 
     # Small things
 
-    def _note_refusal(self, refusal: Refusal) -> None:
-        """What the router's thread tells."""
-        self._refuse(refusal.who or "somebody", refusal.what, refusal.why)
-
-    def _refuse(self, who: str, what: str, why: str) -> None:
+    def _tell_of_refusal(self, who: str, what: str, why: str) -> None:
         self._observe(events.Refused(t=self._now(), who=who, what=what, why=why))
 
     def _observe(self, event: AnyEvent) -> None:
@@ -387,7 +398,3 @@ class Master:
 
     def _now(self) -> float:
         return time.monotonic() - self._began
-
-
-def _over(deadline: float | None) -> bool:
-    return deadline is not None and time.monotonic() >= deadline

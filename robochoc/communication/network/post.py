@@ -115,9 +115,9 @@ class Post:
         publisher.put(content)
 
     @property
-    def connected(self) -> bool:
-        """Whether there is a link to the router now."""
-        return bool(self._session.info.routers_zid())
+    def router(self) -> str:
+        """The router that there is a link to now; empty: there is none. One that was opened anew is another one."""
+        return next(map(str, self._session.info.routers_zid()), "")
 
     def wake(self) -> None:
         """Have whoever waits at the inbox look up."""

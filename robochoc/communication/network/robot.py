@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import secrets
 import time
+import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ from robochoc.communication.host import BadMessage
 from robochoc.communication.network.letters import MASTER, Letters, Opened, Refused, TooLarge
 from robochoc.communication.network.post import Arrived, Item, Missed, Post, Presence, Woken
 from robochoc.communication.network.profile import profile_of, ranges_of
+from robochoc.communication.network.refusals import Refusals
 from robochoc.communication.network.searcher import Searcher, Surroundings
 from robochoc.communication.network.words import (
     Bye,
@@ -55,8 +57,10 @@ IDLE_S = 0.002
 LOOK_UP_S = 0.25
 """How often a robot that waits looks whether the link is still there."""
 REGISTER_AGAIN_S = 1.0
-OBJECTIONS_AT_MOST = 100
-"""So many letters that were refused are told of: whoever sends them may not tire."""
+AHEAD_AT_MOST = 100_000
+"""So many letters of the next epoch wait for the master's word that it has begun."""
+AT_ONCE = 10_000
+"""So many letters at most are one packet."""
 _VISIT_BYTES = 8
 
 
@@ -124,9 +128,11 @@ class NetworkRobot:
         self._ahead: list[tuple[str, Said | Copies]] = []
         """What others have said in an epoch that the master has not told this robot of yet."""
         self._registered = 0.0
-        self._objections = 0
+        self._refusals = Refusals(lambda who, what, why: self._say(Objection(who, what, why)))
         self._connected = time.monotonic()
-        self._away = False
+        self._router = post.router
+        self._unanswered: float | None = None
+        """Since when this robot has registered, and heard nothing of it."""
 
     def run(self) -> Ending:
         """Register, and take part until the end."""
@@ -139,9 +145,11 @@ class NetworkRobot:
         except (Unsupported, TooLarge) as refusal:
             self._fail(Failed(str(refusal), unsupported=True, elsewhere=isinstance(refusal, TooMuch)))
             return Ending(str(refusal), failed=True, assignment={})
-        except (BadMessage, UnknownPeer) as refusal:
-            self._fail(Failed(str(refusal)))
-            return Ending(str(refusal), failed=True, assignment={})
+        except Exception as error:  # noqa: BLE001 - whatever it was, the master has to know
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            why = f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"
+            self._fail(Failed(why))
+            return Ending(why, failed=True, assignment={})
 
     # The loop
 
@@ -151,7 +159,7 @@ class NetworkRobot:
         items = []
         with suppress(Empty):
             items.append(self._post.inbox.get(timeout=IDLE_S if restless else LOOK_UP_S))
-            while True:
+            while len(items) < AT_ONCE:
                 items.append(self._post.inbox.get_nowait())
         return items
 
@@ -180,17 +188,18 @@ class NetworkRobot:
             self._register()
 
     def _look_up(self) -> None:
-        """Whether the master can be reached; after an outage, whether it is the same one."""
-        now = time.monotonic()
-        if self._post.connected:
+        """Whether the master can be reached; behind a new router, whether it is the same one, and still takes us."""
+        now, name = time.monotonic(), self._robot.name
+        router = self._post.router
+        if router:
             self._connected = now
-            if self._away:
-                self._away = False
+            if router != self._router:
+                self._router = router
                 self._register()
-            return
-        self._away = True
-        if now - self._connected > self._manner.patience_s:
+        elif now - self._connected > self._manner.patience_s:
             raise _Over(f"the master is gone: no link to it for {self._manner.patience_s:g} s", failed=True)
+        if self._unanswered is not None and now - self._unanswered > max(self._manner.patience_s, 2 * REGISTER_AGAIN_S):
+            raise _Over(f"the master does not answer {name}: is it enrolled there, and not revoked?", failed=True)
 
     # Letters
 
@@ -200,14 +209,18 @@ class NetworkRobot:
     def _send(self, receiver: str, word: Said | Copies) -> None:
         if isinstance(word, Said) and self._filters:
             context = self._context(self._robot.name, receiver, self._letters.next_number(receiver), word)
-            word = Said(word.epoch, word.clock, self._filters.seal(receiver, word.content, context))
+            try:
+                word = Said(word.epoch, word.clock, self._filters.seal(receiver, word.content, context))
+            except UnknownPeer:
+                return  # it was revoked, and hears nothing any more
         self._post.send(receiver, self._letters.write(receiver, word))
 
     def _read(self, sender: str, content: bytes, packet: list[Envelope]) -> None:
         try:
             opened = self._letters.read(sender, content)
             word = self._unsealed(sender, opened)
-        except (Refused, NotGenuine, UnknownPeer) as refused:
+            self._check(word)
+        except (Refused, NotGenuine, UnknownPeer, BadMessage) as refused:
             self._object(sender, str(refused))
             return
         self._letters.take(sender, opened.number)
@@ -222,6 +235,14 @@ class NetworkRobot:
             return word
         context = self._context(sender, self._robot.name, opened.number, word)
         return Said(word.epoch, word.clock, self._filters.open(sender, word.content, context))
+
+    def _check(self, word: Word) -> None:
+        """Raises `BadMessage` and `Refused`, so that what nobody can use does not take the place of another letter."""
+        epoch = self._searcher.epoch if self._searcher else 0
+        if isinstance(word, Said | Copies) and (word.epoch > epoch + 1 or len(self._ahead) > AHEAD_AT_MOST):
+            raise Refused(f"it is of epoch {word.epoch}, and this is {epoch}")
+        if isinstance(word, Said) and self._searcher and word.epoch == epoch:
+            self._searcher.check(word.content)
 
     def _context(self, sender: str, receiver: str, number: int, word: Said) -> bytes:
         """What binds a sealed message to its place in the run."""
@@ -242,9 +263,8 @@ class NetworkRobot:
 
     def _object(self, sender: str, why: str) -> None:
         """Tell the master of a letter that was refused."""
-        self._objections += 1
-        if self._welcome is not None and self._objections <= OBJECTIONS_AT_MOST:
-            self._say(Objection(sender, f"a letter to {self._robot.name}", why))
+        if self._welcome is not None:
+            self._refusals.note(sender, f"a letter to {self._robot.name}", why)
 
     # The master's orders
 
@@ -287,12 +307,15 @@ class NetworkRobot:
 
     def _register(self) -> None:
         self._registered = time.monotonic()
+        if self._unanswered is None:
+            self._unanswered = self._registered
         self._say(Register(profile_of(self._robot), self._visit))
 
     def _enter(self, welcome: Welcome) -> None:
         """Registered; a second welcome comes after an outage, and of another run from another master."""
         if welcome.visit != self._visit:
             return
+        self._unanswered = None
         if self._welcome is not None:
             if welcome.run != self._welcome.run:
                 raise _Over("the master was started anew; start this robot anew as well", failed=True)
@@ -325,7 +348,12 @@ class NetworkRobot:
         self._searcher.prepare()
         ahead, self._ahead = self._ahead, []
         for sender, word in ahead:
-            self._hear(sender, word, [])
+            try:
+                self._check(word)
+            except BadMessage as bad:
+                self._object(sender, str(bad))
+            else:
+                self._hear(sender, word, [])
 
     def _admit(self, cards: tuple[bytes, ...]) -> None:
         """Believe the key cards of the others, if the Authority has certified them."""
@@ -345,7 +373,7 @@ class NetworkRobot:
             return
         self._say(word)
         until = time.monotonic() + self._manner.patience_s
-        while time.monotonic() < until and self._post.connected:
+        while time.monotonic() < until and self._post.router:
             for item in self._items():
                 if isinstance(item, Arrived) and item.sender == MASTER and self._is_leave(item.content):
                     self._say(Bye())

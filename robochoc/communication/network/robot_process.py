@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import ctypes
+import multiprocessing
 import os
 import signal
 import sys
+import threading
+from multiprocessing.connection import wait
 from typing import NamedTuple
 
 from robochoc.authority.identity import Identity, IdentityTexts
@@ -18,7 +21,6 @@ from robochoc.solver.domain import CompiledDomain
 START_S = 60.0
 """How long robots may take to come."""
 _LOWEST_NICE = 19
-_PR_SET_PDEATHSIG = 1
 _PR_SET_NAME = 15
 
 
@@ -31,6 +33,7 @@ class Given(NamedTuple):
     endpoint: str
     protocol: type[Protocol]
     patience_s: float
+    lease_ms: int
 
 
 def robot_process(given: Given) -> None:
@@ -40,8 +43,8 @@ def robot_process(given: Given) -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
     if sys.platform == "linux":
         libc = ctypes.CDLL(None)
-        libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         libc.prctl(_PR_SET_NAME, given.robot.name.encode())
+    threading.Thread(target=_end_with_the_parent, daemon=True).start()
     identity = Identity.of(given.identity)
 
     def take_place(rank: int, size: int) -> None:
@@ -50,8 +53,16 @@ def robot_process(given: Given) -> None:
         os.setpriority(os.PRIO_PROCESS, 0, max(wanted, os.getpriority(os.PRIO_PROCESS, 0)))
 
     try:
-        with Post(given.endpoint, identity, watch=(), patience_s=START_S) as post:
+        with Post(given.endpoint, identity, watch=(), patience_s=START_S, lease_ms=given.lease_ms) as post:
             manner = Manner(given.patience_s, place=take_place)
             NetworkRobot(given.robot, given.domain, identity, post, lambda _name: given.protocol, manner).run()
     except CannotConnect as error:
         sys.exit(str(error))
+
+
+def _end_with_the_parent() -> None:
+    """Not by the system's means: those would wait for the fork server, and that waits for its last child."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)

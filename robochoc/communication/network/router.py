@@ -3,22 +3,24 @@
 It is a process of its own (`router_process.py`) that holds no letters but those under way. zenoh's access control
 cannot be changed while it runs: to register or revoke somebody, the router is closed and opened anew with other rules,
 in a fraction of a second; what was sent meanwhile is recovered (`post.py`). What it refuses it tells in its log only,
-so that is read (`refusals`).
+so that is read (`Log`).
 """
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import IO, NamedTuple
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import IO, NamedTuple, cast
 
 from robochoc.authority.identity import Identity
 from robochoc.communication.network.access import access_control
+from robochoc.communication.network.letters import MASTER
 from robochoc.communication.network.post import encoded
 
 START_S = 10.0
@@ -26,16 +28,30 @@ START_S = 10.0
 _PROCESS = "robochoc.communication.network.router_process"
 _READY = "listening"
 _LOG = "warn"
-_LOG_OF_REFUSALS = "warn,zenoh::net::routing::interceptor=trace"
+_LOG_OF_REFUSALS = "warn,zenoh::net::routing::interceptor=trace,zenoh_link_tls=debug"
 """With what is allowed as well, several lines for each letter: that costs more than the letters themselves."""
 _CHUNK = 65536
 _DENIED = re.compile(
-    rb"CertCommonName\(([^)]*)\)\S* is unauthorized to ([A-Za-z/ ]+?) \(ingress\) on (\S+)[^\n]*\n"
-    rb"[^\n]*interceptor: Msg intercepted!"
+    rb"(?:CertCommonName\([^)]*\)\S*\+|Using cached result: )([0-9a-f]+) is unauthorized to ([A-Za-z/ ]+?)"
+    rb" \(ingress\) on (\S+)[^\n]*\n[^\n]*interceptor: Msg intercepted!"
 )
 _TELLING = re.compile(rb"unauthorized|zenoh_link_tls")
-_TLS = re.compile(rb"zenoh_link_tls::unicast: ((?:invalid peer certificate|received corrupt message|peer )[^\n]*)")
+_KNOWN = re.compile(rb"CertCommonName\(([^)]*)\)\S*\+([0-9a-f]+) is unauthorized")
+_ACCEPTED = re.compile(rb"zenoh_link_tls::unicast: Accepted TLS connection [^\n]*Common Name: ([^\n]*)\.\n")
+_TLS = re.compile(rb"WARN [^\n]*zenoh_link_tls::unicast: ([^\n]*)")
 _HINT = re.compile(r"\. Hint: .*$")
+_MEANINGS = {
+    "invalid peer certificate: UnknownIssuer": "its certificate is not of this Authority",
+    "invalid peer certificate: certificate expired": "its certificate has expired",
+    "invalid peer certificate: certificate not valid yet": "its certificate is not valid yet",
+    "invalid peer certificate": "its certificate is not good",
+    "peer sent no certificates": "it has shown no certificate",
+    "received corrupt message": "it does not speak TLS",
+    "received fatal alert: UnknownCA": "it does not believe the master, whom its own Authority has not certified",
+    "tls handshake eof": "it has hung up in the middle of the handshake",
+}
+"""What zenoh's words for a connection that it does not take come to; the first that fits counts."""
+_KEPT_SESSIONS = 10_000
 _COLOURS = re.compile(rb"\x1b\[[0-9;]*m")
 
 
@@ -44,7 +60,7 @@ class RouterFailed(Exception):  # noqa: N818 - named for what happened
 
 
 class Refusal(NamedTuple):
-    """The router has refused `who` (as its certificate says; empty: it was not let in) to do `what`."""
+    """The router has refused `who` (as its certificate says; `somebody`: it was not let in) to do `what`."""
 
     who: str
     what: str
@@ -85,8 +101,8 @@ class Router:
             raise RouterFailed("it has no standard streams")
         process.stdin.write(json.dumps(self._settings(reach)).encode() + b"\n")
         process.stdin.flush()
-        self._wait_until_ready(process.stdout)
-        self._reader = threading.Thread(target=self._read, args=[process.stdout], daemon=True)
+        said = self._wait_until_ready(process.stdout)
+        self._reader = threading.Thread(target=self._read, args=[process.stdout, Log(reach), said], daemon=True)
         self._reader.start()
 
     @property
@@ -124,45 +140,68 @@ class Router:
             "access_control": access_control(reach),
         }
 
-    def _wait_until_ready(self, output: IO[bytes]) -> None:
-        said: list[str] = []
+    def _wait_until_ready(self, output: IO[bytes]) -> bytes:
+        """What it has said until it was ready: who waits at the door comes in before that."""
+        said: list[bytes] = []
         watch = threading.Timer(START_S, self._give_up)
         watch.start()
         try:
             for line in output:
-                word = line.decode(errors="replace").strip()
-                if word == _READY:
-                    return
-                said.append(word)
+                if line.strip() == _READY.encode():
+                    return b"".join(said)
+                said.append(line)
         finally:
             watch.cancel()
-        why = "; ".join(said[-2:]) or "it ended without a word"
+        why = b"; ".join(line.strip() for line in said[-2:]).decode(errors="replace") or "it ended without a word"
         raise RouterFailed(f"cannot listen on {self.endpoint}: {why}")
 
     def _give_up(self) -> None:
         if self._process:
             self._process.kill()
 
-    def _read(self, output: IO[bytes]) -> None:
+    def _read(self, output: IO[bytes], log: Log, said: bytes) -> None:
         """Read the log to its end, and tell of refusals. In chunks: at full load there are 80,000 lines a second."""
         rest = b""
-        while chunk := os.read(output.fileno(), _CHUNK):
+        for refusal in log.refusals(said):
+            if self._refused:
+                self._refused(refusal)
+        while chunk := cast("io.BufferedReader", output).read1(_CHUNK):
             text = rest + chunk
             whole = text.rfind(b"\n") + 1
             last = text.rfind(b"\n", 0, max(0, whole - 1)) + 1
             if b"unauthorized" in text[last:whole]:  # what becomes of it stands in the next line
                 whole = last
             if self._refused and _TELLING.search(text, 0, whole):
-                for refusal in refusals(text[:whole]):
+                for refusal in log.refusals(text[:whole]):
                     self._refused(refusal)
             rest = text[whole:]
 
 
-def refusals(log: bytes) -> Iterator[Refusal]:
-    """What a part of the router's log tells of refusals."""
-    plain = _COLOURS.sub(b"", log)
-    for who, what, where in _DENIED.findall(plain):
-        action = f"{what.decode().lower()} {where.decode(errors='replace')}"
-        yield Refusal(who.decode(errors="replace"), action, "no rule of the Authority allows it")
-    for why in _TLS.findall(plain):
-        yield Refusal("", "connect", _HINT.sub("", why.decode(errors="replace")))
+class Log:
+    """Makes refusals of what the router writes into its log; only those in `reach` have rules there."""
+
+    def __init__(self, reach: Collection[str]) -> None:
+        self._reach = reach
+        self._names: dict[bytes, str] = {}
+        """Whose sessions there are: zenoh names a certificate's holder only where it looks a right up anew."""
+
+    def refusals(self, log: bytes) -> Iterator[Refusal]:
+        """What a part of the log tells of refusals; it ends with a whole line."""
+        plain = _COLOURS.sub(b"", log)
+        for name in _ACCEPTED.findall(plain):
+            who = name.decode(errors="replace")
+            if who not in {*self._reach, MASTER}:
+                yield Refusal(who, "connect", "it is not registered with the Authority")
+        if len(self._names) > _KEPT_SESSIONS:
+            self._names.clear()
+        self._names.update((session, name.decode(errors="replace")) for name, session in _KNOWN.findall(plain))
+        for session, what, where in _DENIED.findall(plain):
+            if session in self._names:
+                action = f"{what.decode().lower()} {where.decode(errors='replace')}"
+                yield Refusal(self._names[session], action, "no rule of the Authority allows it")
+        for why in _TLS.findall(plain):
+            yield Refusal("somebody", "connect", _meaning(_HINT.sub("", why.decode(errors="replace"))))
+
+
+def _meaning(why: str) -> str:
+    return next((meaning for words, meaning in _MEANINGS.items() if why.startswith(words)), why)

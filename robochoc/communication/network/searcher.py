@@ -10,8 +10,10 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import msgspec
+
 from robochoc.communication.control import Conclusion, Counters, Events, Ready
-from robochoc.communication.host import Host
+from robochoc.communication.host import BadMessage, Host
 from robochoc.communication.network.profile import BadProfile, among, domain_of
 from robochoc.communication.network.shared import BadShared, SharedRecord, known_of, record_of
 from robochoc.communication.network.words import Account, Checked, Copies, Said, Task, ToMaster
@@ -66,6 +68,7 @@ class Searcher:
         self._copies: dict[str, tuple[SharedRecord, ...]] = {}
         self._early: list[Envelope] = []
         self._events: list[AnyEvent] = []
+        self._decode = msgspec.msgpack.Decoder(protocol.messages).decode
         self._began = 0.0
         self._sent = self._received = 0
         self._told: tuple[int, int] | None = None
@@ -163,6 +166,13 @@ class Searcher:
         self._send(self._host, self._host.start())
         early, self._early = self._early, []
         self.take_in(early)
+
+    def check(self, content: bytes) -> None:
+        """Raises `BadMessage` when `content` is no message of the protocol, before anything is made of it."""
+        try:
+            self._decode(content)
+        except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
+            raise BadMessage(f"it is no message of the protocol: {error}") from None
 
     def hear(self, envelope: Envelope) -> bool:
         """Whether `envelope` belongs into the packet that is being made up; if not, it waits, or comes too late."""

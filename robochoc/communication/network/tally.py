@@ -4,12 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import assert_never
 
 from robochoc.communication.control import Conclusion, Counters, OfEpoch, Ready
 from robochoc.communication.network.words import Account, Checked
 from robochoc.communication.quiescence import Counts, FourCounters
 from robochoc.communication.run_result import RunResult
+from robochoc.observers.events import (
+    AnyEvent,
+    Began,
+    Concluded,
+    Decided,
+    Granted,
+    Heard,
+    Improved,
+    Lost,
+    Received,
+    Refused,
+    Registered,
+    Sent,
+    Settled,
+)
 from robochoc.outcome import Verdict
+
+_ASKED_ENOUGH = 2
 
 
 class Tally:
@@ -31,6 +49,9 @@ class Tally:
         self._accounts: dict[str, Account] = {}
         self._checks: dict[str, Checked] = {}
         self._unchecked = set(order)
+        self._still: Counts | None = None
+        self._since = 0.0
+        self._asked = 0
 
     def hear(self, name: str, word: OfEpoch) -> bool:
         """Take in what a robot tells of this search; whether the word is one for the master.
@@ -75,8 +96,23 @@ class Tally:
 
     @property
     def wave_due(self) -> bool:
-        """Whether a wave could show that all is quiet, or that there were messages enough."""
-        return self.counters.due or (self._enough is not None and not self.counters.waving)
+        """Whether a wave could show that all is quiet, that there were messages enough, or that some are missing."""
+        return self.counters.due or ((self._enough is not None or bool(self._asked)) and not self.counters.waving)
+
+    def missing(self, now: float, patience_s: float) -> int:
+        """How many messages were sent and are lost for good; 0 as long as that cannot be told.
+
+        It can when nothing has been sent or taken in for `patience_s`, and all robots, asked twice after that, say the
+        same again: then nothing is under way either. `now` is on the monotonic clock.
+        """
+        total = self.counters.total
+        if total is None or total != self._still or total.sent == total.received:
+            self._still, self._since, self._asked = total, now, 0
+        elif now - self._since > patience_s and not self.counters.waving:
+            if self._asked == _ASKED_ENOUGH:
+                return total.sent - total.received
+            self._asked += 1
+        return 0
 
     @property
     def silent(self) -> tuple[str, ...]:
@@ -115,3 +151,18 @@ class Tally:
         )
         findings = {name: account.findings for name, account in self._accounts.items()}
         return replace(result, lost=dict(self.lost), findings=findings)
+
+
+def is_of(event: AnyEvent, name: str) -> bool:
+    """Whether `event` is one that the robot `name` may tell of in a search: of what itself has done."""
+    match event:
+        case Sent():
+            return event.sender == name
+        case Received():
+            return event.receiver == name
+        case Decided() | Heard() | Settled() | Concluded():
+            return event.robot == name
+        case Began() | Registered() | Improved() | Lost() | Granted() | Refused():
+            return False
+        case never:
+            assert_never(never)
