@@ -9,6 +9,7 @@ from random import Random
 from hypothesis import strategies as st
 
 from robochoc.expression import Type, parse
+from robochoc.options import Runtime
 from robochoc.problem import (
     Child,
     Constraint,
@@ -21,6 +22,9 @@ from robochoc.problem import (
     Team,
     Variable,
 )
+
+ON_ONE_MACHINE = (Runtime.PROCESSES, Runtime.SIMULATOR)
+"""The runtimes that need no network; that one has tests of its own, as it takes a second to start."""
 
 PREDICATES = tuple(
     Predicate(f"p{number}", ("X", "Y"), parse(text, ("X", "Y"), Type.BOOLEAN))

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import pytest
 from hypothesis import given, settings
-from problems import team_of, teams
+from problems import ON_ONE_MACHINE, team_of, teams
 
 import robochoc.run
 from robochoc.expression import Type, parse
@@ -98,7 +98,7 @@ class Liar(Protocol):
         raise AssertionError((sender, message))
 
 
-@pytest.mark.parametrize("runtime", list(Runtime))
+@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_a_protocol_that_lies_is_refuted(monkeypatch: pytest.MonkeyPatch, runtime: Runtime) -> None:
     monkeypatch.setattr(robochoc.run, "protocol_named", lambda _name: Liar)
     with pytest.raises(Refuted, match=r"broken by V1\.1 = 1, V1\.2 = 1"):

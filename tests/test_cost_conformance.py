@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 from cost_problems import fewest_aside, least_cost, random_complex_cost_team, random_cost_team
-from problems import random_team
+from problems import ON_ONE_MACHINE, random_team
 from test_conformance import ENOUGH, random_schedule
 
 from robochoc.outcome import Outcome, Verdict
@@ -77,7 +77,7 @@ def test_the_least_cost_is_found_in_processes(protocol: str, batch: int, warm: A
 
 
 @pytest.mark.parametrize("protocol", INCOMPLETE)
-@pytest.mark.parametrize("runtime", list(Runtime))
+@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_what_is_not_proven_is_no_better_than_the_least(protocol: str, runtime: Runtime, warm: AceProcess) -> None:
     """And is an answer: its cost is that of its assignment, which breaks nothing hard."""
     chance = Random(f"incomplete {protocol} {runtime}")

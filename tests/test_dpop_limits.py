@@ -11,7 +11,7 @@ import pytest
 from agents import told
 from cost_problems import with_costs
 from dpop_robots import PRODUCT, begun, dimensions, domain, leaf, products
-from problems import team_of
+from problems import ON_ONE_MACHINE, team_of
 
 from robochoc.communication.schedule import RandomChannels
 from robochoc.communication.simulator import Simulation
@@ -91,7 +91,7 @@ def test_costs_are_exact_up_to_there(factor: int) -> None:
 def test_a_run_over_the_limit_says_the_same_in_every_runtime(withdraw: Withdrawal | None) -> None:
     team = products("ABCDE", "AB BC AC AD BD CD AE")
     said = []
-    for runtime in Runtime:
+    for runtime in ON_ONE_MACHINE:
         options = Options(protocol="dpop", runtime=runtime, settings={"memory": "100"}, withdraw=withdraw)
         with pytest.raises(Unsupported) as refused:
             solve(team, options)

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 import pytest
 from cost_problems import with_costs
-from problems import team_of
+from problems import ON_ONE_MACHINE, team_of
 
 from robochoc.communication import queues, robot_process
 from robochoc.expression import Type, parse
@@ -152,7 +152,7 @@ def large() -> tuple[Team, int]:
     return with_costs(team_of(domains, constraints)), int(np.min(total))
 
 
-@pytest.mark.parametrize("runtime", list(Runtime))
+@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_tables_of_several_mib_travel(runtime: Runtime) -> None:
     team, least = large()
     outcome = solve(team, Options(protocol="dpop", runtime=runtime))

@@ -264,7 +264,7 @@ LETTERS = [
         ("R1", MASTER, Counters(1, 2, 3, 4)),
         (MASTER, "R1", Leave("over", failed=False)),
         ("R1", "R2", Said(1, 3, b"content")),
-        ("R1", "R2", Copies(1, ())),
+        ("R1", "R2", Copies(1, b"")),
     )
 ]
 

@@ -11,7 +11,7 @@ from problems import random_team, team_of
 from sparse_teams import profiles_of
 
 from robochoc.communication.network.members import Members, NotTaken
-from robochoc.communication.network.profile import Profile
+from robochoc.communication.network.profile import Profile, Ranges
 from robochoc.formats import PREDEFINED
 from robochoc.problem import Constraint, Kind, Predicate
 from robochoc.protocols.traits import Traits
@@ -182,6 +182,52 @@ def test_who_is_no_child_is_not_asked_to_show_anything() -> None:
     spy = Profile("S", Kind.DISCSP, (), (), {}, {"B": ("Secret",)}, 1, 0, ())
     assert "looks at variables of B, which is no child" in refused(members, "S", spy)
     assert members.unseen() == {}
+
+
+def robot(
+    name: str,
+    parents: tuple[str, ...] = (),
+    children: tuple[str, ...] = (),
+    shown: str = "",
+    wants: tuple[str, ...] = (),
+) -> Profile:
+    variables: dict[str, Ranges] = {shown: ((1, 2),)} if shown else {}
+    return Profile(name, Kind.DISCSP, parents, children, variables, {}, 1, 0, (), wants)
+
+
+def test_what_a_childs_constraints_look_at_is_asked_for_whether_its_parent_says_so_or_not() -> None:
+    members = Members()
+    members.register("A", robot("A", children=("B",)), "first")
+    members.register("B", robot("B", parents=("A",), shown="Y", wants=("X",)), "first")
+    assert members.unseen() == {"A": ("X",)}
+    assert members.show("A", {"X": ((1, 3),), "Secret": ((1, 1),)}) == ""
+    assert not members.unseen()
+    assert not list(members.strangers())
+    assert members.tasks(1, "abt", Traits(), NO_BRIEF)["B"].interfaces == {"A": ("X",), "B": ("Y",)}
+
+
+def test_a_constraint_over_what_no_neighbour_has_is_told() -> None:
+    members = Members()
+    members.register("A", robot("A", children=("B",)), "first")
+    members.register("B", robot("B", parents=("A",), shown="Y", wants=("V9",)), "first")
+    assert members.unseen() == {"A": ("V9",)}
+    assert members.show("A", {}) == ""
+    assert not members.unseen()
+    assert list(members.strangers()) == ["B holds a constraint over V9, which is a variable of none of its neighbours"]
+
+
+def test_who_may_only_ask_does_not_take_part() -> None:
+    with pytest.raises(NotTaken, match="enrolled to observe"):
+        Members().register("A", robot("A"), "first", admitted=False)
+
+
+def test_a_robot_that_was_away_may_come_back_in_another_life() -> None:
+    members = Members()
+    members.register("A", robot("A"), "first")
+    with pytest.raises(NotTaken, match="registered already"):
+        members.register("A", robot("A"), "second")
+    members.robots["A"].doubtful = True
+    assert members.register("A", robot("A"), "second").visit == "second"
 
 
 # What is told at the end

@@ -170,7 +170,7 @@ def test_what_the_robots_check_is_what_the_checker_checks() -> None:
 
 def test_limits() -> None:
     with LocalNetwork(queens3d(4), protocol_named("abt")) as network:
-        result = network.search(messages=500)
+        result = network.search(messages=20)
         assert result.verdict is Verdict.UNKNOWN
         assert sum(result.metrics.messages.values()) >= 500
     with LocalNetwork(CHAIN, Held, brief=Brief(settings={"file": "/nowhere"})) as network:

@@ -94,7 +94,7 @@ def test_what_was_said_in_another_search_is_passed_over() -> None:
                 yield Pause()
             case Account(1):
                 yield post.letter(Said(1, 0, ok(3)), "RA")
-                yield post.letter(Copies(1, ()), "RA")
+                yield post.letter(Copies(1, b"\x90"), "RA")
                 yield task(epoch=2)
             case Ready(2):
                 yield Search(2)

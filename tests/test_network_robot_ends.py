@@ -68,7 +68,7 @@ def copy(scope: tuple[str, ...] = ("B", "C"), body: str = "ne(X, Y)") -> SharedR
 
 
 def copies(sender: str, *records: SharedRecord, number: int = 1) -> Arrived:
-    return Arrived(sender, msgspec.msgpack.encode(Letter(RUN, number, Copies(1, records))))
+    return Arrived(sender, msgspec.msgpack.encode(Letter(RUN, number, Copies(1, msgspec.msgpack.encode(records)))))
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from agents import told
 from complex_problems import complex_team, random_complex_team
 from pkc_bytes import changed_elsewhere, nothing_hidden, restated, run, watched
 from pkc_problems import pkc_parts, random_pkc_team, with_part, with_private_parts
-from problems import random_team, solutions, team_of
+from problems import ON_ONE_MACHINE, random_team, solutions, team_of
 from test_complex_teams import by_hand
 
 from robochoc.communication.processes import ProcessesRun
@@ -266,6 +266,6 @@ def test_private_queens_have_no_solution(private_queens: Team) -> None:
 def test_the_example_is_solved() -> None:
     team = read_team(SECRETS)
     assert {model.model for model in pkc_parts(team).values()} == {Model.PKC}
-    for runtime in Runtime:
+    for runtime in ON_ONE_MACHINE:
         outcome = solve(team, Options(protocol="abt", runtime=runtime, timeout=60))
         assert (outcome.verdict, outcome.verified) == (Verdict.SOLUTION, True)

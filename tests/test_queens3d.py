@@ -6,6 +6,7 @@ import itertools
 from pathlib import Path
 
 import pytest
+from problems import ON_ONE_MACHINE
 
 from robochoc.formats import read_robot, read_team, write_team
 from robochoc.generators.queens3d import QueensModel, queens3d
@@ -89,7 +90,7 @@ def test_absurd_sizes_are_refused(n: int) -> None:
         queens3d(n)
 
 
-@pytest.mark.parametrize("runtime", list(Runtime))
+@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 @pytest.mark.parametrize("model", list(QueensModel))
 def test_four_has_no_solution_and_some_can_fly(model: QueensModel, runtime: Runtime) -> None:
     team = queens3d(4, model)
@@ -102,7 +103,7 @@ def test_four_has_no_solution_and_some_can_fly(model: QueensModel, runtime: Runt
     assert len(outcome.assignment) <= most
 
 
-@pytest.mark.parametrize("runtime", list(Runtime))
+@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 @pytest.mark.parametrize("protocol", ["abt", "sfb"])
 @pytest.mark.parametrize(("model", "most"), [("planar", 10), ("full", 7)])
 def test_of_four_it_is_proven_how_many_can_fly(protocol: str, model: str, most: int, runtime: Runtime) -> None:
@@ -115,7 +116,7 @@ def test_of_four_it_is_proven_how_many_can_fly(protocol: str, model: str, most: 
     assert len(outcome.assignment) == most
 
 
-@pytest.mark.parametrize("runtime", list(Runtime))
+@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_seven_has_a_solution_in_planar_and_none_in_full(runtime: Runtime) -> None:
     assert solve(queens3d(7, "planar"), Options(runtime=runtime)).verdict is Verdict.SOLUTION
     assert solve(queens3d(7, "full"), Options(runtime=runtime)).verdict is Verdict.NO_SOLUTION

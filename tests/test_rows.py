@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+from problems import ON_ONE_MACHINE
 from program import robochoc
 
 from robochoc.formats import read_team, write_team
@@ -35,7 +36,7 @@ def test_a_team_of_rows_is_written_and_read_back(tmp_path: Path) -> None:
     assert read_team(tmp_path / "instances" / "queens3d-5-rows") == queens3d(5, robots="rows")
 
 
-@pytest.mark.parametrize("runtime", list(Runtime))
+@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 @pytest.mark.parametrize(
     ("n", "model", "verdict"),
     [

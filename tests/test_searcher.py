@@ -13,7 +13,7 @@ from robochoc.communication.control import Conclusion, Counters, Events, Ready
 from robochoc.communication.host import BadMessage
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.searcher import EVENTS_AT_ONCE, Searcher, Surroundings
-from robochoc.communication.network.shared import record_of
+from robochoc.communication.network.shared import SharedRecord, record_of
 from robochoc.communication.network.words import Account, Checked, Copies, Said, Task, ToMaster
 from robochoc.formats import PREDEFINED
 from robochoc.message import Envelope, encode
@@ -98,11 +98,11 @@ def test_where_all_know_a_constraint_its_holder_tells_and_waits_to_be_told() -> 
     ((receiver, word),) = around.sent
     assert receiver == "RA"
     assert isinstance(word, Copies)
-    assert [record.scope for record in word.constraints] == [("A", "B")]
+    assert [record.scope for record in msgspec.msgpack.decode(word.content, type=list[SharedRecord])] == [("A", "B")]
     one.search()
     assert len(around.sent) == 1  # not ready: there is nothing to begin
-    one.learn("RC", tuple(map(record_of, held(chain()["RC"]))))
-    one.learn("RC", ())
+    one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held(chain()["RC"])))))
+    one.learn("RC", b"\x90")
     assert around.said == [Ready(1)]
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @click.option(
     "--as", "name", required=True, metavar="NAME", help="Who asks: an enrolled name (--role observer will do)."
 )
-@click.option("--token", metavar="TOKEN", help="Enrol with this token first.")
+@click.option("--token", envvar="ROBOCHOC_TOKEN", metavar="TOKEN", help="Enrol with this token first.")
 @click.option(
     "--identity",
     type=InputPath(),

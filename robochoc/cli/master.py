@@ -74,8 +74,8 @@ class _Telling:
     metavar="NAME",
     help="signed or sealed, or an installed filter: messages go through all of them, in this order.",
 )
-@click.option("--gather", "gather_s", type=float, metavar="SECONDS", help="Give up when the team is not complete then.")
-@click.option("--timeout", type=float, metavar="SECONDS", help="Give up so long after the start: exit status 3.")
+@click.option("--gather", "gather_s", type=float, metavar="SECONDS", help="Give up if the team is not complete then.")
+@click.option("--timeout", type=float, metavar="SECONDS", help="Give up so long after the team is complete: status 3.")
 @click.option("--messages", type=click.IntRange(1), metavar="N", help="Give up after (about) so many messages.")
 @click.option(
     "--patience",
@@ -120,9 +120,11 @@ def master(
     """
     if given["number"] and team:
         raise click.UsageError("--robots and --team both say who is expected; drop one")
+    if team and (team / "scenario.xml").exists():
+        raise click.UsageError(f"{team} has a scenario.xml; across machines problems do not change")
     for option in ("gather_s", "timeout"):
         if given[option] is not None and not given[option] > 0:
-            raise click.UsageError(f"--{option.removesuffix('_s')} takes a number of seconds")
+            raise click.UsageError(f"--{option.removesuffix('_s')} takes a number of seconds, more than 0")
     with network_failures_told("master"):
         plan = _plan(authority, team, given)
         led = _led(plan, _Telling(as_json, journal))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robochoc.cli.failure import INVALID, LOST, USAGE, Failure, failures_told
+from robochoc.cli.failure import INVALID, LIMIT, LOST, USAGE, Failure, failures_told
 
 if TYPE_CHECKING:
     from robochoc.machines.place import Place
@@ -46,6 +46,7 @@ def network_failures_told(place: object) -> Iterator[None]:
         from robochoc.communication.network.post import CannotConnect
         from robochoc.communication.network.router import RouterFailed
         from robochoc.machines.consult import BadTemplate, NoAnswer
+        from robochoc.machines.lead import NotComplete
     except ModuleNotFoundError as missing:
         package = (missing.name or "").partition(".")[0]
         if package not in _EXTRA:
@@ -57,6 +58,7 @@ def network_failures_told(place: object) -> Iterator[None]:
     statuses: dict[int, tuple[type[Exception], ...]] = {
         INVALID: (BadIdentity, BadAuthority, BadToken),
         USAGE: (BadHost, BadName, RouterFailed, BadTemplate),
+        LIMIT: (NotComplete,),
         LOST: (CannotConnect, EnrolmentFailed, NoAnswer),
     }
     with failures_told(place):

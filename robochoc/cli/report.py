@@ -82,7 +82,7 @@ def _verdict(team: Team, outcome: Outcome) -> str:
         case _ if outcome.count is not None:
             return f"{outcome.count:,} solution{'s' * (outcome.count != 1)}"
         case Verdict.SOLUTION | Verdict.OPTIMAL if not outcome.aside:
-            return f"{_proven(team, outcome)}{left}, checked against every constraint{confirmed}"
+            return f"{_proven(team, outcome)}{left}, {_checked(outcome)}{confirmed}"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             who = "some step" if outcome.assignment else "all step"
             if outcome.verdict is Verdict.OPTIMAL:
@@ -90,7 +90,12 @@ def _verdict(team: Team, outcome: Outcome) -> str:
                 who = f"as few as possible{by_weight} (proven) step"
             whole = left or " for the whole team"
             because = f" ({why})" if why else ""
-            return f"no solution{whole}{because}; {who} aside, checked against every constraint{confirmed}"
+            return f"no solution{whole}{because}; {who} aside, {_checked(outcome)}{confirmed}"
+
+
+def _checked(outcome: Outcome) -> str:
+    """Whether somebody has held the answer against the constraints."""
+    return "checked against every constraint" if outcome.verified else f"not checked: {outcome.reason}"
 
 
 def _proven(team: Team, outcome: Outcome) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.failure import LOST, Failure
+from robochoc.cli.failure import LIMIT, LOST, Failure
 from robochoc.cli.local import limits, local_options
 from robochoc.cli.network import PlaceType, network_failures_told
 from robochoc.cli.paths import InputPath
@@ -22,7 +22,12 @@ if TYPE_CHECKING:
 @click.option(
     "--master", "place", type=PlaceType(), required=True, metavar="HOST:PORT", help="Where the master listens."
 )
-@click.option("--token", metavar="TOKEN", help="Enrol with this token first (robochoc authority enrol has printed it).")
+@click.option(
+    "--token",
+    envvar="ROBOCHOC_TOKEN",
+    metavar="TOKEN",
+    help="Enrol with this token first (robochoc authority enrol has printed it); or put it into ROBOCHOC_TOKEN.",
+)
 @click.option(
     "--identity",
     type=InputPath(),
@@ -89,7 +94,7 @@ def robot(
         else:
             decision = ", ".join(f"{name} = {value}" for name, value in ending.assignment.items())
             click.echo(f"{file.stem}: {ending.why}; {decision or 'no value'}")
-    context.exit(0)
+    context.exit(LIMIT if ending.why.startswith("unknown") else 0)
 
 
 def _seconds() -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import msgspec
+from msgspec import UNSET, UnsetType
 
 from robochoc.outcome import Epoch, Metrics, Outcome, Place, Verdict
 
@@ -37,7 +38,7 @@ class _EpochForm(msgspec.Struct, omit_defaults=True):
     verified: bool
     lost: list[str] = []
     confirmed: bool = False
-    simulated_s: float = 0.0
+    simulated_s: float | UnsetType = UNSET
 
 
 class _Form(msgspec.Struct, omit_defaults=True):
@@ -118,13 +119,13 @@ def _epoch(epoch: Epoch) -> _EpochForm:
         verified=epoch.verified,
         lost=list(epoch.lost),
         confirmed=epoch.confirmed,
-        simulated_s=spent.simulated_s,
+        simulated_s=spent.simulated_s or UNSET,
     )
 
 
 def _epoch_of(form: _EpochForm) -> Epoch:
     counts = form.bytes, form.ncccs, form.checks, form.wall_s
-    metrics = Metrics({"messages": form.messages}, *counts, simulated_s=form.simulated_s)
+    metrics = Metrics({"messages": form.messages}, *counts, simulated_s=form.simulated_s or 0.0)
     return Epoch(
         verdict=form.verdict,
         robots=tuple(form.robots),

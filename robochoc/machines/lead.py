@@ -12,10 +12,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
+
 from robochoc.answers import Refuted
 from robochoc.anytime import bound_of, joined, tree_of
 from robochoc.authority.authority import Authority
 from robochoc.authority.enrolment_server import EnrolmentServer
+from robochoc.authority.events import AuthorityEvent, AuthorityObserver
 from robochoc.authority.identity import Identity
 from robochoc.communication.host import BadSettings, settings_of
 from robochoc.communication.network.conditions import Conditions
@@ -30,13 +33,15 @@ from robochoc.machines.speaking import FIRST_FIT, spoken
 from robochoc.observers.events import Observer
 from robochoc.options import Withdrawal
 from robochoc.outcome import Outcome, Verdict
-from robochoc.problem import Kind, Team
+from robochoc.problem import Domain, Kind, Team, Variable
 from robochoc.protocols.traits import Traits
 from robochoc.solver.encoding import Unsupported
 from robochoc.solver.part import Brief
 
 HERE = Place(LOOPBACK)
 """Anything but loopback must be asked for."""
+_TOLD = 5
+"""So many who are awaited are named."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +70,10 @@ class Plan:
     conditions: Conditions = Conditions()
 
 
+class NotComplete(Exception):  # noqa: N818 - a limit that was reached
+    """The team was not complete in time."""
+
+
 class Led(NamedTuple):
     """The outcome, and what the master knows of the team: silhouettes, without any constraint."""
 
@@ -82,10 +91,11 @@ def lead(
 ) -> Led:
     """Be the master of one run. `listening` is called once robots can come.
 
-    Raises `BadAuthority`, `BadHost`, `RouterFailed`, `RobotsLost`, `Unsupported`, `UnknownProtocol`, `Refuted`.
+    Raises `BadAuthority`, `BadHost`, `RouterFailed`, `NotComplete`, `RobotsLost`, `Unsupported`, `UnknownProtocol`,
+    `Refuted`.
     """
     _check_settings_early(plan)
-    authority = Authority.open(plan.authority, observer=observer or (lambda _event: None))
+    authority = Authority.open(plan.authority, observer=_in_run_time(observer))
     hosts = [*([] if plan.place.anywhere else [plan.place.host]), *plan.hosts]
     called = [host for host in hosts if ":" not in host]
     if not called:
@@ -116,6 +126,17 @@ def _enrolling(authority: Authority, identity: Identity, place: Place) -> Iterat
         yield
 
 
+def _in_run_time(observer: Observer | None) -> AuthorityObserver:
+    """Has `observer` hear of the Authority's events in the time of this run, which is about to begin."""
+    began = time.time()
+
+    def told(event: AuthorityEvent) -> None:
+        if observer:
+            observer(msgspec.structs.replace(event, t=max(0.0, event.t - began)))
+
+    return told
+
+
 class _Lead:
     """One run, once the master listens."""
 
@@ -123,23 +144,27 @@ class _Lead:
         self._plan = plan
         self._master = master
         self._lost: dict[str, str] = {}
+        self._deadline: float | None = None
+        self._values: dict[str, dict[str, int]] = {}
         self._outcome = Outcome(plan.name, plan.protocol or SATISFIES, "network", plan.seed, Verdict.UNKNOWN)
 
     def run(self) -> Led:
         try:
             outcome = self._solved()
         except BaseException as error:
-            failure = isinstance(error, RobotsLost | Unsupported | Refuted)
+            failure = isinstance(error, RobotsLost | Unsupported | Refuted | NotComplete)
             self._master.leave(f"the run was broken off: {error if failure else 'the master has stopped'}", failed=True)
             raise
         self._master.leave(_in_words(outcome))
-        return Led(outcome, self._team())
+        return Led(outcome, self._seen())
 
     def _solved(self) -> Outcome:
         plan, members = self._plan, self._master.members
         if not self._master.gather(None if plan.gather_s is None else time.monotonic() + plan.gather_s):
-            awaited = ", ".join(sorted(members.awaited)[:5]) or "more robots"
-            raise RobotsLost({"the team": f"it was not complete after {plan.gather_s:g} s; awaited: {awaited}"})
+            awaited = sorted(members.awaited)
+            names = ", ".join(awaited[:_TOLD]) + f" and {len(awaited) - _TOLD} others" * (len(awaited) > _TOLD)
+            raise NotComplete(f"the team is not complete after {plan.gather_s:g} s; awaited: {names or 'more robots'}")
+        self._deadline = None if plan.timeout is None else time.monotonic() + plan.timeout
         kind = self._team().kind
         protocol = plan.protocol or (SATISFIES if kind is Kind.DISCSP else MINIMISES)
         _check_settings(protocol, plan.settings)
@@ -159,9 +184,8 @@ class _Lead:
     def _search(self, protocol: str, traits: Traits, brief: Brief) -> RunResult:
         """Search until robots stop getting lost; without `survive` the first loss raises `RobotsLost`."""
         plan, master = self._plan, self._master
-        deadline = None if plan.timeout is None else time.monotonic() + plan.timeout
         while True:
-            left = None if deadline is None else max(0.0, deadline - time.monotonic())
+            left = None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
             result = master.search(protocol, traits, brief, left, plan.messages)
             self._outcome = replace(self._outcome, metrics=self._outcome.metrics + result.metrics)
             if not result.lost:
@@ -195,14 +219,37 @@ class _Lead:
         if self._plan.conditions.private:
             reason = "every robot knows its own values, and nobody else's (--private)"
             return replace(outcome, verdict=verdict, reason=reason)
-        held, cost = self._master.checked(result.assignments)
+        self._values = self._decided(result.assignments)
+        held, cost = self._master.checked(self._values)
         if held and (aside or not out):
             verdict = verdict if proven or not ended else Verdict.SOLUTION
-            return replace(outcome, verdict=verdict, assignment=joined(result.assignments), cost=cost, verified=True)
+            return replace(outcome, verdict=verdict, assignment=joined(self._values), cost=cost, verified=True)
         if proven:
             raise Refuted(f"{outcome.protocol} has a solution for {outcome.team}, which the robots' own checks refute")
         reason = outcome.reason or f"{outcome.protocol} has come to its end, and what it came by breaks a constraint"
         return replace(outcome, verdict=Verdict.UNKNOWN, reason=reason)
+
+    def _decided(self, reported: Mapping[str, dict[str, int]]) -> dict[str, dict[str, int]]:
+        """What each robot has decided of its own variables. Raises `RobotsLost` for one that reports what cannot be."""
+        owners = self._team().owner
+        for name, values in reported.items():
+            shown = self._master.members.robots[name].robot.variables
+            if values and not all(values.get(variable.name) in variable.domain for variable in shown):
+                raise RobotsLost({name: "it has reported values that it cannot have"})
+        return {
+            name: {variable: value for variable, value in values.items() if owners.get(variable, name) == name}
+            for name, values in reported.items()
+        }
+
+    def _seen(self) -> Team:
+        """The team as the outcome shows it: with variables that only their robots knew before."""
+        robots = []
+        for robot in self._team().robots:
+            shown = {variable.name for variable in robot.variables}
+            others = [(name, value) for name, value in self._values.get(robot.name, {}).items() if name not in shown]
+            told = tuple(Variable(name, Domain(name, (range(value, value + 1),))) for name, value in others)
+            robots.append(replace(robot, variables=(*robot.variables, *told)))
+        return Team(self._plan.name, tuple(robots))
 
     def _verdict(self, traits: Traits, *, aside: bool) -> Verdict:
         """What the answer of a protocol that has come to its end is."""

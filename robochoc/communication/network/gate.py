@@ -55,6 +55,14 @@ class Gate:
         """Whether `name` is to be turned away."""
         return self._admission.is_revoked(name)
 
+    def admits(self, name: str) -> bool:
+        """Whether `name` has a certificate in force now, whatever the router knows yet."""
+        return name in self._admission.names()
+
+    def is_robot(self, name: str) -> bool:
+        """Whether `name` may take part, and not only ask."""
+        return name in self._admission.names(Role.ROBOT)
+
     def revoked(self, names: Collection[str]) -> list[str]:
         """Those of `names` that are to be turned away now."""
         return [name for name in names if self.is_revoked(name)]

@@ -129,4 +129,4 @@ class Letters:
     def take(self, sender: str, number: int) -> None:
         """The letter `number` of `sender` is what it claims to be: from now on the next one is expected."""
         if number:
-            self._read[sender] = number
+            self._read[sender] = max(number, self._read.get(sender, 0))

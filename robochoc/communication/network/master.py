@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from queue import Empty
-from types import TracebackType
 from typing import Self
 
 from robochoc.authority.admission import Admission
@@ -26,8 +25,9 @@ from robochoc.communication.network.gate import Gate
 from robochoc.communication.network.letters import MASTER, Letters, Refused, TooLarge
 from robochoc.communication.network.members import Member, Members, NotTaken
 from robochoc.communication.network.post import Arrived, Missed, Post, Presence, Woken
-from robochoc.communication.network.profile import BadProfile, Profile, Ranges, domain_of
+from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.refusals import Refusals
+from robochoc.communication.network.router import Refusal
 from robochoc.communication.network.tally import Tally, is_of
 from robochoc.communication.network.words import (
     Ask,
@@ -96,7 +96,7 @@ class Master:
         self._letters = Letters(MASTER, self.run)
         self._facilitator = DirectoryFacilitator(endpoint, conditions.protocol)
         self._refuse = Refusals(self._tell_of_refusal).note
-        told = (lambda one: self._refuse(*one)) if observer else None
+        told = self._note_refusal if observer else None
         self._gate = Gate(admission, identity, conditions.listen or endpoint, told, conditions.lease_ms, members.ways)
         self._dead: dict[str, str] = {}
         self._shown = self._looked = self._read_registry = 0.0
@@ -111,9 +111,7 @@ class Master:
             raise
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         try:
             self._post.close()
         finally:
@@ -131,6 +129,9 @@ class Master:
             self._wait_until(lambda before=unseen: self.members.unseen() != before, deadline)  # type: ignore[misc]
             unseen = self.members.unseen()
         self.members.closed = self.members.complete and not unseen
+        stranger = next(self.members.strangers(), None) if self.members.closed else None
+        if stranger:
+            raise Unsupported(stranger)
         return self.members.closed
 
     def search(
@@ -164,12 +165,15 @@ class Master:
     def checked(self, assignments: Mapping[str, Mapping[str, int]]) -> tuple[bool, float]:
         """Have every robot hold its constraints against what was decided: whether all hold, and the sum of the costs.
 
-        Robots without values have stepped aside. Not in private runs: nobody tells its values there.
+        Not in private runs: nobody tells its values there.
         """
         tally = self.tally
         for name in self.members.order:
             self._tell(name, Judge(tally.epoch, self.members.neighbourhood(name, assignments)))
-        self._wait_until(lambda: not tally.unchecked, time.monotonic() + LAST_WORDS_S)
+        away_s = LAST_WORDS_S + self._conditions.patience_s + self._conditions.lease_ms / 1000
+        self._wait_until(lambda: not tally.unchecked, time.monotonic() + away_s)
+        if tally.unchecked or tally.lost:
+            raise RobotsLost(tally.lost or {MASTER: "robots have not checked their constraints in time"})
         return tally.held, tally.cost
 
     def leave(self, why: str, *, failed: bool = False) -> None:
@@ -246,7 +250,7 @@ class Master:
             self._tell_all(Wave(counters.begin_wave()))
         elif self._progress and now - self._shown >= TICK_S:
             self._shown = now
-            self._progress(Progress(counters.sent, self._now()))
+            self._progress(Progress(counters.sent, time.monotonic() - self._began))
             if not counters.waving:
                 self._tell_all(Wave(counters.begin_wave()))
 
@@ -254,9 +258,8 @@ class Master:
         """Say that the search is over, and collect everybody's account."""
         self._tell_all(Pause())
         self._wait_until(lambda: not tally.silent, time.monotonic() + LAST_WORDS_S)
-        if tally.verdict is not None:
-            for name in tally.silent:
-                self._lose(name, "it did not report at the end")
+        for name in tally.silent if tally.verdict is not None else ():
+            self._lose(name, "it did not report at the end")
 
     # Letters
 
@@ -297,13 +300,11 @@ class Master:
             case Joined(card):
                 member.card, member.joined = card, True
             case Shown(variables):
-                self._note_shown(name, member, variables)
+                self._note_failure(name, self.members.show(name, variables))
             case Events(told):
                 self._note_events(name, told)
             case Failed(why, unsupported, elsewhere):
-                if unsupported:
-                    raise (TooMuch if elsewhere else Unsupported)(why)
-                self._lose(name, why)
+                self._note_failure(name, why, (TooMuch if elsewhere else Unsupported) if unsupported else None)
             case Objection(who, what, why):
                 self._refuse(who, what, f"{why} ({name} says so)")
             case Bye():
@@ -319,18 +320,12 @@ class Master:
             else:
                 self._refuse(name, f"tell of {type(event).__name__}", "it is not about itself")
 
-    def _note_shown(self, name: str, member: Member, variables: Mapping[str, Ranges]) -> None:
-        """Variables that others look at, though the robot's own file does not say so."""
-        wanted = self.members.unseen().get(name, ())
-        missed = [variable for variable in wanted if variable not in variables]
-        if missed:
-            raise Unsupported(f"a parent of {name} looks at {missed[0]}, which is no variable of {name}")
-        try:
-            for variable, ranges in variables.items():
-                domain_of(variable, ranges)
-        except BadProfile as bad:
-            raise RobotsLost({name: str(bad)}) from None
-        member.also.update({variable: variables[variable] for variable in wanted})
+    def _note_failure(self, name: str, why: str, refusal: type[Unsupported] | None = None) -> None:
+        """The robot cannot go on (if there is a `why`); a `refusal` ends the run."""
+        if refusal:
+            raise refusal(why)
+        if why:
+            self._lose(name, why, for_good=True)
 
     def _answer(self, sender: str, ask: Ask) -> None:
         try:
@@ -343,7 +338,7 @@ class Master:
     def _register(self, name: str, profile: Profile, visit: str) -> None:
         known = self.members.robots.get(name)
         try:
-            member = self.members.register(name, profile, visit)
+            member = self.members.register(name, profile, visit, admitted=self._gate.is_robot(name))
         except NotTaken as refusal:
             self._refuse(name, "register", str(refusal))
             self._tell(name, Denied(visit, str(refusal)))
@@ -352,16 +347,19 @@ class Master:
             self._letters.forget(name)
             if unfit := self._facilitator.enter(profile):
                 self._refuse(name, "be in the directory", unfit)
-            self._observe(events.Registered(t=self._now(), robot=name))
+            self._observe(events.Registered(t=time.monotonic() - self._began, robot=name))
             if self._progress:
-                self._progress(Progress(0, self._now(), f"{len(self.members.robots)} robots registered"))
-        member.gone = None
+                self._progress(
+                    Progress(0, time.monotonic() - self._began, f"{len(self.members.robots)} robots registered")
+                )
+        member.gone, member.doubtful = None, False
         self._tell(name, Welcome(visit, self.run, self._conditions.filters, self._watched, self._conditions.private))
 
     def _note_presence(self, name: str, *, there: bool) -> None:
         member = self.members.robots.get(name)
         if member:
             member.gone = None if there else member.gone or time.monotonic()
+            member.doubtful = member.doubtful or not there
 
     def _follow_registry(self) -> None:
         """Let in who was enrolled since, and throw out who was revoked; that needs a router with other rules."""
@@ -382,19 +380,21 @@ class Master:
         if not self.members.closed and not for_good:
             self.members.remove([name])
             return
-        self._observe(events.Lost(t=self._now(), robot=name, why=why))
+        self._observe(events.Lost(t=time.monotonic() - self._began, robot=name, why=why))
+        self.tally.lose(name, why)
         if not self._conditions.survive or not self.members.closed:
             raise RobotsLost({name: why})
-        self.tally.lose(name, why)
 
     # Small things
 
+    def _note_refusal(self, refusal: Refusal) -> None:
+        """What the router tells; not of those who were enrolled a moment ago, and are let in when they try again."""
+        if refusal.what != "connect" or not self._gate.admits(refusal.who):
+            self._refuse(*refusal)
+
     def _tell_of_refusal(self, who: str, what: str, why: str) -> None:
-        self._observe(events.Refused(t=self._now(), who=who, what=what, why=why))
+        self._observe(events.Refused(t=time.monotonic() - self._began, who=who, what=what, why=why))
 
     def _observe(self, event: AnyEvent) -> None:
         if self._observer:
             self._observer(event)
-
-    def _now(self) -> float:
-        return time.monotonic() - self._began

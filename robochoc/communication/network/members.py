@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -38,7 +38,11 @@ class NotTaken(ValueError):  # noqa: N818 - named for the answer
 
 @dataclass
 class Member:
-    """A registered robot in its life `visit`; `gone` since when it is away (None: it is there)."""
+    """A registered robot in its life `visit`; `gone` since when it is away (None: it is there).
+
+    `doubtful`: it was away since its last word, and who is there now may be another life. `also` are variables that it
+    has shown since, as it was `asked` for them.
+    """
 
     profile: Profile
     visit: str
@@ -46,6 +50,8 @@ class Member:
     card: bytes = b""
     joined: bool = False
     gone: float | None = None
+    doubtful: bool = False
+    asked: set[str] = field(default_factory=set)
     left: bool = False
 
     @property
@@ -85,16 +91,18 @@ class Members:
         """What all have told of themselves."""
         return {name: member.profile for name, member in self.robots.items()}
 
-    def register(self, sender: str, profile: Profile, visit: str) -> Member:
-        """Take `sender` in, or find it there already in the same life. Raises `NotTaken`."""
+    def register(self, sender: str, profile: Profile, visit: str, *, admitted: bool = True) -> Member:
+        """Take `sender` in, if it is `admitted`, or find it there already in the same life. Raises `NotTaken`."""
         known = self.robots.get(sender)
         if known and known.visit == visit:
             return known
+        if not admitted:
+            raise NotTaken("it is enrolled to observe, not to take part; say: robochoc authority enrol NAME")
         if profile.name != sender:
             raise NotTaken(f"its file is {profile.name[:80]!r}'s, and its certificate {sender}'s")
         if visit in self._over:
             raise NotTaken("it was away for too long; start it anew")
-        if known and (self.closed or known.gone is None):
+        if known and (self.closed or not (known.doubtful or known.gone)):
             raise NotTaken(f"a robot called {sender} is registered already")
         if self.closed or (self.expected is not None and sender not in self.expected):
             raise NotTaken("the team is complete without it" if self.closed else "it is not one of the team")
@@ -123,15 +131,56 @@ class Members:
         return bool(self.robots) and enough and not self.awaited and all(m.joined for m in self.robots.values())
 
     def unseen(self) -> dict[str, tuple[str, ...]]:
-        """Variables that parts of partially known constraints look at, and whose owners have not shown them."""
+        """Variables that neighbours' constraints look at, by those who have not shown them and may own them.
+
+        A parent need not say which variables a child has to be told: the child's constraints do.
+        """
+        owners = self._owners()
         wanted: dict[str, dict[str, None]] = {}
         for member in self.robots.values():
             for child, names in member.profile.looks_at.items():
-                other = self.robots.get(child)
-                if other:
-                    unseen = [name for name in names if name not in other.profile.variables and name not in other.also]
-                    wanted.setdefault(child, {}).update(dict.fromkeys(unseen))
-        return {child: tuple(names) for child, names in wanted.items() if names}
+                wanted.setdefault(child, {}).update(dict.fromkeys(names))
+            for name in member.profile.wants:
+                if name not in owners:
+                    for parent in member.profile.parents:
+                        wanted.setdefault(parent, {})[name] = None
+        unseen = {}
+        for name, variables in wanted.items():
+            member_asked = self.robots.get(name)
+            if member_asked:
+                known = {*member_asked.profile.variables, *member_asked.also, *member_asked.asked}
+                unseen[name] = tuple(variable for variable in variables if variable not in known)
+        return {name: variables for name, variables in unseen.items() if variables}
+
+    def show(self, name: str, variables: Mapping[str, Ranges]) -> str:
+        """Take in what the robot `name` answers when it is asked for all that is `unseen`; returns what is wrong."""
+        member = self.robots[name]
+        wanted = self.unseen().get(name, ())
+        shown = {variable: variables[variable] for variable in wanted if variable in variables}
+        try:
+            silhouette(member.profile, {**member.also, **shown})
+        except BadProfile as bad:
+            return str(bad)
+        member.asked.update(wanted)
+        member.also.update(shown)
+        return ""
+
+    def strangers(self) -> Iterator[str]:
+        """Constraints over variables that no neighbour has, in words; once nothing is `unseen` any more."""
+        owners = self._owners()
+        for name, member in self.robots.items():
+            looked_at = [one for names in member.profile.looks_at.values() for one in names]
+            for variable in (*member.profile.wants, *looked_at):
+                if owners.get(variable) not in {name, *member.profile.neighbours}:
+                    yield f"{name} holds a constraint over {variable}, which is a variable of none of its neighbours"
+
+    def _owners(self) -> dict[str, str]:
+        """Who has the variables that are shown."""
+        return {
+            variable: name
+            for name, member in self.robots.items()
+            for variable in (*member.profile.variables, *member.also)
+        }
 
     def remove(self, names: Collection[str]) -> None:
         """Robots are out for good: whoever named them as neighbours does so no more."""

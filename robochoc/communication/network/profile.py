@@ -45,7 +45,8 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     """What the robot `name` tells of its file.
 
     `variables` are its interface variables with their domains. `looks_at` names, by child, the child's variables that
-    this robot's parts of partially known constraints look at. `dearest` is the most that the constraints it holds can
+    this robot's parts of partially known constraints look at; `wants` are the others' variables in the constraints that
+    it holds towards its parents. `dearest` is the most that the constraints it holds can
     charge together, short of being broken. `topics` are where it publishes its decision.
     """
 
@@ -58,6 +59,7 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     weight: int
     dearest: float
     topics: tuple[str, ...]
+    wants: tuple[str, ...] = ()
 
     @property
     def neighbours(self) -> tuple[str, ...]:
@@ -86,6 +88,7 @@ def profile_of(robot: Robot) -> Profile:
         weight=robot.weight,
         dearest=sum(dearest(constraint) for constraint in (*robot.private, *robot.shared, *parts)),
         topics=tuple(topic.name for topic in robot.topics),
+        wants=tuple(dict.fromkeys(name for one in robot.shared for name in one.variables if name not in own)),
     )
 
 
@@ -110,11 +113,14 @@ def domain_of(name: str, ranges: Ranges) -> Domain:
 def silhouette(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
     """The robot as others see it; `also` are variables that it has shown since. Raises `BadProfile`."""
     looked_at = [name for names in profile.looks_at.values() for name in names]
-    names = (profile.name, *profile.neighbours, *profile.variables, *looked_at, *also)
+    names = (profile.name, *profile.neighbours, *profile.variables, *looked_at, *profile.wants, *also)
     bad = next((name for name in names if not is_name(name) or len(name) > LONGEST_NAME), None)
     if bad is not None:
         raise BadProfile(f"{bad[:LONGEST_NAME]!r} is no name")
-    if len(profile.neighbours) > MOST_NEIGHBOURS or max(len(profile.variables), len(looked_at)) > MOST_VARIABLES:
+    if (
+        len(profile.neighbours) > MOST_NEIGHBOURS
+        or max(map(len, (profile.variables, looked_at, profile.wants))) > MOST_VARIABLES
+    ):
         raise BadProfile("it has too many neighbours or variables")
     if len({profile.name, *profile.neighbours}) <= len(profile.neighbours):
         raise BadProfile("it names itself, or a neighbour twice")

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from queue import Empty
 from typing import NamedTuple
 
+import msgspec
+
 from robochoc.authority.identity import Identity
 from robochoc.authority.keyring import BadCard, KeyCard, KeyRing, UnknownPeer
 from robochoc.communication.control import Failed, Pause, Wave
@@ -125,7 +127,7 @@ class NetworkRobot:
         self._filters: FilterStack | None = None
         self._welcome: Welcome | None = None
         self._searcher: Searcher | None = None
-        self._ahead: list[tuple[str, Said | Copies]] = []
+        self._ahead: list[tuple[str, Opened]] = []
         """What others have said in an epoch that the master has not told this robot of yet."""
         self._registered = 0.0
         self._refusals = Refusals(lambda who, what, why: self._say(Objection(who, what, why)))
@@ -207,10 +209,10 @@ class NetworkRobot:
         self._post.send(MASTER, self._letters.write(MASTER, word))
 
     def _send(self, receiver: str, word: Said | Copies) -> None:
-        if isinstance(word, Said) and self._filters:
+        if self._filters:
             context = self._context(self._robot.name, receiver, self._letters.next_number(receiver), word)
             try:
-                word = Said(word.epoch, word.clock, self._filters.seal(receiver, word.content, context))
+                word = msgspec.structs.replace(word, content=self._filters.seal(receiver, word.content, context))
             except UnknownPeer:
                 return  # it was revoked, and hears nothing any more
         self._post.send(receiver, self._letters.write(receiver, word))
@@ -218,44 +220,49 @@ class NetworkRobot:
     def _read(self, sender: str, content: bytes, packet: list[Envelope]) -> None:
         try:
             opened = self._letters.read(sender, content)
-            word = self._unsealed(sender, opened)
-            self._check(word)
+            self._use(sender, opened, packet)
         except (Refused, NotGenuine, UnknownPeer, BadMessage) as refused:
             self._object(sender, str(refused))
-            return
-        self._letters.take(sender, opened.number)
-        if isinstance(word, Said | Copies):
-            self._hear(sender, word, packet)
-        else:
+
+    def _use(self, sender: str, opened: Opened, packet: list[Envelope]) -> None:
+        """Take in what is for now; what is for later waits as it is, for the cards that open it have not come yet.
+
+        Raises `BadMessage`, `NotGenuine`, `Refused`, `UnknownPeer`, so that what nobody can use does not take the place
+        of another letter.
+        """
+        word, epoch = opened.word, self._searcher.epoch if self._searcher else 0
+        if not isinstance(word, Said | Copies):
+            self._letters.take(sender, opened.number)
             self._obey(word)
+        elif word.epoch > epoch:
+            if word.epoch > epoch + 1 or len(self._ahead) > AHEAD_AT_MOST:
+                raise Refused(f"it is of epoch {word.epoch}, and this is {epoch}")
+            self._letters.take(sender, opened.number)
+            self._ahead.append((sender, opened))
+        else:
+            word = self._unsealed(sender, opened.number, word)
+            if isinstance(word, Said) and self._searcher and word.epoch == epoch:
+                self._searcher.check(word.content)
+            self._letters.take(sender, opened.number)
+            self._hear(sender, word, packet)
 
-    def _unsealed(self, sender: str, opened: Opened) -> Word:
-        word = opened.word
-        if not isinstance(word, Said) or self._filters is None:
+    def _unsealed(self, sender: str, number: int, word: Said | Copies) -> Said | Copies:
+        if self._filters is None:
             return word
-        context = self._context(sender, self._robot.name, opened.number, word)
-        return Said(word.epoch, word.clock, self._filters.open(sender, word.content, context))
+        context = self._context(sender, self._robot.name, number, word)
+        return msgspec.structs.replace(word, content=self._filters.open(sender, word.content, context))
 
-    def _check(self, word: Word) -> None:
-        """Raises `BadMessage` and `Refused`, so that what nobody can use does not take the place of another letter."""
-        epoch = self._searcher.epoch if self._searcher else 0
-        if isinstance(word, Said | Copies) and (word.epoch > epoch + 1 or len(self._ahead) > AHEAD_AT_MOST):
-            raise Refused(f"it is of epoch {word.epoch}, and this is {epoch}")
-        if isinstance(word, Said) and self._searcher and word.epoch == epoch:
-            self._searcher.check(word.content)
-
-    def _context(self, sender: str, receiver: str, number: int, word: Said) -> bytes:
-        """What binds a sealed message to its place in the run."""
-        return f"{self._letters.run} {sender} {receiver} {number} {word.epoch} {word.clock}".encode()
+    def _context(self, sender: str, receiver: str, number: int, word: Said | Copies) -> bytes:
+        """What binds a sealed word to its place in the run."""
+        kind = word.clock if isinstance(word, Said) else "copies"
+        return f"{self._letters.run} {sender} {receiver} {number} {word.epoch} {kind}".encode()
 
     def _hear(self, sender: str, word: Said | Copies, packet: list[Envelope]) -> None:
         searcher = self._searcher
-        if searcher is None or word.epoch > searcher.epoch:
-            self._ahead.append((sender, word))
-        elif word.epoch < searcher.epoch:
+        if searcher is None or word.epoch != searcher.epoch:
             return
-        elif isinstance(word, Copies):
-            searcher.learn(sender, word.constraints)
+        if isinstance(word, Copies):
+            searcher.learn(sender, word.content)
         else:
             envelope = Envelope(sender, self._robot.name, word.content, word.clock)
             if searcher.hear(envelope):
@@ -342,18 +349,17 @@ class NetworkRobot:
             protocol = self._protocol_named(task.protocol)
         except LookupError as unknown:
             raise Unsupported(f"{self._robot.name}: {unknown}") from None
-        observed = self._welcome.observed or self._manner.sniffed
+        told = self._welcome.observed and not self._welcome.private  # events have values in them
+        observed = told or self._manner.sniffed
         around = Surroundings(self._say, self._send, self._manner.place, observed, self._welcome.private)
         self._searcher = Searcher(self._robot, self._domain, task, protocol, around)
         self._searcher.prepare()
         ahead, self._ahead = self._ahead, []
-        for sender, word in ahead:
+        for sender, opened in ahead:
             try:
-                self._check(word)
-            except BadMessage as bad:
-                self._object(sender, str(bad))
-            else:
-                self._hear(sender, word, [])
+                self._use(sender, opened, [])
+            except (Refused, NotGenuine, UnknownPeer, BadMessage) as refused:
+                self._object(sender, str(refused))
 
     def _admit(self, cards: tuple[bytes, ...]) -> None:
         """Believe the key cards of the others, if the Authority has certified them."""

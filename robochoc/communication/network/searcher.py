@@ -97,7 +97,7 @@ class Searcher:
             known = [one for one in held(self._robot) if one.constraint.model is not Model.PKC]
             for parent in self._robot.parents:
                 theirs = [one for one in known if parent.name in {owners.get(v) for v in one.constraint.variables}]
-                self._around.send(parent.name, Copies(self.epoch, tuple(map(record_of, theirs))))
+                self._around.send(parent.name, Copies(self.epoch, msgspec.msgpack.encode(list(map(record_of, theirs)))))
         self._get_ready()
 
     def _refuse_unfit(self, owners: Mapping[str, str]) -> None:
@@ -113,9 +113,12 @@ class Searcher:
             if not traits.n_ary and len({owners.get(variable) for variable in constraint.variables}) > PAIR:
                 raise Unsupported(f"{robot.name} holds a constraint over more than two robots{refused}")
 
-    def learn(self, sender: str, constraints: tuple[SharedRecord, ...]) -> None:
-        """`sender` holds these constraints, and this robot is in their scopes. Raises `Unsupported`."""
-        self._copies[sender] = constraints
+    def learn(self, sender: str, content: bytes) -> None:
+        """`sender` holds the constraints in `content`, and this robot is in their scopes. Raises `Unsupported`."""
+        try:
+            self._copies[sender] = msgspec.msgpack.decode(content, type=tuple[SharedRecord, ...])
+        except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as bad:
+            raise Unsupported(f"{self._robot.name} was told what cannot be: {sender}'s constraints: {bad}") from None
         self._get_ready()
 
     def _get_ready(self) -> None:

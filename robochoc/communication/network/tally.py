@@ -10,6 +10,7 @@ from robochoc.communication.control import Conclusion, Counters, OfEpoch, Ready
 from robochoc.communication.network.words import Account, Checked
 from robochoc.communication.quiescence import Counts, FourCounters
 from robochoc.communication.run_result import RunResult
+from robochoc.formats.constraints import is_name
 from robochoc.observers.events import (
     AnyEvent,
     Began,
@@ -25,9 +26,17 @@ from robochoc.observers.events import (
     Sent,
     Settled,
 )
-from robochoc.outcome import Verdict
+from robochoc.outcome import Metrics, Verdict
+from robochoc.problem import INFINITE
 
 _ASKED_ENOUGH = 2
+_LARGEST_COUNT = 2**53
+
+
+def _is_sound(metrics: Metrics) -> bool:
+    """Whether a robot can have counted that: names of messages are printed, and numbers added up."""
+    counts = (metrics.bytes, metrics.ncccs, metrics.checks, metrics.memory, *metrics.messages.values())
+    return all(map(is_name, metrics.messages)) and all(0 <= count <= _LARGEST_COUNT for count in counts)
 
 
 class Tally:
@@ -67,10 +76,10 @@ class Tally:
                 self.counters.answer(name, wave, Counts(sent, received))
             case Conclusion(_, verdict) if verdict in set(Verdict):
                 self.verdict, self._witness = Verdict(verdict), name
-            case Account():
+            case Account(metrics=metrics) if _is_sound(metrics):
                 self._accounts[name] = word
                 self._silent.discard(name)
-            case Checked():
+            case Checked(cost=cost) if 0 <= cost < INFINITE:
                 self._checks[name] = word
                 self._unchecked.discard(name)
             case _:

@@ -14,7 +14,6 @@ import msgspec
 
 from robochoc.communication.control import Conclusion, Counters, Events, Failed, OfEpoch, Pause, Ready, Wave
 from robochoc.communication.network.profile import Profile, Ranges
-from robochoc.communication.network.shared import SharedRecord
 from robochoc.outcome import Metrics
 from robochoc.protocols.findings import Findings
 
@@ -170,9 +169,12 @@ class Said(OfEpoch, frozen=True):
 
 
 class Copies(OfEpoch, frozen=True):
-    """The totally known constraints that I hold and you are in: your protocol wants you to know them."""
+    """The totally known constraints that I hold and you are in: your protocol wants you to know them.
 
-    constraints: tuple[SharedRecord, ...]
+    `content` holds `SharedRecord`s, as the filters have sealed it.
+    """
+
+    content: bytes
 
 
 ToMaster = (
