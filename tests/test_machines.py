@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import socket
 import subprocess
@@ -20,6 +21,7 @@ from test_epochs import differ
 
 from robochoc.cli.commands import cli
 from robochoc.formats import read_team, write_team
+from robochoc.observers.checker import objections
 from robochoc.outcome import Verdict
 from robochoc.problem import Team
 from robochoc.run import Options, Runtime, solve
@@ -167,6 +169,19 @@ def test_whom_the_directory_knows_while_the_master_waits(site: Site) -> None:
     assert (watcher.status(), "is gone" in watcher.errors) == (4, True)
     assert [line.partition("@")[0] for line in watcher.output.splitlines()] == ["RA", "RB", "RC"]
     ended({**robots, "RC": last})
+
+
+def test_what_a_parent_leaves_out_its_childs_constraints_say(site: Site) -> None:
+    files = site.folder / "unsaid"
+    files.mkdir()
+    for path in (ROOT / "docs" / "examples" / "scouts").glob("*.xml"):
+        (files / path.name).write_text(re.sub(r' variable="[^"]*"', "", path.read_text()))
+    tokens = site.enrol("--team", files)
+    master = site.master("--team", files, "--json")
+    robots = site.robots(files, tokens)
+    assert master.status() == 0, master.errors
+    assert not list(objections(read_team(files), master.object["assignment"]))
+    ended(robots)
 
 
 # Who is turned away

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from robochoc.authority.authority import check_name
@@ -62,5 +63,6 @@ def join(robot: Robot, place: Place, identity: Identity, manner: Manner, compile
     manner.stage("compiling")
     domain = compiler.compile(robot).domain
     manner.stage(f"looking for the master at {place}")
+    manner = replace(manner, compiled=lambda shown: compiler.compile(shown).domain)
     with Post(str(place), identity, watch=(), patience_s=manner.patience_s) as post:
         return NetworkRobot(robot, domain, identity, post, spoken, manner).run()

@@ -25,7 +25,7 @@ from robochoc.communication.filters import FilterStack, NotGenuine, UnknownFilte
 from robochoc.communication.host import BadMessage
 from robochoc.communication.network.letters import MASTER, Letters, Opened, Refused, TooLarge
 from robochoc.communication.network.post import Arrived, Item, Missed, Post, Presence, Woken
-from robochoc.communication.network.profile import profile_of, ranges_of
+from robochoc.communication.network.profile import among, profile_of, ranges_of
 from robochoc.communication.network.refusals import Refusals
 from robochoc.communication.network.searcher import Searcher, Surroundings
 from robochoc.communication.network.words import (
@@ -91,13 +91,15 @@ class Manner:
 
     `patience_s` is how long the master may be gone. `sniffed`: the master's observers are to be told of all that the
     robot does, even if they do not ask for it. `place` is told the robot's place in the priority order, and how many
-    robots there are, before each search; `stage` in a few words how far it is.
+    robots there are, before each search; `stage` in a few words how far it is. `compiled` compiles the robot's domain
+    again, should others have to see more of its variables than it knew (None: it has no private constraints).
     """
 
     patience_s: float = 10.0
     sniffed: bool = False
     place: Callable[[int, int], None] = _nothing
     stage: Callable[[str], None] = _nothing
+    compiled: Callable[[Robot], CompiledDomain | None] = lambda _robot: None
 
 
 class NetworkRobot:
@@ -352,7 +354,10 @@ class NetworkRobot:
         told = self._welcome.observed and not self._welcome.private  # events have values in them
         observed = told or self._manner.sniffed
         around = Surroundings(self._say, self._send, self._manner.place, observed, self._welcome.private)
-        self._searcher = Searcher(self._robot, self._domain, task, protocol, around)
+        robot, domain = among(self._robot, task.interfaces), self._domain
+        if domain is not None and robot.interface != self._robot.interface:
+            domain = self._manner.compiled(robot)
+        self._searcher = Searcher(robot, domain, task, protocol, around)
         self._searcher.prepare()
         ahead, self._ahead = self._ahead, []
         for sender, opened in ahead:

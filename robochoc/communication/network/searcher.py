@@ -14,7 +14,7 @@ import msgspec
 
 from robochoc.communication.control import Conclusion, Counters, Events, Ready
 from robochoc.communication.host import BadMessage, Host
-from robochoc.communication.network.profile import BadProfile, among, domain_of
+from robochoc.communication.network.profile import BadProfile, domain_of
 from robochoc.communication.network.shared import BadShared, SharedRecord, known_of, record_of
 from robochoc.communication.network.words import Account, Checked, Copies, Said, Task, ToMaster
 from robochoc.communication.system import own_memory
@@ -48,7 +48,10 @@ class Surroundings:
 
 
 class Searcher:
-    """The robot `robot` in the epoch of `task`. `domain` is its compiled domain, None: it needs no solver for that."""
+    """The robot `robot`, as it is `among` those of `task`, in its epoch.
+
+    `domain` is its compiled domain, None: it needs no solver for that.
+    """
 
     def __init__(
         self,
@@ -59,7 +62,7 @@ class Searcher:
         around: Surroundings,
     ) -> None:
         self.epoch = task.epoch
-        self._robot = among(robot, task.interfaces)
+        self._robot = robot
         self._domain = domain
         self._task = task
         self._protocol = protocol
