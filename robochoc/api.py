@@ -11,17 +11,17 @@ Both are thin, and on the same code as the command line.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robochoc.defaults import MINIMISES
+from robochoc.defaults import suits
 from robochoc.formats import read_robot, read_team
 from robochoc.observers.events import Observer
 from robochoc.options import Options, Runtime, Withdrawal
 from robochoc.orders import Order
 from robochoc.outcome import Outcome
-from robochoc.problem import Kind, Team
+from robochoc.problem import Team
 from robochoc.registry import UnknownProtocol, offers
 from robochoc.run import solve
 
@@ -55,17 +55,15 @@ class Problem:
         `TypeError` where an option is none. A program that starts processes is to do so below
         `if __name__ == "__main__":`.
         """
-        default = Options()
-        suits = replace(default, protocol=default.protocol if self.team.kind is Kind.DISCSP else MINIMISES)
-        asked = replace(
-            suits,
+        asked = Options(
+            protocol=protocol or suits(self.team.kind),
             runtime=Runtime(runtime),
             order=Order(order) if order else None,
             withdraw=Withdrawal(withdraw) if withdraw else None,
             settings={name: str(value) for name, value in settings.items()},
             **options,
         )
-        return solve(self.team, replace(asked, protocol=protocol) if protocol else asked, observer=observer)
+        return solve(self.team, asked, observer=observer)
 
 
 def load(path: Path | str) -> Problem:

@@ -4,3 +4,10 @@ SATISFIES = "abt"
 """A team without costs."""
 MINIMISES = "sfb"
 """One with costs; it also says who steps aside, when the protocol that was asked for cannot."""
+FIRST_FIT = "first-fit"
+"""Says who steps aside with `--withdraw maximal`. Nobody can ask for it by name."""
+
+
+def suits(kind: str) -> str:
+    """The protocol for a team of this `Kind`."""
+    return SATISFIES if kind == "DisCSP" else MINIMISES

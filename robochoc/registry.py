@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
+from typing import cast
 
+from robochoc.defaults import FIRST_FIT
+from robochoc.installed import all_in, loaded, missing, named, names_in
+from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import DynamicProtocol, Protocol, Settings
 from robochoc.protocols.traits import Traits
 
@@ -32,23 +35,19 @@ class Offer:
 
 def protocol_names() -> tuple[str, ...]:
     """The names of all protocols that are installed, ours and others', sorted."""
-    return tuple(sorted({entry.name for entry in entry_points(group=GROUP)}))
+    return names_in(GROUP)
 
 
 def offers() -> tuple[Offer, ...]:
     """All that installed packages offer, by name; what cannot be used too, with the reason."""
-    found = sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
-    return tuple(_offer(entry, [other for other in found if other.name == entry.name]) for entry in found)
+    return tuple(_offer(entry, namesakes) for entry, namesakes in all_in(GROUP))
 
 
 def offer_named(name: str) -> Offer:
     """What is offered as `name`. Raises `UnknownProtocol`, which names those there are."""
-    found = list(entry_points(group=GROUP, name=name))
+    found = named(GROUP, name)
     if not found:
-        names = protocol_names()
-        near = difflib.get_close_matches(name.lower(), names, 1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise UnknownProtocol(f"no protocol {name!r} is installed, only: {', '.join(names)}{hint}")
+        raise UnknownProtocol(missing(GROUP, "protocol", name))
     return _offer(found[0], found)
 
 
@@ -60,20 +59,15 @@ def protocol_named(name: str) -> type[Protocol]:
     return offer.protocol
 
 
+def spoken(name: str) -> type[Protocol]:
+    """Like `protocol_named`, of all that robots can be told to speak: also what only says who steps aside."""
+    return FirstFit if name == FIRST_FIT else protocol_named(name)
+
+
 def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> Offer:
-    """What stands behind `entry`: code of whoever wrote the package, which may fail in any way."""
     package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "unknown"
-    if len(namesakes) > 1:
-        places = " and ".join(sorted(f"{one.value} ({one.dist.name if one.dist else 'unknown'})" for one in namesakes))
-        reason = f"is offered by several packages, and only one may: {places}"
-        return Offer(entry.name, entry.value, package, None, reason)
-    try:
-        loaded = entry.load()
-    except (Exception, SystemExit) as error:  # noqa: BLE001 - one broken package must not hide the others
-        reason = f"cannot be imported: {type(error).__name__}: {error}"
-        return Offer(entry.name, entry.value, package, None, reason)
-    fault = _fault(loaded)
-    return Offer(entry.name, entry.value, package, None if fault else loaded, fault)
+    found = loaded(entry, namesakes, _fault)
+    return Offer(entry.name, entry.value, package, cast("type[Protocol] | None", found.what), found.broken)
 
 
 def _fault(loaded: object) -> str:

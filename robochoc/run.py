@@ -16,7 +16,7 @@ from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.session import Session
 from robochoc.communication.simulator import Simulation
 from robochoc.communication.timed import Timed
-from robochoc.defaults import MINIMISES
+from robochoc.defaults import FIRST_FIT, MINIMISES
 from robochoc.epochs import Journey, Played
 from robochoc.observers.checker import has_local_solution
 from robochoc.observers.events import Began, Observer
@@ -26,11 +26,10 @@ from robochoc.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Wi
 from robochoc.orders import CannotTurn, Order, in_order, order_of
 from robochoc.outcome import Epoch, Metrics, Outcome, Verdict
 from robochoc.problem import INFINITE, Team
-from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.refusals import instead, refuse_central, refuse_unfit
-from robochoc.registry import protocol_named
+from robochoc.registry import protocol_named, spoken
 from robochoc.solver.ace import AceProcess, SolverTimeout
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.central import Judge
@@ -40,9 +39,6 @@ from robochoc.solver.encoding import TooMuch, Unsupported
 from robochoc.solver.part import Brief
 
 __all__ = ["CENTRAL", "OnLoss", "Options", "Refuted", "Runtime", "ScheduleName", "Withdrawal", "solve"]
-
-FIRST_FIT = "first-fit"
-"""What an outcome calls the protocol of `--withdraw maximal`, which nobody can ask for."""
 
 
 def solve(
@@ -147,8 +143,8 @@ class _Run:
             outcome = replace(outcome, reason="; ".join([*filter(None, [outcome.reason]), *journey.regrets]))
         if outcome.verdict is Verdict.NO_SOLUTION and self._options.withdraw is not None:
             fewest = self._options.withdraw is Withdrawal.FEWEST
-            outcome = replace(outcome, placed_by=MINIMISES if fewest else FIRST_FIT)
-            outcome = self._placed(outcome, journey, protocol_named(MINIMISES) if fewest else FirstFit)
+            second = MINIMISES if fewest else FIRST_FIT
+            outcome = self._placed(replace(outcome, placed_by=second), journey, spoken(second))
         return outcome
 
     def _limit(self, witness: str | None, sent: int) -> str:

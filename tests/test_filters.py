@@ -330,7 +330,7 @@ def installed(monkeypatch: pytest.MonkeyPatch, **places: str | list[str]) -> Non
     def offered(group: str, name: str | None = None) -> list[EntryPoint]:
         return [entry for entry in found if entry.group == group and name in (None, entry.name)]
 
-    monkeypatch.setattr(filters, "entry_points", offered)
+    monkeypatch.setattr("robochoc.installed.entry_points", offered)
 
 
 def test_the_package_offers_the_two(monkeypatch: pytest.MonkeyPatch) -> None:

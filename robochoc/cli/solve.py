@@ -23,7 +23,7 @@ from robochoc.cli.solve_settings import (
     check_settings,
     protocol_settings,
 )
-from robochoc.defaults import MINIMISES, SATISFIES
+from robochoc.defaults import MINIMISES, SATISFIES, suits
 
 if TYPE_CHECKING:
     from robochoc.observers.journal import Recorder
@@ -246,7 +246,7 @@ def _solve_one(folder: Path, options: Options, products: Products, wanted: Wante
     try:
         with failures_told(folder):
             team = read_team(folder)
-            protocol = wanted.protocol or (SATISFIES if team.kind == "DisCSP" else MINIMISES)
+            protocol = wanted.protocol or suits(team.kind)
             options = replace(options, protocol=protocol, order=order_for(team, wanted.order))
             with _journal(team, options, products.journal) as recorder:
                 outcome = _run(team, options, recorder)

@@ -7,14 +7,15 @@ they protect from, and how to write one: docs/security.md.
 
 from __future__ import annotations
 
-import difflib
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
+from typing import cast
 
 from robochoc.authority.keyring import KeyRing
 from robochoc.formats.diagnostics import on_one_line
+from robochoc.installed import all_in, loaded, missing, named
 
 GROUP = "robochoc.filters"
 
@@ -86,18 +87,14 @@ class FilterOffer:
 
 def filter_offers() -> tuple[FilterOffer, ...]:
     """All that installed packages offer, by name; what cannot be used too, with the reason."""
-    found = sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
-    return tuple(_offer(entry, [other for other in found if other.name == entry.name]) for entry in found)
+    return tuple(_offer(entry, namesakes) for entry, namesakes in all_in(GROUP))
 
 
 def filter_named(name: str) -> type[ChannelFilter]:
     """The filter called `name`. Raises `UnknownFilter`, which names those there are."""
-    found = list(entry_points(group=GROUP, name=name))
+    found = named(GROUP, name)
     if not found:
-        names = sorted({entry.name for entry in entry_points(group=GROUP)})
-        near = difflib.get_close_matches(name.lower(), names, 1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise UnknownFilter(f"no filter {name!r} is installed, only: {', '.join(names) or 'none'}{hint}")
+        raise UnknownFilter(missing(GROUP, "filter", name))
     offer = _offer(found[0], found)
     if offer.filter is None:
         raise UnknownFilter(f"{offer.place}, installed as filter {name!r}, {offer.broken}")
@@ -105,18 +102,8 @@ def filter_named(name: str) -> type[ChannelFilter]:
 
 
 def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> FilterOffer:
-    """What stands behind `entry`: code of whoever wrote the package, which may fail in any way."""
-    places = sorted({one.value for one in namesakes})
-    if len(namesakes) > 1:
-        reason = f"is offered by several packages, and only one may: {' and '.join(places)}"
-        return FilterOffer(entry.name, entry.value, None, reason)
-    try:
-        loaded = entry.load()
-    except (Exception, SystemExit) as error:  # noqa: BLE001 - one broken package must not hide the others
-        reason = f"cannot be imported: {type(error).__name__}: {error}"
-        return FilterOffer(entry.name, entry.value, None, reason)
-    fault = _fault(loaded)
-    return FilterOffer(entry.name, entry.value, None if fault else loaded, fault)
+    found = loaded(entry, namesakes, _fault)
+    return FilterOffer(entry.name, entry.value, cast("type[ChannelFilter] | None", found.what), found.broken)
 
 
 def _fault(loaded: object) -> str:

@@ -12,8 +12,8 @@ from robochoc.authority.identity import BadIdentity, Identity, default_folder
 from robochoc.communication.network.post import Post
 from robochoc.communication.network.robot import Ending, Manner, NetworkRobot
 from robochoc.machines.place import Place
-from robochoc.machines.speaking import spoken
 from robochoc.problem import Robot
+from robochoc.registry import spoken
 from robochoc.solver.compile import Compiler
 
 PATIENCE_S = 30.0

@@ -27,14 +27,14 @@ from robochoc.communication.network.members import Members
 from robochoc.communication.network.router import RouterFailed
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress, RunResult
-from robochoc.defaults import MINIMISES, SATISFIES
+from robochoc.defaults import FIRST_FIT, MINIMISES, SATISFIES, suits
 from robochoc.machines.place import LOOPBACK, Place
-from robochoc.machines.speaking import FIRST_FIT, spoken
 from robochoc.observers.events import Observer
 from robochoc.options import Withdrawal
 from robochoc.outcome import Outcome, Verdict
 from robochoc.problem import Domain, Kind, Team, Variable
 from robochoc.protocols.traits import Traits
+from robochoc.registry import spoken
 from robochoc.solver.encoding import Unsupported
 from robochoc.solver.part import Brief
 
@@ -166,7 +166,7 @@ class _Lead:
             raise NotComplete(f"the team is not complete after {plan.gather_s:g} s; awaited: {names or 'more robots'}")
         self._deadline = None if plan.timeout is None else time.monotonic() + plan.timeout
         kind = self._team().kind
-        protocol = plan.protocol or (SATISFIES if kind is Kind.DISCSP else MINIMISES)
+        protocol = plan.protocol or suits(kind)
         _check_settings(protocol, plan.settings)
         self._outcome = replace(self._outcome, protocol=protocol)
         traits = spoken(protocol).traits
