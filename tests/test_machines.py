@@ -119,6 +119,20 @@ def test_what_robots_keep_to_themselves(site: Site) -> None:
     assert (told["verdict"], told["assignment"], told["verified"]) == ("solution", {}, False)
     said = {name: robot.output.rpartition(" = ")[2].strip() for name, robot in robots.items()}
     assert set(said.values()) == {"1", "2"}, said
+    written_down = {json.loads(line)["event"] for line in journal.read_text().splitlines()}
+    assert written_down == {"Journal", "Granted", "Registered", "Ended"}
+
+
+def test_a_robot_comes_back_while_others_are_awaited(site: Site) -> None:
+    files = written(PAIR, site)
+    tokens = site.enrol("--team", files)
+    master = site.master("--team", files)
+    first = site.robot(files / "RA.xml", "--token", tokens["RA"])
+    master.wait_to_say("RA is there")
+    first.kill()
+    robots = {"RA": site.robot(files / "RA.xml"), **site.robots(files, {"RB": tokens["RB"]})}
+    assert master.status() == 0, master.errors
+    ended(robots)
 
 
 def test_robots_that_are_there_before_their_master(site: Site) -> None:

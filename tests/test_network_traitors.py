@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
 import pytest
-from held import CHAIN, TRIANGLE
+from held import CHAIN, TRIANGLE, Held
 from network_runs import NetworkRun, letter
 
 from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.letters import MASTER, Letters
 from robochoc.communication.network.post import Arrived, Post
 from robochoc.communication.network.profile import Profile, profile_of
-from robochoc.communication.network.words import Denied, Register, Said
+from robochoc.communication.network.words import Copies, Denied, Register, Said, Word
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.message import encode
 from robochoc.outcome import Verdict
@@ -120,6 +121,27 @@ def test_a_router_that_changes_letters(tmp_path: Path, filters: tuple[str, ...])
                 run.wait_for_refusal("RX1", "letter to RX2", why)
         run.wait_for_progress()
         assert run.let_go().verdict is Verdict.NO_SOLUTION
+
+
+@pytest.mark.parametrize("filters", [(), ("sealed",)])
+def test_constraints_that_others_have_to_know_are_sealed_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, filters: tuple[str, ...]
+) -> None:
+    monkeypatch.setattr(Held, "traits", replace(Held.traits, everywhere=True))
+    sent: list[bytes] = []
+    write = Letters.write
+
+    def recorded(letters: Letters, receiver: str, word: Word) -> bytes:
+        content = write(letters, receiver, word)
+        if isinstance(word, Copies):
+            sent.append(content)
+        return content
+
+    monkeypatch.setattr(Letters, "write", recorded)
+    with NetworkRun(tmp_path, TRIANGLE, Conditions(filters)) as run:
+        assert run.let_go().verdict is Verdict.NO_SOLUTION
+    assert len(sent) == 3
+    assert any(b"ne(X" in content for content in sent) is not bool(filters)
 
 
 def recorded_said(reader: Post) -> Said:
