@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from machines import Site
 
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
@@ -16,6 +17,12 @@ def four(tmp_path: Path) -> Path:
     folder = tmp_path / "queens3d-4"
     write_team(queens3d(4), folder)
     return folder
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Iterator[Site]:
+    with Site(tmp_path) as site:
+        yield site
 
 
 @pytest.fixture(autouse=True, scope="session")

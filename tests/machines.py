@@ -15,12 +15,19 @@ from pathlib import Path
 from typing import Any, Self
 
 from click.testing import CliRunner
+from problems import PREDICATES, team_of
 from program import ROOT
 
 from robochoc.cli.commands import cli
+from robochoc.formats import write_team
+from robochoc.problem import Constraint, Team
 
 LOOPBACK = "127.0.0.1"
 LONG_S = 90.0
+SOON_S = 20.0
+_DIFFERENT = [Constraint("C", PREDICATES[0], pair, pair) for pair in (("A", "B"), ("B", "C"), ("A", "C"))]
+PAIR = team_of(dict.fromkeys("AB", range(1, 3)), _DIFFERENT[:1])
+TRIANGLE = team_of(dict.fromkeys("ABC", range(1, 3)), _DIFFERENT)
 _POLL_S = 0.02
 
 
@@ -180,3 +187,15 @@ def ended(programs: Mapping[str, Program], status: int = 0) -> None:
     """Wait until all have ended, with that status."""
     found = {name: program.status() for name, program in programs.items()}
     assert set(found.values()) == {status}, {name: programs[name].errors for name in found if found[name] != status}
+
+
+def written(team: Team, site: Site) -> Path:
+    folder = site.folder / "files"
+    write_team(team, folder)
+    return folder
+
+
+def one_line(program: Program) -> str:
+    """All that a program says that did not get far."""
+    assert program.errors.count("\n") == 1, program.errors
+    return program.errors
