@@ -17,7 +17,8 @@ from pathlib import Path
 from secrets import token_hex
 
 PROGRAM = str(Path(sys.executable).with_name("robochoc"))
-GONE_WITHIN_S = 2.0
+GONE_WITHIN_S = 6.0
+"""Three times what it takes at most on a machine that has time for it: here other tests run beside it."""
 POLL_S = 0.01
 _PATIENCE_S = 30.0
 _MARK = "ROBOCHOC_FAULT_TEST"

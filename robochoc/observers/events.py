@@ -29,6 +29,28 @@ class Began(Event, frozen=True):
     minimises: bool | UnsetType = UNSET
 
 
+class Given(Event, frozen=True):
+    """What the robots know when a run, or an epoch, begins; follows its `Began`. Enough to play it again.
+
+    `order` is the priority order, and so says who is in the team; `robots` holds the XML files, by name, of those
+    whose file is another than in the `Given` before (or all; empty, with the reason in `why`: it could not be
+    written). Whoever is in `fresh` begins anew; `void_keys` and `void_agents` are what no longer stands
+    (`solver/explanation.py`), and `quiet` says whether no message of the epoch before was lost. `seed`, `settings`
+    and `aside` are what all are told beside the problem (`solver/part.py`).
+    """
+
+    order: tuple[str, ...]
+    robots: dict[str, str]
+    seed: int = 0
+    settings: dict[str, str] = {}
+    aside: float | None = None
+    fresh: tuple[str, ...] = ()
+    void_keys: tuple[str, ...] = ()
+    void_agents: tuple[str, ...] = ()
+    quiet: bool = True
+    why: str = ""
+
+
 class Registered(Event, frozen=True):
     """A robot has confirmed that it is there."""
 
@@ -132,6 +154,18 @@ class Refused(Event, frozen=True):
 
 
 AnyEvent = (
-    Began | Registered | Sent | Received | Decided | Heard | Improved | Settled | Concluded | Lost | Granted | Refused
+    Began
+    | Given
+    | Registered
+    | Sent
+    | Received
+    | Decided
+    | Heard
+    | Improved
+    | Settled
+    | Concluded
+    | Lost
+    | Granted
+    | Refused
 )
 Observer = Callable[[AnyEvent], None]

@@ -16,6 +16,7 @@ from robochoc.observers.events import (
     Began,
     Concluded,
     Decided,
+    Given,
     Granted,
     Heard,
     Improved,
@@ -171,7 +172,7 @@ def is_of(event: AnyEvent, name: str) -> bool:
             return event.receiver == name
         case Decided() | Heard() | Settled() | Concluded():
             return event.robot == name
-        case Began() | Registered() | Improved() | Lost() | Granted() | Refused():
+        case Began() | Given() | Registered() | Improved() | Lost() | Granted() | Refused():
             return False
         case never:
             assert_never(never)

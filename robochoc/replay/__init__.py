@@ -1,0 +1,1 @@
+"""Replay: what a journal holds, played again with the same protocol objects."""
