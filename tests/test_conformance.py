@@ -17,7 +17,7 @@ from robochoc.problem import Team
 from robochoc.registry import protocol_named, protocol_names
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 
-PER_BATCH, FIRST_BATCH = 300, 140
+PER_BATCH, FIRST_BATCH = 300, 90
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 10))]
 EVERY_PROTOCOL = pytest.mark.parametrize("protocol", protocol_names())
 
@@ -87,7 +87,7 @@ def test_simulator_agrees_with_brute_force(protocol: str, batch: int) -> None:
 
 @EVERY_PROTOCOL
 @given(seed=st.integers(0, 2**32), chance=st.randoms(use_true_random=False))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_simulator_agrees_with_brute_force_and_shrinks(protocol: str, seed: int, chance: Random) -> None:
     agrees(team_for(protocol, Random(seed)), Options(**{**vars(random_schedule(chance)), "protocol": protocol}))
 
@@ -96,7 +96,7 @@ def test_simulator_agrees_with_brute_force_and_shrinks(protocol: str, seed: int,
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 4))])
 def test_processes_agree_with_brute_force(protocol: str, batch: int) -> None:
     chance = Random(f"processes {protocol} {batch}")
-    for _ in range(part_of(25 if batch else 14, protocol, batch)):
+    for _ in range(part_of(25 if batch else 8, protocol, batch)):
         agrees(team_for(protocol, chance), Options(protocol=protocol, timeout=60))
 
 

@@ -23,7 +23,7 @@ COMPLETE = [name for name in MINIMISING if protocol_named(name).traits.complete]
 INCOMPLETE = [name for name in MINIMISING if name not in COMPLETE]
 SHORT = {"cycles": "25"}
 """Of protocols that go through cycles."""
-PER_BATCH, FIRST_BATCH = 200, 60
+PER_BATCH, FIRST_BATCH = 200, 40
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 11))]
 
 
@@ -72,7 +72,7 @@ def test_the_least_cost_is_found_in_the_simulator(protocol: str, batch: int, war
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 4))])
 def test_the_least_cost_is_found_in_processes(protocol: str, batch: int, warm: AceProcess) -> None:
     chance = Random(f"costs processes {protocol} {batch}")
-    for _ in range(16 if batch else 9):
+    for _ in range(16 if batch else 5):
         agrees(team_for(protocol, chance), Options(protocol=protocol, timeout=60), warm)
 
 

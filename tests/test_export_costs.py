@@ -71,6 +71,7 @@ def test_what_is_exported_costs_the_same() -> None:
         assert least_exported(xcsp3(team)) == least_cost(team), team
 
 
+@pytest.mark.slow
 def test_ace_and_choco_find_the_least_cost_of_what_is_exported(tmp_path: Path) -> None:
     for team, least in ((coloring(4, 3, 3), 1), (charged_in_any_case(), 9), (spared(), 0)):
         path = tmp_path / "team.xml"

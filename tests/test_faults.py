@@ -37,7 +37,7 @@ MIDDLE_S = 0.3
 """So long after the last robot's process is there the search is well under way."""
 STARTING_S = 0.7
 """In so much time the program begins, imports, reads the team, and starts most robots."""
-FEW, MANY = 5, 50
+FEW, MANY = 3, 50
 OLD = b"what was here before"
 
 

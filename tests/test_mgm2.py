@@ -176,7 +176,7 @@ def test_two_that_are_stuck_alone_move_together() -> None:
     assert set(ends[MGM2]) == {(0, 0)}
 
 
-@pytest.mark.parametrize("batch", range(3))
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in (1, 2))])
 def test_the_cost_never_rises_and_the_end_is_a_2_optimum(batch: int) -> None:
     """By what is drawn a pair may not have come to it yet; that it has not in 60 cycles is rare."""
     chance = Random(f"mgm2 {batch}")

@@ -122,7 +122,7 @@ def test_seven_has_a_solution_in_planar_and_none_in_full(runtime: Runtime) -> No
     assert solve(queens3d(7, "full"), Options(runtime=runtime)).verdict is Verdict.NO_SOLUTION
 
 
-@pytest.mark.parametrize("model", list(QueensModel))
+@pytest.mark.parametrize("model", [QueensModel.PLANAR, pytest.param(QueensModel.FULL, marks=pytest.mark.slow)])
 def test_the_flagship_121_robots_in_121_processes(model: QueensModel) -> None:
     outcome = solve(queens3d(11, model), Options(timeout=100))
     assert outcome.verdict is Verdict.SOLUTION
