@@ -11,15 +11,18 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 from robochoc.change import BadChange, changed, changed_by, concerns, described, rejoined, without
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.formats import InvalidInput, read_robot
+from robochoc.observers.events import Began, Observer
+from robochoc.observers.given import TeamWriter
 from robochoc.orders import reordered
 from robochoc.outcome import Verdict
 from robochoc.problem import AddAgent, Event, Robot, Team
+from robochoc.protocols.protocol import Protocol
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.explanation import Void, void
 from robochoc.solver.part import NO_BRIEF, Brief
@@ -33,6 +36,40 @@ class Played(NamedTuple):
     team: Team
     result: RunResult
     opened_by: str
+
+
+class Opening(NamedTuple):
+    """A run that begins, or an epoch: its number, what has opened it, and what the robots are to solve."""
+
+    epoch: Epoch
+    number: int = 0
+    by: str = ""
+
+    @classmethod
+    def of(cls, team: Team, brief: Brief) -> Self:
+        """A run of `team` as it is."""
+        return cls(Epoch(team, brief=brief))
+
+
+class Announcer:
+    """Tells `observer`, if there is one, of what begins, and what the robots are given for it."""
+
+    def __init__(self, observer: Observer | None) -> None:
+        self._observer = observer
+        self._writer = TeamWriter()
+
+    def __call__(self, protocol: type[Protocol], opening: Opening, session: Session | None = None) -> None:
+        """A run of `protocol` begins; or an epoch in `session`, which has been open before (None: it comes after)."""
+        if self._observer is None:
+            return
+        epoch, number, by = opening
+        detail: dict[str, Any] = {"epoch": number, "opened_by": by} if number else {}
+        if protocol.traits.costs:
+            detail["minimises"] = True
+        self._observer(Began(t=0, protocol=protocol.__name__, **detail))
+        fresh = epoch.team.order if session and session.anew else epoch.fresh
+        quiet = session is None or session.quiet
+        self._observer(self._writer.given(epoch.team, epoch.brief, epoch.void, fresh=fresh, quiet=quiet))
 
 
 class Journey:
@@ -73,14 +110,15 @@ class Journey:
         """The team as the robots see it: in the order of the run. Raises `CannotTurn`."""
         return self.team if self._order is None else reordered(self.team, self._order)
 
-    def go(self, session: Session, announce: Callable[[int, str], None]) -> Iterator[Played]:
+    def go(self, session: Session, announce: Callable[[Opening], None]) -> Iterator[Played]:
         """One epoch after the other; the last is the one whose verdict counts. A time limit may end it earlier.
 
-        Before each, `announce` is told its number and what has opened it.
+        Before each, `announce` is told of it.
         """
         opened = "the start"
+        epoch = Epoch(self.arranged(), brief=self._brief)
         for number in count():
-            announce(number, opened)
+            announce(Opening(epoch, number, opened))
             result = self._search(session)
             yield Played(self.team, result, opened)
             if result.lost:
@@ -95,7 +133,7 @@ class Journey:
             self._take_stock(fresh)
             if result.lost and not self.team.robots and self._next is None:
                 return
-            self._go_over(session, before, fresh)
+            epoch = self._go_over(session, before, fresh)
 
     def _search(self, session: Session) -> RunResult:
         if not self.team.robots:  # all have left, and others may come: nobody is against it
@@ -162,12 +200,14 @@ class Journey:
             stay = [name for name in self._order if name in self.team and name not in fresh]
             self._order = (*stay, *(name for name in self.team.order if name not in stay))
 
-    def _go_over(self, session: Session, before: Team, fresh: Collection[str]) -> None:
+    def _go_over(self, session: Session, before: Team, fresh: Collection[str]) -> Epoch:
         """Have `session`, which has worked on `before`, work on the team as it is now."""
         now = self.arranged()
         keys, agents = void(before, now)
         stale = Void(keys, agents | set(fresh))
-        session.change(Epoch(now, self._compile(now), stale, frozenset(fresh), self._brief))
+        epoch = Epoch(now, self._compile(now), stale, frozenset(fresh), self._brief)
+        session.change(epoch)
+        return epoch
 
     def _read_again(self, name: str) -> None:
         """Take what the file of `name` says now for what it said from the beginning."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, TypedDict, assert_never
+from typing import TypedDict, assert_never
 
 from robochoc.answers import Refuted, answered, check, placed
 from robochoc.anytime import absent
@@ -17,9 +17,9 @@ from robochoc.communication.session import Session
 from robochoc.communication.simulator import Simulation
 from robochoc.communication.timed import Timed
 from robochoc.defaults import FIRST_FIT, MINIMISES
-from robochoc.epochs import Journey, Played
+from robochoc.epochs import Announcer, Journey, Opening, Played
 from robochoc.observers.checker import has_local_solution
-from robochoc.observers.events import Began, Observer
+from robochoc.observers.events import Observer
 from robochoc.observers.objective import aside_cost
 from robochoc.opinion import contradiction, decided, total_cost
 from robochoc.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
@@ -81,6 +81,7 @@ class _Run:
         self._solver = solver
         self._options = options
         self._observer = observer
+        self._announce = Announcer(observer)
         self._progress = progress
         self._began = time.monotonic()
         self._deadline = None if options.timeout is None else self._began + options.timeout
@@ -163,7 +164,7 @@ class _Run:
         """Play all epochs; returns the robots that are lost, if nobody is left."""
         lost: Mapping[str, str] = {}
         with self._session(protocol, journey.arranged(), domains) as session:
-            for played in journey.go(session, lambda number, opened: self._announce(protocol, number, opened)):
+            for played in journey.go(session, lambda opening: self._announce(protocol, opening, session)):
                 self._epochs.append(self._epoch(played, protocol.traits))
                 lost = played.result.lost
         return lost
@@ -180,7 +181,7 @@ class _Run:
             team = journey.arranged()
             if outcome.placed_by == MINIMISES and self._options.order is None:
                 team = _favourable(team)
-            self._announce(protocol)
+            self._announce(protocol, Opening.of(team, brief))
             domains = self._domains(team)
             with self._session(protocol, team, domains, brief) as session:
                 result = session.search(self._left_s(), self._options.messages)
@@ -349,13 +350,6 @@ class _Run:
         conditions = Conditions(filters=self._options.filters, survive=survive)
         watchers: _Watchers = {"observer": self._observer, "progress": self._progress}
         return LocalNetwork(team, protocol, domains=domains, conditions=conditions, brief=brief, **watchers)
-
-    def _announce(self, protocol: type[Protocol], number: int = 0, opened: str = "") -> None:
-        if self._observer:
-            detail: dict[str, Any] = {"epoch": number, "opened_by": opened} if number else {}
-            if protocol.traits.costs:
-                detail["minimises"] = True
-            self._observer(Began(t=0, protocol=protocol.__name__, **detail))
 
     def _left_s(self) -> float | None:
         return None if self._deadline is None else max(0.0, self._deadline - time.monotonic())

@@ -8,6 +8,7 @@ from problems import team_of
 
 from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
+from robochoc.observers.events import Given
 from robochoc.observers.journal import Header, Recorder
 from robochoc.problem import Constraint, Kind, Relation, Semantics, Team
 from robochoc.registry import protocol_named, protocol_names
@@ -44,14 +45,17 @@ def fixed_teams(protocol: str) -> dict[str, Team]:
 
 
 def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
-    """The journal of the fixed run, of a few cycles; the wall-clock time, which is not fixed, is left out."""
+    """The journal of the fixed run, of a few cycles.
+
+    The wall-clock time, which is not fixed, is left out, and so are the robots' files, which are no protocol's.
+    """
     withdraw = None if team.dynamic or team.kind is Kind.DISWCSP else Withdrawal.MAXIMAL
     settings = {"cycles": "3"} if hasattr(protocol_named(protocol).settings, "cycles") else {}
     options = Options(
         protocol=protocol, runtime=Runtime.SIMULATOR, schedule=schedule, withdraw=withdraw, settings=settings
     )
     recorder = Recorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=0))
-    solve(team, options, observer=recorder)
+    solve(team, options, observer=lambda event: None if isinstance(event, Given) else recorder(event))
     return recorder.content()
 
 

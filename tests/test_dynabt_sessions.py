@@ -38,7 +38,7 @@ def played(team: Team, schedule: Schedule) -> Counter[Verdict]:
     journey = Journey(team, None, domains, lambda: None)
     seen = Counter[Verdict]()
     with Simulation(team, protocol_named("dynabt"), schedule, domains=domains(journey.team)) as session:
-        epochs = list(journey.go(session, lambda _number, _opened: None))
+        epochs = list(journey.go(session, lambda _: None))
     for now, (then, result, _) in zip(stages(team), epochs, strict=True):
         assert now.order == then.order
         if result.verdict is not Verdict.UNKNOWN:

@@ -51,6 +51,10 @@ class Scripted(Session):
         self.epochs: list[Epoch] = []
         self.limits: list[int | None] = []
 
+    @property
+    def quiet(self) -> bool:
+        return True
+
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
         assert timeout is None
         self.limits.append(messages)
@@ -76,7 +80,7 @@ def journey_of(team: Team, *, spares: int = 0, messages: int | None = None) -> J
 
 
 def travel(journey: Journey, session: Scripted) -> list[Played]:
-    return list(journey.go(session, lambda _number, _opened: None))
+    return list(journey.go(session, lambda _: None))
 
 
 def teams(played: Sequence[Played]) -> list[tuple[str, ...]]:

@@ -38,6 +38,10 @@ class Losing(Session):
         self._losses = list(losses)
         self.epochs: list[Epoch] = []
 
+    @property
+    def quiet(self) -> bool:
+        return True
+
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
         assert (timeout, messages) == (None, None)
         lost = dict.fromkeys(self._losses.pop(0).split(), "was lost") if self._losses else {}
@@ -69,7 +73,7 @@ def team(tmp_path: Path) -> Team:
 def travel(team: Team, losses: Sequence[str], spares: int = 0) -> tuple[Journey, Losing, list[Team]]:
     journey = Journey(team, None, lambda _: {}, lambda: None, spares=spares)
     session = Losing(losses)
-    return journey, session, [played.team for played in journey.go(session, lambda _number, _opened: None)]
+    return journey, session, [played.team for played in journey.go(session, lambda _: None)]
 
 
 def test_who_is_lost_leaves(team: Team) -> None:

@@ -16,6 +16,7 @@ from robochoc.cli.export import export
 from robochoc.cli.generate import generate
 from robochoc.cli.master import master
 from robochoc.cli.protocols import protocols
+from robochoc.cli.replay import replay
 from robochoc.cli.robot import robot
 from robochoc.cli.solve import solve
 from robochoc.cli.validate import validate
@@ -28,7 +29,7 @@ Exit status:
   1  the input is invalid
   2  wrong usage, or more than this version can do
   3  a limit was reached without a verdict
-  4  robots were lost, or the answer was refuted
+  4  robots were lost, the answer was refuted, or a replay is different
 """
 
 
@@ -55,6 +56,7 @@ for command in (
     animate,
     compile_team,
     export,
+    replay,
     cache,
     protocols,
     authority,

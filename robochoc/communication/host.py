@@ -114,21 +114,11 @@ class Host:
         Raises `BadMessage` when an envelope's content is no message of the protocol.
         """
         for envelope in packet:
-            self._receive(envelope)
-        return self._step(self.protocol.settle)
+            self.take_in(envelope)
+        return self.settle()
 
-    def metrics(self) -> Metrics:
-        """What this robot has sent and checked so far; `ncccs` is its own clock."""
-        return Metrics(dict(self.sent), self.bytes, self.clock, self.checks)
-
-    def _equip(self, brief: Brief) -> None:
-        """Give the protocol what it cannot have of itself: what was set, and chance."""
-        protocol = self.protocol
-        if brief.settings:
-            protocol.settings = settings_of(type(protocol), brief.settings)
-        protocol.chance = random.Random(f"{brief.seed} {self.name}").random  # noqa: S311 - a search is no secret
-
-    def _receive(self, envelope: Envelope) -> None:
+    def take_in(self, envelope: Envelope) -> None:
+        """Take in one message of a packet, of which more may follow. Raises `BadMessage`."""
         try:
             message: Message = self._decoder.decode(envelope.content)
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
@@ -141,6 +131,21 @@ class Host:
             self._observer(
                 Received(t=self._now(), sender=envelope.sender, receiver=self.name, type=kind, clock=self.clock)
             )
+
+    def settle(self) -> list[Envelope]:
+        """That was the whole packet: let the protocol settle, and return what it says."""
+        return self._step(self.protocol.settle)
+
+    def metrics(self) -> Metrics:
+        """What this robot has sent and checked so far; `ncccs` is its own clock."""
+        return Metrics(dict(self.sent), self.bytes, self.clock, self.checks)
+
+    def _equip(self, brief: Brief) -> None:
+        """Give the protocol what it cannot have of itself: what was set, and chance."""
+        protocol = self.protocol
+        if brief.settings:
+            protocol.settings = settings_of(type(protocol), brief.settings)
+        protocol.chance = random.Random(f"{brief.seed} {self.name}").random  # noqa: S311 - a search is no secret
 
     def _step(self, act: Callable[[], None]) -> list[Envelope]:
         """Let the protocol act, count its checks, and wrap what it has said."""

@@ -100,6 +100,11 @@ class ProcessesRun(Session):
         self._enough: int | None = None
         self._searching = False
 
+    @property
+    def quiet(self) -> bool:
+        """See `Session.quiet`."""
+        return self._quiet
+
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
         """See `Session.search`. Raises `RobotsLost` when a robot's process ends or fails.
 

@@ -101,6 +101,7 @@ class Concurrent(Schedule):
         """Lose all that is under way; nobody is busy."""
         for state in (self._busy_until, self._inboxes, self._last_arrival, self._agenda):
             state.clear()
+        self.now = 0
 
     def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: ARG002 - they are in the clock
         """The robot is free from `clock` on, for what has come or will come."""

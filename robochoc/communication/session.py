@@ -37,7 +37,17 @@ class Epoch(NamedTuple):
 
 
 class Session(ABC):
-    """One team and one protocol in one runtime. Whoever opens it closes it: it is a context manager."""
+    """One team and one protocol in one runtime. Whoever opens it closes it: it is a context manager.
+
+    `anew`: robots know nothing of the epoch before, whatever their protocol could have kept.
+    """
+
+    anew: bool = False
+
+    @property
+    @abstractmethod
+    def quiet(self) -> bool:
+        """Whether no message of the search before was lost: it came to rest, or there was none. Robots are told."""
 
     @abstractmethod
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:

@@ -57,6 +57,11 @@ class Simulation(Session):
             name: self._host(part) for name, part in Epoch(team, domains, brief=brief).parts(protocol).items()
         }
 
+    @property
+    def quiet(self) -> bool:
+        """See `Session.quiet`."""
+        return self._quiet
+
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
         """See `Session.search`; a limit on messages is looked at after each packet."""
         began = time.monotonic()

@@ -4,7 +4,7 @@ from robochoc.files import write_atomically
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput, encodable, on_one_line
 from robochoc.formats.folder import write_team
 from robochoc.formats.intension import PREDEFINED
-from robochoc.formats.robot import read_robot
+from robochoc.formats.robot import read_robot, robot_in
 from robochoc.formats.team import find_teams, read_team, robot_names
 from robochoc.formats.writer import robot_xml
 
@@ -17,6 +17,7 @@ __all__ = [
     "on_one_line",
     "read_robot",
     "read_team",
+    "robot_in",
     "robot_names",
     "robot_xml",
     "write_atomically",

@@ -13,7 +13,7 @@ from robochoc.formats.constraints import Context, is_name, read_private, read_sh
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput, MistakeError, Report, shortened, suggestion
 from robochoc.formats.extension import check_count, read_domain, read_relation
 from robochoc.formats.intension import PREDEFINED, read_predicate, read_topic
-from robochoc.formats.xml import attribute, line, read_xml
+from robochoc.formats.xml import attribute, line, parsed_xml, read_xml
 from robochoc.problem import (
     Child,
     Constraint,
@@ -57,11 +57,26 @@ def read_robot(path: Path | str) -> Robot:
 
 def read_robot_file(path: Path) -> RobotFile:
     """The robot in the XML file `path`, with what the team has to check. Raises `InvalidInput`."""
-    if not is_name(path.stem):
-        message = f"'{shortened(path.stem)}' cannot be a robot's name"
+    _check_name(path.stem, path)
+    return _Reader(path, read_xml(path, "instance")).whole()
+
+
+def robot_in(content: bytes, name: str) -> Robot:
+    """The robot called `name`, whose XML file has this `content`. Nobody need have written such a file.
+
+    The same limits hold as for a file. Raises `InvalidInput`, which tells of the file `NAME.xml`.
+    """
+    path = Path(f"{name}.xml")
+    _check_name(name, path)
+    return _Reader(path, parsed_xml(content, path, "instance")).whole().robot
+
+
+def _check_name(name: str, path: Path) -> None:
+    """Raise `InvalidInput` unless `name`, which the file at `path` gives its robot, can be one."""
+    if not is_name(name):
+        message = f"'{shortened(name)}' cannot be a robot's name"
         hint = "rename the file: a letter, then letters, digits, '.' and '_'"
         raise InvalidInput([Diagnostic(str(path), 0, message, hint)])
-    return _Reader(path, read_xml(path, "instance")).whole()
 
 
 class _Reader:

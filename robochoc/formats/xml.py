@@ -47,7 +47,16 @@ def read_xml(path: Path, root: str) -> etree._Element:
 
     Raises `InvalidInput` with every mistake that the failing layer shows.
     """
-    content = _content(path)
+    try:
+        content = _bytes(path)
+    except OSError as error:
+        raise _invalid(path, 0, f"cannot be read: {error.strerror}", "check the path and its permissions") from None
+    return parsed_xml(content, path, root)
+
+
+def parsed_xml(content: bytes, path: Path, root: str) -> etree._Element:
+    """Like `read_xml`, of the `content` of a file that would be `path`. Whoever wrote it may be a stranger."""
+    _check_text(content, path)
     doctype = _DOCTYPE.match(content)
     if doctype:
         raise _invalid(path, doctype[0].count(b"\n") + 1, "a DOCTYPE is not accepted", "delete it, and every entity")
@@ -107,11 +116,8 @@ def _with_few_mistakes(tree: etree._Element, content: bytes, schema: etree.XMLSc
     return tree
 
 
-def _content(path: Path) -> bytes:
-    try:
-        content = _bytes(path)
-    except OSError as error:
-        raise _invalid(path, 0, f"cannot be read: {error.strerror}", "check the path and its permissions") from None
+def _check_text(content: bytes, path: Path) -> None:
+    """Raise `InvalidInput` unless `content` is UTF-8, not empty, and within the limit."""
     if len(content) > MAX_BYTES:
         raise _invalid(path, 0, f"is larger than {MAX_BYTES // 2**20} MiB", "a robot's file is a few kB; split it")
     if not content.strip():
@@ -121,7 +127,6 @@ def _content(path: Path) -> bytes:
     except UnicodeDecodeError as error:
         number = content.count(b"\n", 0, error.start) + 1
         raise _invalid(path, number, "is not UTF-8", "save it in UTF-8, as the XML declaration says") from None
-    return content
 
 
 def _bytes(path: Path) -> bytes:

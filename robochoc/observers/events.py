@@ -36,19 +36,23 @@ class Given(Event, frozen=True):
     whose file is another than in the `Given` before (or all; empty, with the reason in `why`: it could not be
     written). Whoever is in `fresh` begins anew; `void_keys` and `void_agents` are what no longer stands
     (`solver/explanation.py`), and `quiet` says whether no message of the epoch before was lost. `seed`, `settings`
-    and `aside` are what all are told beside the problem (`solver/part.py`).
+    and `aside` are what all are told beside the problem (`solver/part.py`). What a file cannot say stands beside the
+    files, for all robots: `shown`, by name, own variables that neighbours see though the robot's file does not say so,
+    and `empty`, the variables that have no value left (`observers/given.py`).
     """
 
     order: tuple[str, ...]
     robots: dict[str, str]
     seed: int = 0
     settings: dict[str, str] = {}
-    aside: float | None = None
+    aside: float | int | None = None
     fresh: tuple[str, ...] = ()
     void_keys: tuple[str, ...] = ()
     void_agents: tuple[str, ...] = ()
     quiet: bool = True
     why: str = ""
+    shown: dict[str, tuple[str, ...]] = {}
+    empty: tuple[str, ...] = ()
 
 
 class Registered(Event, frozen=True):

@@ -52,6 +52,8 @@ class LocalNetwork(Session):
     Robots compile nothing: `domains` are their compiled domains.
     """
 
+    anew = True
+
     def __init__(
         self,
         team: Team,
@@ -109,6 +111,11 @@ class LocalNetwork(Session):
     def master(self) -> Master:
         """The master of the run."""
         return self._master
+
+    @property
+    def quiet(self) -> bool:
+        """See `Session.quiet`: every search begins anew, so that there is none before."""
+        return True
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
         """See `Session.search`. Raises `RobotsLost` and `Unsupported`."""

@@ -1,0 +1,108 @@
+"""`robochoc replay`: whether a recorded run would go the same way again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from robochoc.cli.animate import LARGEST_FILE
+from robochoc.cli.failure import INVALID, LOST, USAGE, Failure, failures_told, invalid_input_fails
+from robochoc.cli.local import limits, local_options
+from robochoc.cli.paths import InputPath
+from robochoc.cli.solve_settings import protocol_settings
+
+if TYPE_CHECKING:
+    from robochoc.observers.journal import Journal
+    from robochoc.replay import Means, Replayed
+
+NEXT_STEP = "give what 'robochoc solve --journal' wrote"
+
+
+@click.command(short_help="Play a journal again, and say where the protocol does something else.")
+@click.argument("journal", type=InputPath(), metavar="JOURNAL")
+@click.option(
+    "--team",
+    "folder",
+    type=InputPath(),
+    metavar="DIR",
+    help="The team's folder, for a journal that does not say what robots were given: one from across machines.",
+)
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="What was set of the protocol, for a journal that does not say what robots were given.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@local_options
+@invalid_input_fails
+def replay(
+    journal: Path,
+    folder: Path | None,
+    settings: tuple[str, ...],
+    local_solutions: int,
+    local_timeout: float,
+    *,
+    as_json: bool,
+    no_cache: bool,
+) -> int:
+    """Drive the same protocol objects through the packets in JOURNAL, and compare all that they say and do.
+
+    The exit status is 0 if that is the same as was recorded, and 4 if not: then the protocol is another one than it
+    was, or the journal is. The first difference is shown. A journal that ends early is played as far as it goes.
+    """
+    from robochoc.formats import read_team
+    from robochoc.replay import Means
+    from robochoc.solver.cache import SolutionCache
+
+    recorded = _journal(journal)
+    means = Means(
+        team=read_team(folder) if folder else None,
+        settings=protocol_settings(settings),
+        limits=limits(local_solutions, local_timeout),
+        cache=None if no_cache else SolutionCache(),
+    )
+    with failures_told(journal):
+        replayed = _replayed(journal, recorded, means)
+    if as_json:
+        from robochoc.cli.replay_report import result_json
+
+        click.echo(result_json(recorded, replayed))
+    else:
+        from robochoc.cli.replay_report import report
+
+        click.echo(report(recorded, replayed))
+    return 0 if replayed.identical else LOST
+
+
+def _replayed(path: Path, journal: Journal, means: Means) -> Replayed:
+    from robochoc.cli.progress import progress_line
+    from robochoc.formats import on_one_line
+    from robochoc.replay import CannotReplay
+    from robochoc.replay import replay as play
+
+    try:
+        with progress_line(on_one_line(journal.header.team)) as progress:
+            return play(journal, means, progress=progress)
+    except CannotReplay as why:
+        status = INVALID if why.broken else USAGE
+        raise Failure(status, on_one_line(f"{path}: it cannot be played again: {why}")) from why
+
+
+def _journal(path: Path) -> Journal:
+    from robochoc.observers.journal import BadJournal, is_journal, read_journal
+
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE)
+    except OSError as error:
+        raise Failure(INVALID, f"{path}: {error.strerror} ({NEXT_STEP})") from error
+    try:
+        if not is_journal(content):
+            raise Failure(INVALID, f"{path}: this is no journal ({NEXT_STEP})")
+        return read_journal(content)
+    except BadJournal as wrong:
+        raise Failure(INVALID, f"{path}: {wrong} ({NEXT_STEP})") from wrong

@@ -1,0 +1,202 @@
+"""Who plays: the robots of each run, made of what they were given then."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+from robochoc.change import BadChange, changed_by, without
+from robochoc.communication.host import BadSettings, Host
+from robochoc.communication.session import Epoch
+from robochoc.defaults import FIRST_FIT, MINIMISES
+from robochoc.observers.events import Given, Lost
+from robochoc.observers.given import BadGiven, TeamReader, brief_of, void_of
+from robochoc.observers.journal import Header
+from robochoc.observers.objective import aside_cost
+from robochoc.orders import CannotTurn, Order, order_of, reordered
+from robochoc.problem import Robot, Team
+from robochoc.protocols.protocol import DynamicProtocol, Protocol
+from robochoc.registry import UnknownProtocol, offers, spoken
+from robochoc.replay.steps import Run
+from robochoc.solver.ace import AceProcess, SolverLost, SolverMissing, SolverTimeout
+from robochoc.solver.cache import SolutionCache
+from robochoc.solver.compile import CompileFailed, Compiler, CompileTimeout, Limits
+from robochoc.solver.domain import CompiledDomain, TooManySolutions
+from robochoc.solver.encoding import Unsupported
+from robochoc.solver.part import Brief, Part
+
+_UNCOMPILED = (
+    TooManySolutions,
+    CompileTimeout,
+    CompileFailed,
+    SolverMissing,
+    SolverLost,
+    SolverTimeout,
+    Unsupported,
+    BadSettings,
+)
+"""What stands in the way of robots that have to be compiled, or set, first."""
+
+
+class CannotReplay(Exception):  # noqa: N818 - named for what was found
+    """The run cannot be played again; says why, and what would help. `broken`: it is the journal's fault."""
+
+    def __init__(self, why: str, *, broken: bool = False) -> None:
+        super().__init__(why)
+        self.broken = broken
+
+
+class Means(NamedTuple):
+    """What a replay may use.
+
+    `team` is the one in the files, for runs whose journals do not say what robots were given; `protocols` are, by
+    their classes' names, to be used rather than those that are installed. `settings` are what was set of the protocol,
+    where the journal does not say. `limits`, `cache` and `solver` are for
+    robots whose private constraints need a solver (`solver/compile.py`).
+    """
+
+    team: Team | None = None
+    protocols: Mapping[str, type[Protocol]] = MappingProxyType({})
+    settings: Mapping[str, str] = MappingProxyType({})
+    limits: Limits | None = None
+    cache: SolutionCache | None = None
+    solver: AceProcess | None = None
+
+
+class Ensemble(NamedTuple):
+    """The robots of one run, ready to begin: the protocol, their hosts, and what each of them knows.
+
+    Those in `mindful` go on with what they found out in the epoch before.
+    """
+
+    protocol: type[Protocol]
+    hosts: Mapping[str, Host]
+    parts: Mapping[str, Part]
+    quiet: bool
+    mindful: Collection[str]
+
+
+class Cast:
+    """Makes the robots of one run after the other; those that go on from one epoch to the next are the same.
+
+    `only` names those that are to play (None: all).
+    """
+
+    def __init__(self, header: Header | None, means: Means, only: Collection[str] | None = None) -> None:
+        self._header = header
+        self._means = means
+        self._only = only
+        self._reader = TeamReader(header.team if header else "")
+        self._hosts: dict[str, Host] = {}
+        self._compiled: dict[str, tuple[Robot, CompiledDomain]] = {}
+        self._lost: set[str] = set()
+
+    def enter(self, run: Run) -> Ensemble:
+        """The robots of `run`. Raises `CannotReplay`."""
+        protocol = self._protocol(run)
+        try:
+            epoch = self._epoch(run, protocol)
+            epoch = epoch._replace(domains=self._domains(epoch.team))
+            parts = epoch.parts(protocol)
+            goes_on = run.began is not None and isinstance(run.began.epoch, int)
+            before = self._hosts if goes_on else {}
+            names = [name for name in parts if self._only is None or name in self._only]
+            self._hosts = {name: _host(protocol, parts[name], before.get(name), epoch) for name in names}
+        except BadGiven as why:
+            raise CannotReplay(str(why), broken=True) from why
+        except _UNCOMPILED as why:
+            raise CannotReplay(str(why)) from why
+        self._lost.update(event.robot for event in run.events if isinstance(event, Lost))
+        kept = issubclass(protocol, DynamicProtocol)
+        mindful = [name for name in names if kept and name in before and name not in epoch.fresh]
+        return Ensemble(protocol, self._hosts, parts, run.given is None or run.given.quiet, mindful)
+
+    def _protocol(self, run: Run) -> type[Protocol]:
+        """The class that the run names; of a master's journal, the header's."""
+        asked = self._header.protocol if self._header else None
+        if run.began is None:
+            return self._named(asked or "")
+        name = run.began.protocol
+        if name in self._means.protocols:
+            return self._means.protocols[name]
+        for known in (asked, FIRST_FIT, MINIMISES):
+            try:
+                found = spoken(known) if known else None
+            except UnknownProtocol:
+                continue
+            if found is not None and found.__name__ == name:
+                return found
+        for offer in offers():
+            if offer.protocol is not None and offer.protocol.__name__ == name:
+                return offer.protocol
+        hint = "install the package that it came from (robochoc protocols shows what there is)"
+        raise CannotReplay(f"no protocol whose class is called {name!r} is installed; {hint}")
+
+    @staticmethod
+    def _named(name: str) -> type[Protocol]:
+        try:
+            return spoken(name)
+        except UnknownProtocol as unknown:
+            raise CannotReplay(str(unknown)) from unknown
+
+    def _epoch(self, run: Run, protocol: type[Protocol]) -> Epoch:
+        if run.given is not None and not (run.given.why and self._means.team):
+            return self._as_given(run.given)
+        return self._as_filed(run, protocol)
+
+    def _as_given(self, given: Given) -> Epoch:
+        return Epoch(self._reader.team(given), void=void_of(given), fresh=frozenset(given.fresh), brief=brief_of(given))
+
+    def _as_filed(self, run: Run, protocol: type[Protocol]) -> Epoch:
+        """What the files say, for a run whose journal does not; robots that were lost before are left out."""
+        if self._means.team is None:
+            raise CannotReplay(
+                "the journal does not say what the robots were given, as that of a run across machines;"
+                " name the folder with the team's files: --team DIR"
+            )
+        if run.began is not None and isinstance(run.began.epoch, int):
+            raise CannotReplay("the journal does not say what the robots were given when their problem changed")
+        try:
+            team = self._arranged(changed_by(self._means.team, events=0))
+        except (CannotTurn, BadChange, ValueError) as why:
+            raise CannotReplay(f"the team cannot be brought into the order of the run: {why}") from why
+        seed = self._header.seed if self._header else 0
+        asked = self._header.protocol if self._header else None
+        if asked is None or self._named(asked) is protocol:
+            return Epoch(team, brief=Brief(seed, self._means.settings))
+        return Epoch(team, brief=Brief(seed, aside=aside_cost(team) if protocol.traits.costs else None))
+
+    def _arranged(self, team: Team) -> Team:
+        order = self._header.order if self._header else None
+        if isinstance(order, str):
+            order = order_of(team, Order(order), self._header.seed if self._header else 0)
+        if isinstance(order, tuple):
+            team = reordered(team, order)
+        return without(team, [name for name in self._lost if name in team])
+
+    def _domains(self, team: Team) -> dict[str, CompiledDomain]:
+        """The compiled domains of those who play; what did not change is not compiled again."""
+        means = self._means
+        with Compiler(means.limits, means.cache, solver=means.solver) as compiler:
+            for robot in team.robots:
+                if self._only is not None and robot.name not in self._only:
+                    continue
+                known = self._compiled.get(robot.name)
+                if known is None or known[0] != robot:
+                    self._compiled[robot.name] = robot, compiler.compile(robot).domain
+        return {name: domain for name, (_, domain) in self._compiled.items() if name in team}
+
+
+def _host(protocol: type[Protocol], part: Part, before: Host | None, epoch: Epoch) -> Host:
+    """The robot of `part`: the one that was there before, if it goes on, or a new one. Raises `CannotReplay`."""
+    name = part.robot.name
+    try:
+        if before is None or name in epoch.fresh:
+            return Host.of(protocol, part)
+        before.change(part, epoch.void)
+    except _UNCOMPILED:
+        raise
+    except Exception as error:  # a protocol that is being written, or a journal that is not what it says
+        raise CannotReplay(f"{name} could not begin: {type(error).__name__}: {error}") from error
+    return before

@@ -1,0 +1,210 @@
+"""What a robot knows after each of its own steps, and why it has changed its mind.
+
+The robot is played again, by what its journal says that it was told; nobody else has to be, but where a journal's
+text form has lost what a message said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import msgspec
+
+from robochoc.message import Message
+from robochoc.observers.events import AnyEvent, Sent
+from robochoc.observers.journal import Header, Journal
+from robochoc.protocols.protocol import Protocol
+from robochoc.replay.cast import CannotReplay, Cast, Means
+from robochoc.replay.look import Look, carefully
+from robochoc.replay.replay import SIMULATED, Difference, Scene, Stops
+from robochoc.replay.steps import Step, runs_of, steps_of
+
+MOST_REASONS = 8
+
+
+class Choice(msgspec.Struct, frozen=True):
+    """An own value, and what rules it out (None: nothing that the robot knows)."""
+
+    value: str
+    ruled_out_by: str | None
+
+
+class State(msgspec.Struct, frozen=True, kw_only=True):
+    """What a robot knows after its step number `step`, counted from 0 over the whole journal; all of it to be shown.
+
+    `value` are its variables' values (empty: none), `view` says of others what it knows, as pairs (robot, words),
+    `domain` tells each own value with what rules it out, `nogoods` are those that are kept, `more` whatever else the
+    protocol keeps, by name, and `why` says why the value is another one than before (empty: it is not).
+    """
+
+    step: int
+    value: dict[str, int] = {}
+    view: list[tuple[str, str]] = []
+    domain: list[Choice] = []
+    nogoods: list[str] = []
+    more: dict[str, str] = {}
+    why: list[str] = []
+
+
+def states_of(
+    journal: Journal | Iterable[AnyEvent],
+    robot: str,
+    means: Means | None = None,
+    *,
+    header: Header | None = None,
+    since: int = 0,
+) -> Iterator[State]:
+    """The states of `robot` after its own steps, from step number `since` on; a step that is there in part has none.
+
+    `journal` may be events alone, sorted as in one; then `header` is its header, if there is any. Raises
+    `CannotReplay` where there is nothing to play by, and where it turns out that the protocol is not the one that was
+    recorded. Where the journal does not tell what the robot was told next, the last state says so in `more`.
+    """
+    if isinstance(journal, Journal):
+        header, events = journal.header, journal.events
+    else:
+        events = tuple(journal)
+    for alone in (True, False):
+        player = _Player(header, robot, means or Means(), alone=alone)
+        try:
+            for state in player.states(events, since):
+                yield state
+                since = state.step + 1
+        except _Unsaid:
+            continue
+        return
+
+
+class _Unsaid(Exception):  # noqa: N818 - named for what happens
+    """What the robot was told can only be made again by those who had said it."""
+
+
+class _Player:
+    """Plays the robot's steps, and looks at it after each; `alone`, or with all others."""
+
+    def __init__(self, header: Header | None, robot: str, means: Means, *, alone: bool) -> None:
+        self._cast = Cast(header, means, {robot} if alone else None)
+        self._simulated = header is None or header.runtime == SIMULATED
+        self._robot = robot
+        self._alone = alone
+        self._step = 0
+
+    def states(self, events: Sequence[AnyEvent], since: int) -> Iterator[State]:
+        gone: set[str] = set()
+        for run in runs_of(events):
+            ensemble = self._cast.enter(run)
+            if self._robot not in ensemble.hosts:
+                continue
+            scene = Scene(run, ensemble, simulated=self._simulated)
+            look = Look(ensemble.parts[self._robot])
+            gone.intersection_update(ensemble.mindful)
+            for step in steps_of(run.events):
+                if self._alone and step.robot != self._robot:
+                    continue
+                if step.robot in gone:
+                    self._step += step.robot == self._robot
+                    continue
+                try:
+                    state = self._played(scene, look, step, since)
+                except Stops as stops:
+                    if stops.unsaid and self._alone:
+                        raise _Unsaid from stops
+                    gone.add(step.robot)
+                    state = self._last(step, str(stops), since)
+                if state is not None:
+                    yield state
+
+    def _played(self, scene: Scene, look: Look, step: Step, since: int) -> State | None:
+        """What the robot knows after `step`; None where the step is another's, is not whole, or is not asked for."""
+        if step.robot != self._robot:
+            scene.play(step, 0)
+            return None
+        number, protocol = self._step, scene.ensemble.hosts[self._robot].protocol
+        self._step += 1
+        wanted = step.whole and number >= since
+        before = _Before(look, protocol) if wanted else None
+        difference = scene.play(step, number)
+        if difference is not None:
+            raise CannotReplay(f"{self._robot} does not do again what was recorded: {in_short(difference)}")
+        heard = scene.heard
+        for sent, message in heard:
+            look.hear(sent.sender, message)
+        if before is None:
+            return None
+        return State(
+            step=number,
+            value=dict(protocol.assignment),
+            view=carefully(lambda: look.view(protocol), []),
+            domain=[Choice(*pair) for pair in carefully(lambda: look.domain(protocol), [])],
+            nogoods=carefully(lambda: look.nogoods(protocol), []),
+            more=look.more(protocol),
+            why=carefully(lambda: before.reasons(protocol, heard, step), []),
+        )
+
+    def _last(self, step: Step, why: str, since: int) -> State | None:
+        """Instead of the state that nobody knows: that there is none, and why."""
+        if step.robot != self._robot:
+            return None
+        self._step += 1
+        return State(step=self._step - 1, more={"replay": f"ends here: {why}"}) if self._step > since else None
+
+
+class _Before:
+    """What a robot had in mind before a step: to tell afterwards why it has changed it."""
+
+    def __init__(self, look: Look, protocol: Protocol) -> None:
+        self._look = look
+        self._value = protocol.value
+        self._text = carefully(lambda: self._told(protocol), None)
+
+    def _told(self, protocol: Protocol) -> str | None:
+        return None if protocol.value is None else self._look.own_value(protocol, protocol.value)
+
+    def reasons(self, protocol: Protocol, heard: Sequence[tuple[Sent, Message]], step: Step) -> list[str]:
+        """Why the value is another one now, in words; empty where it is not."""
+        if protocol.value == self._value:
+            return []
+        reasons = self._against_the_old(protocol, heard)
+        if not reasons:
+            reasons = [
+                f"{sent.sender} said {sent.type} ({self._look.said(sent.sender, message)})" for sent, message in heard
+            ]
+            more = len(reasons) - MOST_REASONS
+            reasons = [*reasons[:MOST_REASONS], *([f"and {more:,} more messages"] if more > 0 else [])]
+        back = [event for event in step.done if isinstance(event, Sent) and event.type in ("Nogood", "Backtrack")]
+        reasons += [f"no value was left, and it said {sent.type} to {sent.receiver}" for sent in back[:1]]
+        return [*reasons, self._now(protocol)]
+
+    def _against_the_old(self, protocol: Protocol, heard: Sequence[tuple[Sent, Message]]) -> list[str]:
+        """What rules out the value that it had, and who has said so; nothing where that is not known."""
+        if self._value is None or self._text is None or self._value >= len(protocol.problem.values):
+            return []
+        ruling = self._look.ruling(protocol, self._value)
+        if ruling is None:
+            return []
+        text, robots = ruling
+        told = [sent for sent, message in heard if sent.sender in robots or hasattr(message, "lhs")]
+        sources = ", ".join(dict.fromkeys(f"{sent.type} from {sent.sender}" for sent in told[:MOST_REASONS]))
+        return [f"{self._text} was ruled out by: {text}{f' ({sources})' if sources else ''}"]
+
+    def _now(self, protocol: Protocol) -> str:
+        """What can be said of the new value."""
+        index = protocol.value
+        if index is None:
+            return "it has no value now"
+        text = self._look.own_value(protocol, index)
+        store = vars(protocol).get("store")
+        higher = range(index)
+        if store is not None and index and all(self._look.against(protocol, place) is not None for place in higher):
+            return f"{text} is the first value that nothing rules out"
+        return f"{text} is its first value" if self._value is None and not index else f"it takes {text}"
+
+
+def in_short(difference: Difference) -> str:
+    """`difference` in one line."""
+    if difference.raised:
+        return f"in its step {difference.step} the protocol raised {difference.raised}"
+    recorded = type(difference.recorded).__name__ if difference.recorded else "nothing more"
+    replayed = type(difference.replayed).__name__ if difference.replayed else "nothing more"
+    where = f"in its step {difference.step} of run {difference.run}"
+    return f"{where}, recorded is {recorded}, and replayed {replayed}"

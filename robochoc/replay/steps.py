@@ -1,0 +1,108 @@
+"""A journal's events as runs, and a run's as the steps of its robots.
+
+A step is what a robot does with one packet: it takes the messages in, decides, speaks, and has settled. A step that
+takes nothing in is its start. The last one may be there in part only, where a journal, or a robot, ends early.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import takewhile
+from typing import NamedTuple, assert_never
+
+from robochoc.observers.events import (
+    AnyEvent,
+    Began,
+    Concluded,
+    Decided,
+    Given,
+    Granted,
+    Heard,
+    Improved,
+    Lost,
+    Received,
+    Refused,
+    Registered,
+    Sent,
+    Settled,
+)
+
+RobotEvent = Received | Heard | Decided | Concluded | Sent | Settled
+"""What a robot tells of itself, in its own order."""
+
+
+class Run(NamedTuple):
+    """A run, or an epoch of it, counted from 0; a journal of a master's has no `Began`, and no `Given`, of it."""
+
+    number: int
+    began: Began | None
+    given: Given | None
+    events: list[AnyEvent]
+
+
+class Step(NamedTuple):
+    """One step of one robot: what it took in, what it did then, and whether all of that is there."""
+
+    robot: str
+    received: Sequence[Received]
+    done: Sequence[RobotEvent]
+    whole: bool
+
+
+def runs_of(events: Iterable[AnyEvent]) -> Iterator[Run]:
+    """The runs, one after the other; those in which no robot has been given, or has done, anything are left out."""
+    number = 0
+    run = Run(0, None, None, [])
+    for event in events:
+        if isinstance(event, Began):
+            if _is_one(run):
+                yield run
+                number += 1
+            run = Run(number, event, None, [])
+        elif isinstance(event, Given):
+            run = run._replace(given=event)
+        else:
+            run.events.append(event)
+    if _is_one(run):
+        yield run
+
+
+def _is_one(run: Run) -> bool:
+    """Whether anybody has, or could have, done anything in it."""
+    return run.given is not None or any(actor(event) is not None for event in run.events)
+
+
+def steps_of(events: Iterable[AnyEvent]) -> Iterator[Step]:
+    """The steps of one run in the order of their ends; then those that have none."""
+    open_still: dict[str, list[RobotEvent]] = {}
+    for event in events:
+        robot = actor(event)
+        if robot is None:
+            continue
+        own = open_still.setdefault(robot, [])
+        own.append(event)  # type: ignore[arg-type]  # it has an actor
+        if isinstance(event, Settled):
+            del open_still[robot]
+            yield _step(robot, own, whole=True)
+    for robot, own in open_still.items():
+        yield _step(robot, own, whole=False)
+
+
+def actor(event: AnyEvent) -> str | None:
+    """The robot whose step `event` is part of; None where it is nobody's."""
+    match event:
+        case Sent():
+            return event.sender
+        case Received():
+            return event.receiver
+        case Heard() | Decided() | Concluded() | Settled():
+            return event.robot
+        case Began() | Given() | Registered() | Improved() | Lost() | Granted() | Refused():
+            return None
+        case never:
+            assert_never(never)
+
+
+def _step(robot: str, events: Sequence[RobotEvent], *, whole: bool) -> Step:
+    received = list(takewhile(lambda one: isinstance(one, Received), events))
+    return Step(robot, received, events[len(received) :], whole)  # type: ignore[arg-type]  # see takewhile
