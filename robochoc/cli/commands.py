@@ -14,6 +14,7 @@ from robochoc.cli.compile import compile_team
 from robochoc.cli.directory import directory
 from robochoc.cli.export import export
 from robochoc.cli.generate import generate
+from robochoc.cli.journal import journal
 from robochoc.cli.master import master
 from robochoc.cli.protocols import protocols
 from robochoc.cli.replay import replay
@@ -57,6 +58,7 @@ for command in (
     compile_team,
     export,
     replay,
+    journal,
     cache,
     protocols,
     authority,

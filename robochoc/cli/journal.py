@@ -1,0 +1,163 @@
+"""`robochoc journal`: what is in a journal, and in forms that other programs read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from robochoc.cli.failure import INVALID, USAGE, Failure
+from robochoc.cli.paths import InputPath, OutputFile
+
+if TYPE_CHECKING:
+    from robochoc.observers.journal import Journal
+    from robochoc.view.sniffer.trace import Trace
+
+FORMATS = ("jsonl", "acl", "csv", "mermaid", "html")
+LARGEST_FILE = 1 << 30
+"""1 GiB: a journal of millions of messages."""
+MOST_IN_PAGE = 100_000
+"""Messages: with more, the page would be too large for browsers to open at once."""
+NEXT_STEP = "give what 'robochoc solve --journal' wrote"
+
+
+@click.group(short_help="What is in a journal, and exports of it.")
+def journal() -> None:
+    """What 'robochoc solve --journal FILE' has written: all that robots said to each other, took in and decided."""
+
+
+@journal.command(short_help="Say what is in a journal.")
+@click.argument("file", type=InputPath(), metavar="FILE")
+def show(file: Path) -> None:
+    """Say what was run, who took part, what was said how often, how it ended, and whether the journal is whole."""
+    from robochoc.cli.journal_report import report
+
+    for line in report(_trace(_journal(file), file)):
+        click.echo(line)
+
+
+@journal.command(short_help="Write conversations for other programs, or as a page.")
+@click.argument("file", type=InputPath(), metavar="FILE")
+@click.option("--format", "form", type=click.Choice(FORMATS), required=True, help="What to write; see above.")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File to write  [default: standard output]")
+@click.option("--robots", default="", metavar="PATTERNS", help="Only what these say to each other: Robot3.1,Robot2.*")
+@click.option("--types", default="", metavar="PATTERNS", help="Only messages of these types: Ok,Nogood")
+@click.option("--from", "first", type=click.IntRange(0), default=0, metavar="N", help="From message N on; 0 is first.")
+@click.option("--to", "last", type=click.IntRange(0), metavar="N", help="Up to message N.")
+@click.option("--conversation", type=click.IntRange(1), metavar="N", help="Only run (or epoch) N; 1 is the first.")
+def export(
+    file: Path,
+    form: str,
+    output: Path | None,
+    robots: str,
+    types: str,
+    first: int,
+    last: int | None,
+    conversation: int | None,
+) -> None:
+    """Write the messages in the journal FILE, all or those that are meant.
+
+    \b
+    jsonl    the journal as text, one JSON object a line; robochoc reads it as well
+    acl      messages of FIPA ACL as text (FIPA00070), one a line
+    csv      a table: one message a row, with its cause, its words and its content
+    mermaid  a sequence diagram, for Markdown pages
+    html     one page that holds everything, to be opened in a browser or mailed
+
+    In PATTERNS, * stands for anything and ? for one character. Messages have the numbers that the page shows.
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.files import write_atomically
+    from robochoc.view.sniffer.patterns import patterns_in
+    from robochoc.view.sniffer.selection import NothingMeant, Selection
+
+    meant = Selection(patterns_in(robots), patterns_in(types), first, last, conversation)
+    read = _journal(file)
+    trace = _trace(read, file)
+    try:
+        messages = meant.of(trace)
+    except NothingMeant as nothing:
+        raise click.UsageError(_one_line(str(nothing))) from nothing
+    if trace.damage:
+        click.echo(_one_line(f"{file}: it is not whole, this is what can be read: {trace.damage}"), err=True)
+    pieces = _pieces(form, read, trace, messages)
+    if output is None:
+        for piece in pieces:
+            click.echo(piece, nl=False)
+        return
+    content = b"".join(pieces)
+    write_atomically(output, content)
+    count = f"{len(messages):,} message{'s' * (len(messages) != 1)}"
+    click.echo(f"{output}: {count}, {len(content):,} bytes")
+
+
+def _pieces(form: str, read: Journal, trace: Trace, messages: range | list[int]) -> Iterable[bytes]:
+    """The export, piece by piece."""
+    from robochoc.view.sniffer.export import TooMuchToDraw, acl_texts, mermaid, table
+    from robochoc.view.sniffer.export_lines import lines, part_of
+    from robochoc.view.sniffer.feed import Feed
+
+    whole = len(messages) == len(trace.messages.t)
+    match form:
+        case "jsonl":
+            return lines(read if whole else part_of(read, trace, messages))
+        case "acl":
+            return acl_texts(Feed(trace), messages)
+        case "csv":
+            return table(Feed(trace), messages)
+        case "mermaid":
+            try:
+                return [mermaid(Feed(trace), messages)]
+            except TooMuchToDraw as much:
+                raise Failure(USAGE, f"{much} (choose some, by --robots, --types, --from and --to)") from much
+        case _:
+            return [_page(read, trace, messages)]
+
+
+def _page(read: Journal, trace: Trace, messages: range | list[int]) -> bytes:
+    if len(messages) > MOST_IN_PAGE:
+        raise Failure(
+            USAGE,
+            f"{len(messages):,} messages are too many for one page: at most {MOST_IN_PAGE:,}"
+            " (choose some, by --robots, --types, --from and --to, or look at all of them with 'robochoc sniff')",
+        )
+    from robochoc.view.sniffer.excerpt import excerpt
+    from robochoc.view.sniffer.feed import Feed
+    from robochoc.view.sniffer.packed import packed_feed
+    from robochoc.view.sniffer.page import page
+
+    whole = len(messages) == len(trace.messages.t)
+    feed = Feed(trace if whole else excerpt(trace, messages))
+    return page("embedded", packed_feed(feed, read), title=f"{read.header.protocol} on {read.header.team}")
+
+
+def _journal(file: Path) -> Journal:
+    from robochoc.observers.journal import BadJournal, read_journal
+
+    try:
+        with file.open("rb") as stream:
+            content = stream.read(LARGEST_FILE + 1)
+    except OSError as error:
+        raise Failure(INVALID, f"{file}: {error.strerror} ({NEXT_STEP})") from error
+    if len(content) > LARGEST_FILE:
+        raise Failure(USAGE, f"{file}: it has more than {LARGEST_FILE:,} bytes")
+    try:
+        return read_journal(content)
+    except BadJournal as bad:
+        raise Failure(INVALID, _one_line(f"{file}: {bad} ({NEXT_STEP})")) from bad
+
+
+def _trace(read: Journal, file: Path) -> Trace:
+    from robochoc.view.sniffer.trace import Trace, TraceTooLarge
+
+    try:
+        return Trace.of(read)
+    except TraceTooLarge as large:
+        raise Failure(USAGE, f"{file}: {large}") from large
+
+
+def _one_line(words: str) -> str:
+    from robochoc.formats import on_one_line
+
+    return on_one_line(words)

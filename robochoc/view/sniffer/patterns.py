@@ -1,0 +1,35 @@
+"""Names of robots, or patterns of them, as `robochoc sniff` and `robochoc journal` take them: `Robot3.1,Robot2.*`.
+
+`*` stands for anything, `?` for any one character, as in the properties of JADE's sniffer.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+
+def patterns_in(text: str) -> tuple[str, ...]:
+    """The names and patterns in `text`, which are separated by commas."""
+    return tuple(part for part in (part.strip() for part in text.split(",")) if part)
+
+
+def matching(names: Iterable[str], patterns: Sequence[str]) -> list[str]:
+    """Those of `names` that one of `patterns` fits, in their order."""
+    wholes = [_expression(pattern) for pattern in patterns]
+    return [name for name in names if any(whole.fullmatch(name) for whole in wholes)]
+
+
+def unmatched(names: Iterable[str], patterns: Sequence[str]) -> list[str]:
+    """Those of `patterns` that fit none of `names`."""
+    known = list(names)
+    return [pattern for pattern in patterns if not matching(known, (pattern,))]
+
+
+def _expression(pattern: str) -> re.Pattern[str]:
+    """Each part between two `*` is where it fits first, for good: so no time is lost on names that nearly fit."""
+    first, *rest = ("".join("." if sign == "?" else re.escape(sign) for sign in part) for part in pattern.split("*"))
+    if not rest:
+        return re.compile(first, re.DOTALL)
+    middle = "".join(f"(?>.*?{part})" for part in rest[:-1])
+    return re.compile(f"{first}{middle}.*{rest[-1]}", re.DOTALL)
