@@ -15,6 +15,7 @@ from pathlib import Path
 import channels
 import dynamic
 import flagship
+import journals
 import local_search
 import network
 import optimum
@@ -36,6 +37,7 @@ PARTS: dict[str, Callable[[], Section]] = {
     "transport": transport.measured,
     "flagship": flagship.measured,
     "simulator": simulated.measured,
+    "journal": journals.measured,
     "solver": solver.measured,
 }
 LONG: dict[str, Callable[[], Section]] = {

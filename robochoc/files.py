@@ -28,13 +28,72 @@ def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
     if path.exists() and not path.is_file():
         path.write_bytes(content)
         return
-    target = path.resolve()
-    complete = _written_unnamed(target, content, mode) or _written_named(target, content, mode)
+    os.close(_replaced(path.resolve(), content, mode))
+
+
+class Growing:
+    """A file that takes the place of `path` once its `beginning` is written, and then grows.
+
+    Whoever looks sees the old file, or the beginning and whatever was appended since. Otherwise as
+    `write_atomically`. Raises `OSError`. Processes forked meanwhile have the descriptor too, but nothing is buffered.
+    """
+
+    def __init__(self, path: Path, beginning: bytes, mode: int = 0o666) -> None:
+        self._size = 0
+        self._torn = False
+        stream = _stream_to(path)
+        self._own = stream is None and not (path.exists() and not path.is_file())
+        if self._own:
+            self._descriptor = _replaced(path.resolve(), beginning, mode)
+            self._size = len(beginning)
+            return
+        self._descriptor = os.open(path, os.O_WRONLY) if stream is None else os.dup(stream)
+        try:
+            self.append(beginning)
+        except BaseException:
+            self.close()
+            raise
+
+    def append(self, content: bytes) -> None:
+        """Write all of `content` behind what is there. Raises `OSError`; of a file of our own nothing is added then.
+
+        Whoever was interrupted by a signal's exception may append the same again: it is written in the same place.
+        """
+        if not self._own:
+            self._stream(content)
+            return
+        done = 0
+        try:
+            while done < len(content):
+                done += os.pwrite(self._descriptor, memoryview(content)[done:], self._size + done)
+        except OSError:
+            with suppress(OSError):
+                os.ftruncate(self._descriptor, self._size)
+            raise
+        self._size += done
+
+    def _stream(self, content: bytes) -> None:
+        if self._torn:
+            raise OSError(errno.EIO, "an interrupt came between two bytes")
+        self._torn = True  # where it stopped is not known any more
+        _write_all(self._descriptor, content)
+        self._torn = False
+
+    def close(self) -> None:
+        """Nothing more will come."""
+        os.close(self._descriptor)
+
+
+def _replaced(target: Path, content: bytes, mode: int) -> int:
+    """Put a new file with `content` where `target` is; its descriptor, open for writing."""
+    descriptor, complete = _written_unnamed(target, content, mode) or _written_named(target, content, mode)
     try:
         complete.replace(target)
     except BaseException:
         complete.unlink(missing_ok=True)
+        os.close(descriptor)
         raise
+    return descriptor
 
 
 def _stream_to(path: Path) -> int | None:
@@ -46,7 +105,7 @@ def _stream_to(path: Path) -> int | None:
     return None
 
 
-def _written_unnamed(target: Path, content: bytes, mode: int) -> Path | None:
+def _written_unnamed(target: Path, content: bytes, mode: int) -> tuple[int, Path] | None:
     """The complete file beside `target`, named at the last moment; None where the system cannot do that."""
     if not hasattr(os, "O_TMPFILE"):
         return None
@@ -56,27 +115,37 @@ def _written_unnamed(target: Path, content: bytes, mode: int) -> Path | None:
         if error.errno in _NO_UNNAMED:
             return None
         raise
-    with os.fdopen(descriptor, "wb") as file:
-        file.write(content)
-        file.flush()
+    try:
+        _write_all(descriptor, content)
         complete = _beside(target)
         try:
             # Only with a folder's descriptor does Python ask the kernel to follow the link in /proc.
             os.link(f"/proc/self/fd/{descriptor}", complete, src_dir_fd=descriptor, follow_symlinks=True)
         except OSError:
+            os.close(descriptor)
             return None
-    return complete
+    except BaseException:
+        os.close(descriptor)
+        raise
+    return descriptor, complete
 
 
-def _written_named(target: Path, content: bytes, mode: int) -> Path:
+def _written_named(target: Path, content: bytes, mode: int) -> tuple[int, Path]:
     complete = _beside(target)
+    descriptor = os.open(complete, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode)
     try:
-        with os.fdopen(os.open(complete, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode), "wb") as file:
-            file.write(content)
+        _write_all(descriptor, content)
     except BaseException:
         complete.unlink(missing_ok=True)
+        os.close(descriptor)
         raise
-    return complete
+    return descriptor, complete
+
+
+def _write_all(descriptor: int, content: bytes) -> None:
+    left = memoryview(content)
+    while left:
+        left = left[os.write(descriptor, left) :]
 
 
 def _beside(target: Path) -> Path:

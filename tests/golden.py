@@ -9,7 +9,7 @@ from problems import team_of
 from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.observers.events import Given
-from robochoc.observers.journal import Header, Recorder
+from robochoc.observers.journal import Header, Recorder, lines_of, read_journal
 from robochoc.problem import Constraint, Kind, Relation, Semantics, Team
 from robochoc.registry import protocol_named, protocol_names
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
@@ -45,7 +45,7 @@ def fixed_teams(protocol: str) -> dict[str, Team]:
 
 
 def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
-    """The journal of the fixed run, of a few cycles.
+    """The journal of the fixed run, of a few cycles, in its text form; it was written and read as a file is.
 
     The wall-clock time, which is not fixed, is left out, and so are the robots' files, which are no protocol's.
     """
@@ -56,7 +56,7 @@ def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
     )
     recorder = Recorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=0))
     solve(team, options, observer=lambda event: None if isinstance(event, Given) else recorder(event))
-    return recorder.content()
+    return b"".join(lines_of(read_journal(recorder.content())))
 
 
 def files() -> dict[str, tuple[str, str, ScheduleName]]:

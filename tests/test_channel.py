@@ -22,7 +22,7 @@ from robochoc.formats.result import read_result, result_json
 from robochoc.generators.queens3d import queens3d
 from robochoc.message import Envelope
 from robochoc.observers.events import Sent, Settled
-from robochoc.observers.journal import Header, Recorder, metrics_of, read_journal
+from robochoc.observers.journal import Header, Recorder, lines_of, metrics_of, read_journal
 from robochoc.outcome import Verdict
 from robochoc.problem import Team
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
@@ -53,10 +53,10 @@ def simulated(channel: ChannelModel, protocol: str = "abt", seed: int = 0) -> Op
     return Options(protocol=protocol, runtime=Runtime.SIMULATOR, seed=seed, channel=channel)
 
 
-def recorded(team: Team, options: Options) -> bytes:
+def recorded(team: Team, options: Options) -> list[bytes]:
     recorder = Recorder(Header(team=team.name, protocol=options.protocol, runtime="simulator", seed=options.seed))
     solve(team, options, observer=recorder)
-    return recorder.content()
+    return [*lines_of(read_journal(recorder.content()))]
 
 
 # What a message needs

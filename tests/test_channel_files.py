@@ -8,6 +8,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from entries import entries_of
 from program import robochoc
 
 from robochoc.communication.channel import CHANNELS, LARGEST_FILE, ChannelModel, read_channel
@@ -101,7 +102,7 @@ def test_the_command_line_simulates_seconds(tmp_path: Path) -> None:
     words = robochoc(*run, "wwan", "--journal", tmp_path / "journal.jsonl")
     assert words.returncode == 0
     assert words.stdout.rstrip().endswith("simulated (wwan)")
-    assert '"channel":"wwan"' in (tmp_path / "journal.jsonl").read_text().splitlines()[0]
+    assert entries_of(tmp_path / "journal.jsonl")[0]["channel"] == "wwan"
     (tmp_path / "own.toml").write_text("latency_ms = 1000")
     outcome = json.loads(robochoc(*run, tmp_path / "own.toml", "--json").stdout)
     assert outcome["channel"] == "own"

@@ -9,10 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from entries import entries_of
 from program import PROGRAM, ROOT, robochoc
 
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
+from robochoc.observers.journal import read_journal
 
 
 def test_a_journal_and_a_result_give_the_page_that_solve_gives(four: Path) -> None:
@@ -68,10 +70,14 @@ def test_what_goes_to_standard_output_does_not_replace_it(four: Path) -> None:
     with log.open("a") as out:
         words = [PROGRAM, "solve", str(four), "--json", "--runtime", "simulator", "--journal", "/dev/stdout"]
         subprocess.run(words, stdout=out, check=True)
-    lines = log.read_text().splitlines()
-    assert lines[0] == "precious"
-    assert json.loads(lines[1])["verdict"] == "no-solution"
-    assert json.loads(lines[2])["event"] == "Journal"
+    precious, _, journal = log.read_bytes().partition(b"\n")
+    assert precious == b"precious"
+    found = read_journal(journal)
+    assert found.outcome is not None
+    assert found.outcome.verdict == "no-solution"
+    assert str(found.damage).endswith("more follows the end")
+    told = journal[journal.rindex(b'{"team":') :]
+    assert json.loads(told)["verdict"] == "no-solution"
 
 
 @pytest.mark.parametrize("closed", ["0<&-", "1>&-", "2>&-", "0<&- 1>&- 2>&-"])
@@ -82,13 +88,14 @@ def test_closed_streams_do_no_harm(four: Path, closed: str, runtime: str) -> Non
     done = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=60, check=False)  # noqa: S602
     assert done.returncode == 0
     assert done.stderr == ""
-    assert "no-solution" in journal.read_text()
+    assert entries_of(journal)[-1]["outcome"]["verdict"] == "no-solution"
 
 
 def test_a_full_disk_is_said_after_the_verdict(four: Path) -> None:
     done = robochoc("solve", four, "--runtime", "simulator", "--journal", "/dev/full")
     assert done.returncode == 1
-    assert "No space left" in done.stderr
+    assert done.stderr.startswith("/dev/full: the journal could not be written to its end: No space left on device (")
+    assert len(done.stderr.splitlines()) == 1
     assert "no solution" in done.stdout
 
 

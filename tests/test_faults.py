@@ -25,8 +25,8 @@ from faulty_protocols import (
 from robochoc.communication import crew, processes
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import Lost
-from robochoc.observers.journal import read_journal
+from robochoc.observers.events import Lost, Sent
+from robochoc.observers.journal import Ended, Follower, Header, in_order, read_journal
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 
@@ -154,12 +154,12 @@ def nothing_is_left(run: Run) -> None:
 
 
 def the_journal_is_whole(content: bytes, lost: list[str], *, killed: bool) -> None:
-    """It tells who was lost; that of a killed parent is not written, that of one just begun need not be."""
-    if killed or (not lost and content == OLD):
-        assert content == OLD
+    """It tells who was lost. That of a run just begun need not be there, that of a killed one may end anywhere."""
+    if not lost and content == OLD:
         return
     journal = read_journal(content)
     assert journal.outcome is None
+    assert journal.damage is None or (killed and "it ends within a block" in journal.damage)
     assert [event.robot for event in journal.events if isinstance(event, Lost)] == lost
 
 
@@ -229,6 +229,30 @@ def test_ctrl_c_twice(pause_s: float, team: Path, tmp_path: Path) -> None:
         assert run.status() == 128 + signal.SIGINT
         nothing_is_left(run)
     the_journal_is_whole((tmp_path / "run" / "run.jsonl").read_bytes(), [], killed=False)
+
+
+@pytest.mark.parametrize("runtime", ["processes", "simulator"])
+def test_the_journal_of_a_run_that_was_killed_lacks_its_last_block(runtime: str, team: Path, tmp_path: Path) -> None:
+    """It can be read while the run goes on, and what was read then is in what is left."""
+    path = tmp_path / "run" / "run.jsonl"
+    with running(observed(team, tmp_path / "run", "--runtime", runtime), tmp_path / "run") as run:
+        wait_until(lambda: path.read_bytes() != OLD, "it never began")
+        with path.open("rb") as file:
+            follower = Follower(file)
+            followed = follower.read()
+            while sum(isinstance(line, Sent) for line in followed) < 20_000:
+                time.sleep(0.01)
+                followed += follower.read()
+            run.strike(signal.SIGKILL)
+            assert run.end() < GONE_WITHIN_S
+            everything = followed + follower.read()
+            _, damage = follower.finish()
+    journal = read_journal(path.read_bytes())
+    assert journal.damage == damage
+    assert damage is None or "it ends within a block" in damage
+    events = [line for line in everything if not isinstance(line, Header | Ended)]
+    assert journal.events == tuple(in_order(events))
+    assert journal.outcome is None
 
 
 def test_many_robots_killed_at_once(team: Path, tmp_path: Path) -> None:

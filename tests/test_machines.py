@@ -8,6 +8,7 @@ import signal
 from pathlib import Path
 
 import pytest
+from entries import entries_of
 from machines import PAIR, TRIANGLE, Program, Site, ended, one_line, written
 from program import ROOT
 
@@ -69,7 +70,7 @@ def test_a_journal_by_the_robots_own_words(site: Site) -> None:
     for name, robot in robots.items():
         assert robot.object == {"robot": name, "outcome": "solution", "assignment": robot.object["assignment"]}
     assert {k: v for robot in robots.values() for k, v in robot.object["assignment"].items()} == told["assignment"]
-    kinds = {json.loads(line).get("event") for line in journal.read_text().splitlines()}
+    kinds = {entry["event"] for entry in entries_of(journal)}
     assert {"Registered", "Sent", "Received", "Decided"} <= kinds, kinds
     show = site.start("elsewhere", "animate", journal, "--team", SCOUTS, "-o", page)
     assert show.status() == 0, show.errors
@@ -88,7 +89,7 @@ def test_what_robots_keep_to_themselves(site: Site) -> None:
     assert (told["verdict"], told["assignment"], told["verified"]) == ("solution", {}, False)
     said = {name: robot.output.rpartition(" = ")[2].strip() for name, robot in robots.items()}
     assert set(said.values()) == {"1", "2"}, said
-    written_down = {json.loads(line)["event"] for line in journal.read_text().splitlines()}
+    written_down = {entry["event"] for entry in entries_of(journal)}
     assert written_down == {"Journal", "Granted", "Registered", "Ended"}
 
 

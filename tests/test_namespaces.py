@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from entries import entries_of
 from machines import Program, Site, ended
 from namespaces import DELAY_S, TUN, Link, bad_line, inside, namespaces, route, veth, why_not
 from problems import PREDICATES, team_of
@@ -119,7 +119,7 @@ def nothing_was_lost(master: Program, journal: Path) -> float:
     messages = expected()
     assert (told["verdict"], told["withdrawn"]) == ("no-solution", [])
     assert told["metrics"]["messages_by_type"] == messages
-    events = [json.loads(line).get("event") for line in journal.read_text().splitlines()]
+    events = [entry["event"] for entry in entries_of(journal)]
     assert events.count("Sent") == events.count("Received") == sum(messages.values())
     assert "is lost" not in master.errors
     assert "refused" not in master.errors

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+from entries import entries_of
 from program import robochoc
 from test_orders import graph_team, pkc_team
 
@@ -28,7 +29,7 @@ def test_solve_in_an_order_by_name(four: Path, runtime: str) -> None:
     assert (done.returncode, json.loads(done.stdout)["verdict"]) == (0, "no-solution")
     assert read_journal(journal.read_bytes()).header.order == "random"
     assert robochoc(*words).returncode == 0
-    assert "order" not in json.loads(journal.read_text().splitlines()[0])
+    assert "order" not in entries_of(journal)[0]
 
 
 def test_solve_in_the_order_of_a_file(four: Path) -> None:
@@ -39,7 +40,7 @@ def test_solve_in_the_order_of_a_file(four: Path) -> None:
     done = robochoc(*words)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["verdict"] == "no-solution"
-    lines = [json.loads(line) for line in journal.read_text().splitlines()]
+    lines = entries_of(journal)
     assert lines[0]["order"] == names
     assert lines[-1]["outcome"]["witness"] == "Robot4.4"
 

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+from entries import entries_of
 from program import ROOT, robochoc
 
 from robochoc.change import changed_by
@@ -93,7 +94,7 @@ def test_the_scene_shows_the_robots_of_the_last_epoch(tmp_path: Path) -> None:
         page = tmp_path / f"{saved.name}.html"
         assert robochoc("animate", saved, "--team", RESCUE, "-o", page).returncode == 0
         assert page.read_bytes() == html.read_bytes()
-    began = [event for event in map(json.loads, journal.read_text().splitlines()) if event["event"] == "Began"]
+    began = [event for event in entries_of(journal) if event["event"] == "Began"]
     assert [event.get("epoch", 0) for event in began] == [0, 1, 2, 3, 4]
 
 

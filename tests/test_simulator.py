@@ -13,7 +13,7 @@ from problems import team_of, teams
 from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.generators.queens3d import queens3d
 from robochoc.message import Envelope
-from robochoc.observers.journal import Header, Recorder, metrics_of, read_journal
+from robochoc.observers.journal import Header, Recorder, lines_of, metrics_of, read_journal
 from robochoc.outcome import Verdict
 from robochoc.problem import Constraint, Relation, Semantics, Team
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
@@ -55,10 +55,10 @@ def test_metrics_from_the_journal_are_the_hosts(team: Team, seed: int) -> None:
     assert replace(read, wall_s=spent.wall_s) == spent
 
 
-def recorded(team: Team, options: Options) -> bytes:
+def recorded(team: Team, options: Options) -> list[bytes]:
     recorder = Recorder(Header(team=team.name, protocol="abt", runtime="simulator", seed=options.seed))
     solve(team, options, observer=recorder)
-    return recorder.content()
+    return [*lines_of(read_journal(recorder.content()))]
 
 
 def test_other_seeds_are_other_runs() -> None:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from robochoc.outcome import Outcome
 
 LARGEST_FILE = 1 << 30
-"""1 GiB: a journal of millions of messages."""
+"""1 GiB: more than `read_journal` keeps of any journal of a run."""
 NEXT_STEP = "give what 'robochoc solve --json' or '--journal' wrote"
 
 
@@ -73,15 +73,18 @@ def _outcome(saved: Path) -> Outcome:
 
     try:
         with saved.open("rb") as file:
-            content = file.read(LARGEST_FILE)
+            content = file.read(LARGEST_FILE + 1)
     except OSError as error:
         raise Failure(INVALID, f"{saved}: {error.strerror} ({NEXT_STEP})") from error
+    if len(content) > LARGEST_FILE:
+        raise Failure(INVALID, f"{saved}: it has more than {LARGEST_FILE:,} bytes ({NEXT_STEP})")
     try:
         if not is_journal(content):
             return read_result(content)
-        outcome = read_journal(content).outcome
+        journal = read_journal(content)
     except (BadJournal, BadResult) as wrong:
         raise Failure(INVALID, f"{saved}: {wrong} ({NEXT_STEP})") from wrong
-    if outcome is None:
-        raise Failure(INVALID, f"{saved}: the run broke off before an outcome, so there is nothing to show")
-    return outcome
+    if journal.outcome is None:
+        why = journal.damage or "the run broke off"
+        raise Failure(INVALID, f"{saved}: {why}, so there is no outcome to show ({NEXT_STEP})")
+    return journal.outcome

@@ -94,14 +94,15 @@ def export(
 
 def _pieces(form: str, read: Journal, trace: Trace, messages: range | list[int]) -> Iterable[bytes]:
     """The export, piece by piece."""
+    from robochoc.observers.journal import lines_of
     from robochoc.view.sniffer.export import TooMuchToDraw, acl_texts, mermaid, table
-    from robochoc.view.sniffer.export_lines import lines, part_of
     from robochoc.view.sniffer.feed import Feed
+    from robochoc.view.sniffer.part import part_of
 
     whole = len(messages) == len(trace.messages.t)
     match form:
         case "jsonl":
-            return lines(read if whole else part_of(read, trace, messages))
+            return lines_of(read if whole else part_of(read, trace, messages))
         case "acl":
             return acl_texts(Feed(trace), messages)
         case "csv":

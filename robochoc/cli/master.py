@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,21 +11,14 @@ from robochoc.cli.failure import LIMIT
 from robochoc.cli.network import PlaceType, network_failures_told
 from robochoc.cli.paths import InputPath, OutputFile
 from robochoc.cli.progress import progress_line
+from robochoc.cli.recording import recording, shown_and_flushed
 from robochoc.cli.solve_settings import WITHDRAWALS, SolveCommand, protocol_settings
 
 if TYPE_CHECKING:
     from robochoc.machines.lead import Led, Plan
     from robochoc.machines.place import Place
     from robochoc.observers.events import AnyEvent
-    from robochoc.observers.journal import Recorder
-
-
-@dataclass(frozen=True)
-class _Telling:
-    """What becomes of a run's events and its outcome."""
-
-    as_json: bool
-    journal: Path | None
+    from robochoc.observers.journal import Header, Recorder
 
 
 @click.command(cls=SolveCommand, short_help="Lead a team whose robots are on machines of their own.")
@@ -100,7 +90,12 @@ class _Telling:
     help="The Authority's folder  [default: robochoc/authority in your data folder]",
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
-@click.option("--journal", type=OutputFile(), metavar="FILE", help="Write down every event, as JSON lines.")
+@click.option(
+    "--journal",
+    type=OutputFile(),
+    metavar="FILE",
+    help="Write down every event while the run goes on, in a compact file (docs/journal.md).",
+)
 @click.pass_context
 def master(
     context: click.Context,
@@ -127,15 +122,9 @@ def master(
             raise click.UsageError(f"--{option.removesuffix('_s')} takes a number of seconds, more than 0")
     with network_failures_told("master"):
         plan = _plan(authority, team, given)
-        led = _led(plan, _Telling(as_json, journal))
-    if as_json:
-        from robochoc.formats.result import result_json
-
-        click.echo(result_json(led.outcome))
-    else:
-        from robochoc.cli.report import report
-
-        click.echo(report(led.team, led.outcome))
+        with recording(journal, lambda: _header(plan)) as recorder:
+            led = _led(plan, recorder)
+            _tell(led, as_json=as_json)
     context.exit(LIMIT if led.outcome.verdict == "unknown" else 0)
 
 
@@ -170,11 +159,12 @@ def _plan(authority: Path | None, team: Path | None, given: dict[str, Any]) -> P
     )
 
 
-def _led(plan: Plan, telling: _Telling) -> Led:
+def _led(plan: Plan, recorder: Recorder | None) -> Led:
     """The run, with whatever watches it."""
     from robochoc.machines.lead import lead
 
-    with progress_line(plan.name) as progress, _recorder(plan, telling.journal) as recorder:
+    with progress_line(plan.name) as show:
+        progress = shown_and_flushed(recorder, show)
 
         def observe(event: AnyEvent) -> None:
             _tell_event(event)
@@ -187,24 +177,27 @@ def _led(plan: Plan, telling: _Telling) -> Led:
         led = lead(plan, observer=observe, watched=recorder is not None, progress=progress, listening=listening)
         if recorder:
             recorder.outcome = led.outcome
+            recorder.close()  # before anything else goes to where it may be written
         return led
 
 
-@contextmanager
-def _recorder(plan: Plan, path: Path | None) -> Iterator[Recorder | None]:
-    """A recorder, if there is a journal to write; it is written at the end, also of a run that breaks off."""
-    if path is None:
-        yield None
-        return
-    from robochoc.defaults import SATISFIES
-    from robochoc.formats import write_atomically
-    from robochoc.observers.journal import Header, Recorder
+def _tell(led: Led, *, as_json: bool) -> None:
+    if as_json:
+        from robochoc.formats.result import result_json
 
-    recorder = Recorder(Header(team=plan.name, protocol=plan.protocol or SATISFIES, runtime="network", seed=plan.seed))
-    try:
-        yield recorder
-    finally:
-        write_atomically(path, recorder.content())
+        click.echo(result_json(led.outcome))
+    else:
+        from robochoc.cli.report import report
+
+        click.echo(report(led.team, led.outcome))
+
+
+def _header(plan: Plan) -> Header:
+    """What the journal says of the run."""
+    from robochoc.defaults import SATISFIES
+    from robochoc.observers.journal import Header
+
+    return Header(team=plan.name, protocol=plan.protocol or SATISFIES, runtime="network", seed=plan.seed)
 
 
 def _tell_event(event: AnyEvent) -> None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +14,7 @@ from robochoc.cli.failure import INVALID, LIMIT, Failure, failures_told, worst
 from robochoc.cli.local import limits, local_options
 from robochoc.cli.order import GIVEN, OrderName, order_for
 from robochoc.cli.paths import InputPath, OutputFile
+from robochoc.cli.recording import recording, shown_and_flushed
 from robochoc.cli.solve_settings import (
     WITHDRAWALS,
     Products,
@@ -26,7 +26,7 @@ from robochoc.cli.solve_settings import (
 from robochoc.defaults import MINIMISES, SATISFIES, suits
 
 if TYPE_CHECKING:
-    from robochoc.observers.journal import Recorder
+    from robochoc.observers.journal import Header, Recorder
     from robochoc.observers.objective import Objective
     from robochoc.outcome import Outcome
     from robochoc.problem import Team
@@ -168,7 +168,7 @@ if TYPE_CHECKING:
     "--journal",
     type=OutputFile(),
     metavar="FILE",
-    help="Write down every message and decision, as JSON lines.",
+    help="Write down every message and decision while the run goes on, in a compact file (docs/journal.md).",
 )
 @click.option("--serve", is_flag=True, help="Show the 3D scene live on this machine until Ctrl-C.")
 @click.pass_context
@@ -248,7 +248,7 @@ def _solve_one(folder: Path, options: Options, products: Products, wanted: Wante
             team = read_team(folder)
             protocol = wanted.protocol or suits(team.kind)
             options = replace(options, protocol=protocol, order=order_for(team, wanted.order))
-            with _journal(team, options, products.journal) as recorder:
+            with recording(products.journal, lambda: _header(team, options), _objective(team, options)) as recorder:
                 outcome = _run(team, options, recorder)
                 _tell(team, outcome, wanted)
     except Failure as failure:
@@ -268,38 +268,27 @@ def _run(team: Team, options: Options, recorder: Recorder | None) -> Outcome:
     from robochoc.run import solve as run
 
     with progress_line(team.name) as progress:
-        outcome = run(team, options, observer=recorder, progress=progress)
+        outcome = run(team, options, observer=recorder, progress=shown_and_flushed(recorder, progress))
     if recorder:
         recorder.outcome = outcome
+        recorder.close()  # before anything else goes to where it may be written
     return outcome
 
 
-@contextmanager
-def _journal(team: Team, options: Options, path: Path | None) -> Iterator[Recorder | None]:
-    """A recorder, if there is a journal to write; it is written at the end, also of a run that breaks off."""
-    if path is None:
-        yield None
-        return
+def _header(team: Team, options: Options) -> Header:
+    """What the journal says of the run."""
     from msgspec import UNSET
 
-    from robochoc.formats import write_atomically
-    from robochoc.observers.journal import Header, Recorder
+    from robochoc.observers.journal import Header
 
-    recorder = Recorder(
-        Header(
-            team=team.name,
-            protocol=options.protocol,
-            runtime=options.runtime,
-            seed=options.seed,
-            order=options.order or UNSET,
-            channel=options.channel.name if options.channel else UNSET,
-        ),
-        _objective(team, options),
+    return Header(
+        team=team.name,
+        protocol=options.protocol,
+        runtime=options.runtime,
+        seed=options.seed,
+        order=options.order or UNSET,
+        channel=options.channel.name if options.channel else UNSET,
     )
-    try:
-        yield recorder
-    finally:
-        write_atomically(path, recorder.content())
 
 
 def _objective(team: Team, options: Options) -> Callable[[], Objective] | None:

@@ -85,7 +85,7 @@ class Trace:
         """The trace of a whole journal. Raises `TraceTooLarge`."""
         trace = cls(journal.header, generation)
         trace.add(journal.events)
-        trace.end(journal.outcome, getattr(journal, "damage", None))
+        trace.end(journal.outcome, journal.damage)
         return trace
 
     def add(self, events: Iterable[AnyEvent]) -> None:

@@ -6,10 +6,8 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-import msgspec
-
 from robochoc.observers.events import AnyEvent, Began, Received, Sent
-from robochoc.observers.journal import Ended, Journal
+from robochoc.observers.journal import Journal
 from robochoc.view.sniffer.trace import Trace
 
 
@@ -54,13 +52,3 @@ def _meant(events: Sequence[AnyEvent], trace: Trace, messages: set[int]) -> Iter
                     yield event
             case _:
                 yield event
-
-
-def lines(journal: Journal) -> Iterator[bytes]:
-    """The journal as JSON, an object a line."""
-    encode = msgspec.json.Encoder().encode
-    yield encode(journal.header) + b"\n"
-    for event in journal.events:
-        yield encode(event) + b"\n"
-    if journal.outcome:
-        yield encode(Ended(outcome=journal.outcome)) + b"\n"
