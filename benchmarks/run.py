@@ -21,6 +21,7 @@ import network
 import optimum
 import peers
 import simulated
+import sniffer
 import solver
 import start
 import sweep
@@ -48,6 +49,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "local_search": local_search.measured,
     "channels": channels.measured,
     "network": network.measured,
+    "sniffer": sniffer.measured,
 }
 """Parts that take longer than all others together: only when they are named."""
 ALL = {**PARTS, **LONG}

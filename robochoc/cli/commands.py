@@ -19,6 +19,7 @@ from robochoc.cli.master import master
 from robochoc.cli.protocols import protocols
 from robochoc.cli.replay import replay
 from robochoc.cli.robot import robot
+from robochoc.cli.sniff import sniff
 from robochoc.cli.solve import solve
 from robochoc.cli.validate import validate
 
@@ -55,6 +56,7 @@ for command in (
     validate,
     generate,
     animate,
+    sniff,
     compile_team,
     export,
     replay,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -125,12 +126,14 @@ def _page(read: Journal, trace: Trace, messages: range | list[int]) -> bytes:
         )
     from robochoc.view.sniffer.excerpt import excerpt
     from robochoc.view.sniffer.feed import Feed
+    from robochoc.view.sniffer.moves import whole_scene
     from robochoc.view.sniffer.packed import packed_feed
     from robochoc.view.sniffer.page import page
 
     whole = len(messages) == len(trace.messages.t)
     feed = Feed(trace if whole else excerpt(trace, messages))
-    return page("embedded", packed_feed(feed, read), title=f"{read.header.protocol} on {read.header.team}")
+    answers = {**packed_feed(feed, read), "scene": zlib.compress(whole_scene(feed.trace))}
+    return page("embedded", answers, title=f"{read.header.protocol} on {read.header.team}")
 
 
 def _journal(file: Path) -> Journal:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ from robochoc.cli.solve_settings import (
     check_settings,
     protocol_settings,
 )
+from robochoc.cli.watching import Watch, watching
 from robochoc.defaults import MINIMISES, SATISFIES, suits
 
 if TYPE_CHECKING:
@@ -171,6 +173,15 @@ if TYPE_CHECKING:
     help="Write down every message and decision while the run goes on, in a compact file (docs/journal.md).",
 )
 @click.option("--serve", is_flag=True, help="Show the 3D scene live on this machine until Ctrl-C.")
+@click.option(
+    "--sniff",
+    metavar="[=PATTERNS]",
+    help=(
+        "Show who says what, as it is said, on a page of this machine until Ctrl-C; of these robots at first, such as"
+        " Robot3.1,Robot2.* (see robochoc sniff)."
+    ),
+)
+@click.option("--open", "open_browser", is_flag=True, help="With --sniff: show the page in a browser, then begin.")
 @click.pass_context
 def solve(
     context: click.Context,
@@ -197,6 +208,7 @@ def solve(
     protocol = settings.pop("protocol")
     on_loss = settings.pop("on_loss") or ("withdraw" if settings["spares"] else "fail")
     order = settings.pop("order")
+    watched = watching(settings.pop("sniff"), open_browser=settings.pop("open_browser"))
     with failures_told("--channel"):
         channel = channel_for(settings.pop("channel"))
     options = Options(
@@ -211,13 +223,15 @@ def solve(
         **settings,
     )
     folders, statuses = _teams(paths)
-    products = Products(html, journal, serve)
+    products = Products(html, journal, serve, watched)
     if html and html == journal:
         raise click.UsageError(f"--html and --journal are two files; both are {html}")
     if settings["count"] and products:
-        raise click.UsageError("--count gives a number: there is nothing for --html, --journal or --serve to show")
+        raise click.UsageError("--count gives a number: there is nothing for --html, --journal, --serve or --sniff")
+    if serve and products.watching:
+        raise click.UsageError("--serve and --sniff both stay until Ctrl-C; the page of --sniff shows the scene, too")
     if products and len(folders) > 1:
-        raise click.UsageError(f"--html, --journal and --serve are for one team; {len(folders)} were found")
+        raise click.UsageError(f"--html, --journal, --serve and --sniff are for one team; {len(folders)} were found")
     wanted = Wanted(protocol, order, as_json=as_json, explain=explain)
     for folder in folders:
         statuses.append(_solve_one(folder, options, products, wanted))
@@ -240,7 +254,15 @@ def _teams(paths: tuple[Path, ...]) -> tuple[list[Path], list[int]]:
 
 
 def _solve_one(folder: Path, options: Options, products: Products, wanted: Wanted) -> int:
-    """Solve the team in `folder`, tell the outcome, and return the exit status."""
+    """Solve the team in `folder`, tell the outcome, and return the exit status, once nobody watches any more."""
+    with Watch(products.watching) as watch:
+        status = _solved(folder, options, products, wanted, watch)
+        watch.stay()
+    return status
+
+
+def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, watch: Watch) -> int:
+    """The exit status of a run that somebody may watch."""
     from robochoc.formats import on_one_line, read_team
 
     try:
@@ -248,7 +270,8 @@ def _solve_one(folder: Path, options: Options, products: Products, wanted: Wante
             team = read_team(folder)
             protocol = wanted.protocol or suits(team.kind)
             options = replace(options, protocol=protocol, order=order_for(team, wanted.order))
-            with recording(products.journal, lambda: _header(team, options), _objective(team, options)) as recorder:
+            header = partial(_header, team, options)
+            with recording(products.journal, header, _objective(team, options), watch.begun()) as recorder:
                 outcome = _run(team, options, recorder)
                 _tell(team, outcome, wanted)
     except Failure as failure:

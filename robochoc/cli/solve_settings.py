@@ -10,12 +10,13 @@ from typing import Any
 import click
 
 from robochoc.cli.order import GIVEN
+from robochoc.cli.watching import Watching
 
 WITHDRAWALS = ("fewest", "maximal")
 
 
 class SolveCommand(click.Command):
-    """Lets `--withdraw` and `--spare` stand alone: the word after them is their value only when it can be one."""
+    """Lets `--withdraw`, `--spare` and `--sniff` stand alone: a word after one is its value only when it can be."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Give a bare option its value."""
@@ -24,9 +25,16 @@ class SolveCommand(click.Command):
             following = args[place + 1] if place + 1 < len(args) else ""
             if word == "--withdraw" and following not in WITHDRAWALS:
                 args = [*args[:place], f"--withdraw={WITHDRAWALS[0]}", *args[place + 1 :]]
+            elif word == "--sniff" and not _names_robots(following):
+                args = [*args[:place], "--sniff=", *args[place + 1 :]]
             elif word == "--spare" and not following.isdecimal():
                 args = [*args[:place], "--spare=1", *args[place + 1 :]]
         return super().parse_args(ctx, args)
+
+
+def _names_robots(word: str) -> bool:
+    """Whether `word` can be patterns of robots' names, and not the next option, or the path of a team."""
+    return bool(word) and not word.startswith("-") and "/" not in word and not Path(word).exists()
 
 
 @dataclass(frozen=True)
@@ -36,9 +44,10 @@ class Products:
     html: Path | None
     journal: Path | None
     serve: bool
+    watching: Watching | None = None
 
     def __bool__(self) -> bool:
-        return bool(self.html or self.journal or self.serve)
+        return bool(self.html or self.journal or self.serve or self.watching)
 
 
 @dataclass(frozen=True)

@@ -39,10 +39,10 @@ def crew_of(outcome: Outcome, team: Team | None = None) -> tuple[Craft, ...]:
     withdrawn = frozenset(outcome.withdrawn)
     values: Assignment = {} if outcome.verdict is Verdict.NO_SOLUTION else outcome.assignment
     if team is None:
-        crew = [_craft(name, [name], None, values) for name in values]
+        crew = [lone_craft(name, values) for name in values]
         crew += [Craft(name, numbers(name), withdrew=True) for name in withdrawn]
     else:
-        crew = [craft for robot in team.robots for craft in _crafts(robot, values, withdrew=robot.name in withdrawn)]
+        crew = [craft for robot in team.robots for craft in crafts_of(robot, values, withdrew=robot.name in withdrawn)]
     return tuple(sorted(crew, key=lambda craft: (natural(craft.name), craft.name)))
 
 
@@ -52,7 +52,12 @@ def numbers(name: str) -> Cell | None:
     return (int(found[1]), int(found[2])) if found else None
 
 
-def _crafts(robot: Robot, values: Assignment, *, withdrew: bool) -> list[Craft]:
+def lone_craft(variable: str, values: Assignment) -> Craft:
+    """The craft of `variable`, of whose robot nothing else is known."""
+    return _craft(variable, [variable], None, values)
+
+
+def crafts_of(robot: Robot, values: Assignment, *, withdrew: bool = False) -> list[Craft]:
     """One craft per topic that has coordinates, or per variable that names a cell, or one for the robot."""
     own = [variable.name for variable in robot.variables]
     topics = [topic for topic in robot.topics if topic.x is not None and topic.y is not None]

@@ -97,10 +97,13 @@ class Layout:
     axes: tuple[Axis, Axis, Axis]
 
 
-def lay_out(crew: Sequence[Craft]) -> Layout:
-    """A place of its own for each of `crew`, in the air and on the ground."""
+def lay_out(crew: Sequence[Craft], others: Sequence[Craft] = ()) -> Layout:
+    """A place of its own for each of `crew`, in the air and on the ground.
+
+    The axes also reach to the cells and levels of `others`: where some of the crew may be at another time.
+    """
     cells = _cells(crew)
-    axes = _axes(crew, cells)
+    axes = _axes(crew, others, [*cells, *(other.cell for other in others if other.cell)])
     rows, columns, levels = axes
     ground = levels.ground
     beside = _lines(rows.low, rows.cells, columns.high + _GAP, 1)
@@ -137,13 +140,13 @@ def _cells(crew: Sequence[Craft]) -> list[Cell]:
     return [craft.cell or next(grid) for craft in crew]
 
 
-def _axes(crew: Sequence[Craft], cells: Sequence[Cell]) -> tuple[Axis, Axis, Axis]:
+def _axes(crew: Sequence[Craft], others: Sequence[Craft], cells: Sequence[Cell]) -> tuple[Axis, Axis, Axis]:
     most = max(_LEVELS[-1], 3 * math.ceil(math.sqrt(len(crew))))
     names = _axis_names(crew)
     rows = Axis.over(names[0], (x for x, _ in cells), most=most, scaled=most)
     columns = Axis.over(names[1], (y for _, y in cells), most=most, scaled=most)
     side = max(rows.cells, columns.cells)
-    values = [craft.level for craft in crew if craft.level is not None]
+    values = [craft.level for craft in (*crew, *others) if craft.level is not None]
     if all(1 <= value <= side for value in values):
         return rows, columns, Axis(names[2], 1, side, 1, side)
     scaled = min(max(side, _LEVELS[0]), _LEVELS[-1])

@@ -1,29 +1,23 @@
 """The scene in meshcat's live viewer: the page from a server of our own, the commands over its WebSocket.
 
 meshcat's server listens on every interface, with a zmq socket beside it, and outlives its parent. This one is the
-calling thread itself, on the loopback interface only. Other sites in the same browser get nothing from it: a Host
-that is not this machine's (DNS rebinding) is not found, and tornado refuses a WebSocket of another Origin.
+calling thread itself, on the loopback interface only (`loopback.py`).
 """
 
 from __future__ import annotations
 
 import asyncio
-import webbrowser
 from collections.abc import Callable
 from contextlib import suppress
-from socket import create_server
 
-from tornado.httpserver import HTTPServer
-from tornado.web import Application, RequestHandler
+from tornado.web import Application
 from tornado.websocket import WebSocketHandler
 
+from robochoc.view.address import listening, url_of
+from robochoc.view.loopback import FixedPage, application, open_in_browser, served
 from robochoc.view.page import live_page
 from robochoc.view.scene import Scene
 from robochoc.view.stage import commands
-
-_LOOPBACK = "127.0.0.1"
-_LONGEST_MESSAGE_BYTES = 1024
-"""Of a browser, which has nothing to say."""
 
 
 def serve(
@@ -38,44 +32,23 @@ def serve(
 
 
 async def _serve(scene: Scene, port: int, ready: Callable[[str], None] | None, *, open_browser: bool) -> None:
-    with create_server((_LOOPBACK, port)) as listening:
-        listening.setblocking(False)
-        port = listening.getsockname()[1]
-        url = f"http://{_LOOPBACK}:{port}/"
-        server = HTTPServer(_application(scene, port))
-        server.add_socket(listening)
-        try:
+    with listening(port) as here:
+        url = url_of(here)
+        async with served(_application(scene, here.getsockname()[1]), here):
             if ready:
                 ready(url)
             if open_browser:
-                # In a thread, because a browser for the terminal would not return before it is closed.
-                await asyncio.to_thread(webbrowser.open, url)
+                await open_in_browser(url)
             await asyncio.Event().wait()
-        finally:
-            server.stop()
-            await server.close_all_connections()
 
 
 def _application(scene: Scene, port: int) -> Application:
-    application = Application(websocket_max_message_size=_LONGEST_MESSAGE_BYTES, log_function=lambda _: None)
-    application.add_handlers(
-        r"(127\.0\.0\.1|localhost)$",
+    return application(
         [
-            (r"/", _Page, {"page": live_page(scene, port)}),
+            (r"/", FixedPage, {"page": live_page(scene, port)}),
             (r"/commands", _Commands, {"commands": commands(scene)}),
-        ],
+        ]
     )
-    return application
-
-
-class _Page(RequestHandler):
-    def initialize(self, page: bytes) -> None:
-        self.page = page
-
-    def get(self) -> None:
-        self.set_header("Content-Type", "text/html; charset=utf-8")
-        self.set_header("Cache-Control", "no-store")
-        self.write(self.page)
 
 
 class _Commands(WebSocketHandler):

@@ -7,14 +7,14 @@ Content-Security-Policy lets no other script run than the two it was made with, 
 from __future__ import annotations
 
 import base64
-import hashlib
 from html import escape
 from importlib.resources import files
 from string import Template
 
 from robochoc.view.label import printable
-from robochoc.view.recorder import viewer_script
+from robochoc.view.policy import policy
 from robochoc.view.scene import Scene
+from robochoc.view.script import viewer_script
 from robochoc.view.stage import commands
 
 
@@ -31,14 +31,10 @@ def live_page(scene: Scene, port: int) -> bytes:
 def _filled(scene: Scene, embedded: str, connections: str) -> bytes:
     here = files(__package__)
     viewer, player = viewer_script(), (here / "page.js").read_text(encoding="utf-8")
-    policy = (
-        f"default-src 'none'; script-src {_hashed(viewer)} {_hashed(player)}; style-src 'unsafe-inline';"
-        f" img-src data: blob:; connect-src {connections}; base-uri 'none'; form-action 'none'"
-    )
     return (
         Template((here / "page.html").read_text(encoding="utf-8"))
         .substitute(
-            policy=policy,
+            policy=policy((viewer, player), connections),
             title=_text(scene.title),
             facts="".join(f"<dt>{_text(name)}</dt><dd>{_text(fact)}</dd>" for name, fact in scene.facts),
             commands=embedded,
@@ -51,7 +47,3 @@ def _filled(scene: Scene, embedded: str, connections: str) -> bytes:
 
 def _text(text: str) -> str:
     return escape(printable(text))
-
-
-def _hashed(script: str) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"

@@ -10,7 +10,6 @@ from __future__ import annotations
 import base64
 import warnings
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -121,11 +120,6 @@ class Recorder:
         import umsgpack  # noqa: PLC0415 - comes with meshcat, and like it only when a scene is drawn
 
         self.commands.append(umsgpack.packb(message))
-
-
-def viewer_script() -> str:
-    """The JavaScript of meshcat's viewer, three.js included: all that a page needs to show commands."""
-    return (Path(_meshcat().viewer_assets_path()) / "dist" / "main.min.js").read_text(encoding="utf-8")
 
 
 def _meshcat() -> Any:  # noqa: ANN401 - meshcat is untyped

@@ -43,6 +43,25 @@ _FADE = 25
 
 def commands(scene: Scene) -> list[bytes]:
     """The packed commands that make meshcat's viewer show `scene` and play its flight once."""
+    recorder = _drawn(scene)
+    _animate(recorder, scene.drones)
+    return recorder.commands
+
+
+def still(scene: Scene) -> list[bytes]:
+    """The same without the flight: every drone stays at home."""
+    return _drawn(scene).commands
+
+
+def path_of(number: int, drone: Drone) -> str:
+    """Where in meshcat's tree, below its root, `drone` is: the scene's `number`-th, counted from 0.
+
+    The number keeps paths apart, and away from names that mean something in JavaScript.
+    """
+    return f"drones/{number + 1} " + re.sub(r"[^\w.-]", "_", drone.name)
+
+
+def _drawn(scene: Scene) -> Recorder:
     recorder = Recorder()
     extent = _extent(scene)
     radius = float(np.linalg.norm(extent[1] - extent[0])) / 2
@@ -51,7 +70,7 @@ def commands(scene: Scene) -> list[bytes]:
     _draw_box(recorder, scene.axes)
     _label_axes(recorder, scene.axes, _TEXT * radius)
     _draw_drones(recorder, scene.drones, radius)
-    return recorder.commands
+    return recorder
 
 
 def _box(axes: Sequence[Axis]) -> _Corners:
@@ -152,14 +171,19 @@ def _lattice(walls: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64
 def _draw_drones(recorder: Recorder, drones: Sequence[Drone], radius: float) -> None:
     paint = _paint(drones)
     texts = _texts([drone.name for drone in drones], _READABLE * radius)
-    tracks = []
-    for number, (drone, text, keys) in enumerate(zip(drones, texts, flights(drones), strict=True)):
-        # The number keeps paths apart, and away from names that mean something in JavaScript.
-        path = f"drones/{number + 1} " + re.sub(r"[^\w.-]", "_", drone.name)
+    for number, (drone, text) in enumerate(zip(drones, texts, strict=True)):
+        path = path_of(number, drone)
         recorder.mesh(f"{path}/body", quadrotor(), paint[drone.group])
         height = min(_TEXT * radius, _NAME_WIDTH / label(text).aspect)
         _write(recorder, f"{path}/name", text, np.array([0, 0, 0.42]), height)
         recorder.place(path, drone.home)
+
+
+def _animate(recorder: Recorder, drones: Sequence[Drone]) -> None:
+    paint = _paint(drones)
+    tracks = []
+    for number, (drone, keys) in enumerate(zip(drones, flights(drones), strict=True)):
+        path = path_of(number, drone)
         if keys:
             tracks.append(Track(path, "position", "vector3", keys))
         if drone.aside:

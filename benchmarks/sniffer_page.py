@@ -1,0 +1,102 @@
+"""What a page of the sniffer asks for, without a browser: `URL follow`, `URL stop`, `URL time`; and `FILE write N`.
+
+follow: keep up with all that there is, as the page does; stop: connect, and never listen again; time: print after how
+many seconds there is what; write: make a journal of N messages.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+import time
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from tornado.httpclient import AsyncHTTPClient
+from tornado.websocket import websocket_connect
+
+from robochoc.observers.events import Began, Received, Sent, Settled
+from robochoc.observers.journal import Header, JournalFile, Recorder
+
+STOPPED = "stopped.pid"
+"""In the folder for temporary files: who has stopped, and is to be put out."""
+_SPAN = 1 << 16
+_ROBOTS = 49
+_FANOUT = 4
+
+
+async def follow(url: str, *, until_over: bool = False) -> None:
+    """Ask for whatever is new."""
+    client = AsyncHTTPClient()
+    began = time.perf_counter()
+    about: dict[str, Any] = msgspec.json.decode((await client.fetch(f"{url}about")).body)
+    socket = await websocket_connect(f"{url.replace('http', 'ws', 1)}news")
+    if "stop" in sys.argv:
+        _stop()
+    had = {"columns": 0, "steps": 0}
+    first = True
+    news: dict[str, Any] = about
+    while True:
+        if news["generation"] != about["generation"]:
+            had, about = dict.fromkeys(had, 0), {**about, "generation": news["generation"]}
+        for what, number in (("columns", news["messages"]), ("steps", news["steps"])):
+            while had[what] < number:
+                to = min(number, had[what] + _SPAN)
+                await client.fetch(f"{url}{what}?from={had[what]}&to={to}", request_timeout=60)
+                had[what] = to
+                if first and what == "steps":
+                    first = False
+                    await client.fetch(f"{url}details?chunk=0", request_timeout=60)
+                    print(f"the first picture can be drawn {time.perf_counter() - began:.2f}", flush=True)
+        if until_over and news["over"]:
+            print(f"all messages are there, in order {time.perf_counter() - began:.2f}")
+            return
+        message = await socket.read_message()
+        if message is None:
+            return
+        news = msgspec.json.decode(message)
+
+
+def _stop() -> None:
+    Path(os.environ["TMPDIR"], STOPPED).write_text(str(os.getpid()))
+    os.kill(os.getpid(), signal.SIGSTOP)
+
+
+def write(path: Path, messages: int) -> None:
+    """A journal of `messages` messages of 49 robots, whose bundles come out of order."""
+    file = JournalFile(path)
+    recorder = Recorder(Header(team="long", protocol="abt", runtime="processes", seed=0), None, [file.write])
+    recorder(Began(t=0, protocol="ABT"))
+    names = [f"Robot{row}.{column}" for row in range(1, 8) for column in range(1, 8)]
+    waiting: list[list[str]] = [[] for _ in names]
+    said = 0
+    for step in count():
+        robot = step * 31 % _ROBOTS
+        name = names[robot]
+        t = step * 1e-5
+        for sender in waiting[robot]:
+            recorder(Received(t=t, sender=sender, receiver=name, type="Ok", clock=step))
+        waiting[robot].clear()
+        for place in range(_FANOUT):
+            to = (robot + 1 + place * 7 + step % 5) % _ROBOTS
+            content = {"value": [step % 7 + 1]}
+            recorder(Sent(t=t, sender=name, receiver=names[to], type="Ok", content=content, bytes=8, clock=step))
+            waiting[to].append(name)
+        said += _FANOUT
+        late = t - 1e-4 if step % 100 == 0 else t
+        recorder(Settled(t=late, robot=name, clock=step, checks=step))
+        if said >= messages:
+            break
+    recorder.close()
+    file.close()
+
+
+if __name__ == "__main__":
+    if sys.argv[2] == "write":
+        write(Path(sys.argv[1]), int(sys.argv[3]))
+    else:
+        asyncio.run(follow(sys.argv[1], until_over=sys.argv[2] == "time"))

@@ -1,0 +1,73 @@
+"""`robochoc sniff`: the page that explains a run, from its journal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from robochoc.cli.failure import INVALID, USAGE, Failure, invalid_input_fails
+from robochoc.cli.paths import InputPath
+
+if TYPE_CHECKING:
+    from robochoc.view.sniffer.session import Session
+
+NEXT_STEP = "give what 'robochoc solve --journal' wrote"
+
+
+@click.command(short_help="Look into what robots said: a page on this machine.")
+@click.argument("journal", type=InputPath(), metavar="JOURNAL")
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port of the page; 0 is any free one.")
+@click.option("--open", "open_browser", is_flag=True, help="Show the page in a browser.")
+@click.option(
+    "--robots",
+    "chosen",
+    default="",
+    metavar="PATTERNS",
+    help="Robots to begin with: names or patterns, such as Robot3.1,Robot2.*.  [default: all]",
+)
+@click.option(
+    "--team",
+    "folder",
+    type=InputPath(),
+    metavar="DIR",
+    help="The team's folder, for the 3D scene.  [default: what the journal says]",
+)
+@invalid_input_fails
+def sniff(journal: Path, port: int, chosen: str, folder: Path | None, *, open_browser: bool) -> None:
+    """Show the conversations in JOURNAL on a page of this machine, until Ctrl-C: who said what, and why.
+
+    JOURNAL is what 'robochoc solve --journal' writes; while it is still written, the page follows it.
+    """
+    from robochoc.view.sniffer.server import serve
+
+    session = _session(journal, chosen, folder)
+    try:
+        serve(
+            session,
+            port=port,
+            open_browser=open_browser,
+            ready=lambda url: click.echo(f"{url} shows {journal} on this machine; Ctrl-C ends it", err=True),
+        )
+    except OSError as error:
+        raise Failure(USAGE, f"port {port}: {error.strerror} (choose another, or none)") from error
+
+
+def _session(journal: Path, chosen: str, folder: Path | None) -> Session:
+    """The journal, opened; its first piece is read, for what is none to be told at once."""
+    from robochoc.formats import on_one_line, read_team
+    from robochoc.observers.journal import BadJournal
+    from robochoc.view.sniffer.patterns import patterns_in
+    from robochoc.view.sniffer.session import Session
+    from robochoc.view.sniffer.trace import TraceTooLarge
+
+    robots = {robot.name: robot for robot in read_team(folder).robots} if folder else {}
+    try:
+        session = Session(journal, chosen=patterns_in(chosen), robots=robots)
+        session.begin()
+    except (BadJournal, TraceTooLarge) as wrong:
+        raise Failure(INVALID, on_one_line(f"{journal}: {wrong} ({NEXT_STEP})")) from wrong
+    except OSError as error:
+        raise Failure(INVALID, on_one_line(f"{journal}: {error.strerror or error} ({NEXT_STEP})")) from error
+    return session

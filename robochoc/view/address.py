@@ -1,0 +1,24 @@
+"""Where pages of ours are to be found: on the loopback interface of this machine alone."""
+
+from __future__ import annotations
+
+from secrets import token_urlsafe
+from socket import create_server, socket
+
+_LOOPBACK = "127.0.0.1"
+_SECRET_BYTES = 18
+
+
+def listening(port: int = 0) -> socket:
+    """A socket that listens on the loopback interface; port 0 is any free one. Raises `OSError` when it is taken."""
+    return create_server((_LOOPBACK, port))
+
+
+def url_of(listening: socket, path: str = "") -> str:
+    """Where a browser of this machine finds `path`."""
+    return f"http://{_LOOPBACK}:{listening.getsockname()[1]}/{path}"
+
+
+def secret_path() -> str:
+    """A path that nobody guesses: others may use this machine, too."""
+    return token_urlsafe(_SECRET_BYTES)

@@ -1,0 +1,18 @@
+"""meshcat's viewer: what a page needs to show a scene."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+
+def viewer_script() -> str:
+    """The JavaScript of meshcat's viewer, three.js included: all that a page needs to show commands.
+
+    meshcat itself is not imported, which takes long: this is but a file of it. Raises `ModuleNotFoundError`.
+    """
+    found = find_spec("meshcat")
+    if found is None or not found.submodule_search_locations:
+        raise ModuleNotFoundError("meshcat, whose viewer draws the scene, is not installed", name="meshcat")
+    viewer = Path(found.submodule_search_locations[0]) / "viewer" / "dist" / "main.min.js"
+    return viewer.read_text(encoding="utf-8")

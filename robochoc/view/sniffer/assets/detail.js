@@ -1,0 +1,137 @@
+"use strict";
+/* One message in full: what it says in words, every field of the ACL message, its content, its causes, its consequences. */
+(() => {
+  const LINKS = 60; // a packet of thousands is told by its number
+  const ENTRIES = 500; // of one list in a content
+
+  /* JSON as a tree. Inner levels are made when they are opened, so that no depth or length of a stranger's can hurt. */
+  Sniffer.tree = (value, name, depth = 0) => {
+    const { make } = Sniffer;
+    const label = name === undefined ? null : make("b", {}, `${name}: `);
+    if (value === null || typeof value !== "object") return make("div", { class: "leaf" }, label, make("code", {}, JSON.stringify(value)));
+    const entries = Object.entries(value);
+    const brief = Array.isArray(value) ? `[ ${entries.length} ]` : `{ ${entries.length} }`;
+    const branch = make("details", { class: "branch" }, make("summary", {}, label, make("code", {}, brief)));
+    const open = () => {
+      if (!branch.open || branch.childElementCount > 1) return;
+      branch.append(...entries.slice(0, ENTRIES).map(([key, inner]) => Sniffer.tree(inner, key, depth + 1)));
+      if (entries.length > ENTRIES) branch.append(make("p", { class: "soft" }, `and ${Sniffer.count(entries.length - ENTRIES)} more`));
+    };
+    branch.addEventListener("toggle", open);
+    branch.open = depth < 2 && entries.length <= 12;
+    open();
+    return branch;
+  };
+
+  /* A button that goes to a message. */
+  Sniffer.link = (model, message, told) => {
+    const { make } = Sniffer;
+    const { sender, receiver } = model.messages;
+    const mark = make("i", { class: "swatch" });
+    mark.style.background = Sniffer.palette.colour(model.messages.kind[message]);
+    return make("li", {}, make("button", { type: "button", class: "plain link", onclick: () => told.message(message) },
+      mark, make("b", {}, Sniffer.count(message)), ` ${model.kindOf(message).name} `,
+      make("span", { class: "soft" }, `${model.nameOf(sender[message])} → ${model.nameOf(receiver[message])}`)));
+  };
+
+  Sniffer.links = (model, messages, told, none) => {
+    const list = [...messages.slice(0, LINKS)].map((message) => Sniffer.link(model, message, told));
+    if (messages.length > LINKS) list.push(Sniffer.make("li", { class: "soft" }, `and ${Sniffer.count(messages.length - LINKS)} more`));
+    return list.length ? Sniffer.make("ul", { class: "links" }, ...list) : Sniffer.make("p", { class: "soft" }, none);
+  };
+
+  Sniffer.facts = (pairs) => Sniffer.make("dl", { class: "facts" }, ...pairs.flatMap(([name, fact]) =>
+    (fact === "" || fact === null || fact === undefined ? [] : [Sniffer.make("dt", {}, name), Sniffer.make("dd", {}, fact)])));
+
+  Sniffer.copyButton = (text) => {
+    const button = Sniffer.make("button", { type: "button", onclick: async () => {
+      try {
+        await navigator.clipboard.writeText(text);
+        button.textContent = "Copied";
+        Sniffer.say("Copied");
+      } catch {
+        button.textContent = "The browser does not allow it";
+      }
+      setTimeout(() => (button.textContent = "Copy"), 1500);
+    } }, "Copy");
+    return button;
+  };
+
+  Sniffer.Detail = class {
+    constructor(model, view, texts, saving, told) {
+      Object.assign(this, { model, view, texts, saving, told });
+      this.element = Sniffer.byId("message");
+    }
+
+    paint() {
+      const { view, model } = this;
+      const m = view.selected;
+      if (m < 0 || m >= model.messageCount) {
+        this._key = "";
+        Sniffer.fill(this.element, Sniffer.make("p", { class: "hint" }, m < 0
+          ? "Choose a message: press its arrow, or its row in the table. What it says, why it was said and what came of it then stand here."
+          : `Message ${Sniffer.count(m)} has not been loaded yet.`));
+        return;
+      }
+      const key = `${m}|${model.receivedStep[m]}|${model.whole}|${Sniffer.palette.dark}|${model.consequencesOf(m).length}`;
+      if (key === this._key) return;
+      this._key = key;
+      this._show(m);
+    }
+
+    _show(m) {
+      const { make, count, moment } = Sniffer;
+      const { model, told } = this;
+      const { sender, receiver, t, step, bytes, clock } = model.messages;
+      const kind = model.kindOf(m);
+      const taken = model.receivedStep[m];
+      const from = model.nameOf(sender[m]);
+      const to = model.nameOf(receiver[m]);
+      const mark = make("i", { class: "swatch big" });
+      mark.style.background = Sniffer.palette.colour(model.messages.kind[m]);
+      const robot = (number) => make("button", { type: "button", class: "plain robot", onclick: () => told.robot(number) }, model.nameOf(number));
+      this.words = make("blockquote", {}, "…");
+      this.more = make("div");
+      const causes = model.causesOf(m);
+      const fate = taken === Sniffer.NONE ? (model.whole ? "never" : "not yet")
+        : `t = ${moment(model.steps.t[taken])}, after ${moment(model.steps.t[taken] - t[m])}`;
+      Sniffer.fill(this.element,
+        make("h2", {}, mark, `${count(m)} ${kind.name}`),
+        make("p", { class: "who" }, robot(sender[m]), " → ", robot(receiver[m])),
+        this.words,
+        kind.why ? make("p", { class: "soft" }, kind.why) : null,
+        make("h3", {}, "Why it was said"),
+        Sniffer.links(model, causes, told, `${from} said it at its start: nothing had to be heard before.`),
+        make("h3", {}, "What came of it"),
+        Sniffer.links(model, model.consequencesOf(m), told, taken !== Sniffer.NONE ? `${to} took it in and said nothing.`
+          : model.whole ? `${to} never took it in.` : `${to} has not taken it in yet.`),
+        make("h3", {}, "When"),
+        Sniffer.facts([["Said", `t = ${moment(t[m])}`], ["Taken in", fate], ["Run", Sniffer.runName(model.runOf(m) || { protocol: "?" })],
+          ["Step", `${count(step[m])}, ${from}'s ${count(model.ordinal[step[m]] + 1)}`],
+          ["NCCC clock", count(clock[m])], ["Size", Sniffer.many(bytes[m], "byte")]]),
+        this.more,
+        this.saving.panel(m));
+      this.element.scrollTop = 0;
+      this._details(m);
+    }
+
+    async _details(m) {
+      const { make } = Sniffer;
+      let detail;
+      try {
+        detail = await this.texts.detail(m);
+      } catch (trouble) {
+        if (this.view.selected === m) this.words.textContent = `What it says cannot be had: ${trouble.message}`;
+        return;
+      }
+      if (this.view.selected !== m || !detail) return;
+      this.words.textContent = detail.words;
+      Sniffer.fill(this.more,
+        make("h3", {}, "Its content"), Sniffer.tree(detail.content),
+        make("h3", {}, "As a FIPA ACL message"),
+        Sniffer.facts(Object.entries(detail.fields).map(([name, text]) => [name, make("code", {}, text)])),
+        make("details", {}, make("summary", {}, "As text"), make("pre", { tabIndex: 0 }, detail.acl), Sniffer.copyButton(detail.acl)));
+      Sniffer.say(detail.words, false);
+    }
+  };
+})();

@@ -1,0 +1,102 @@
+"use strict";
+/* Keeping up: what has been told to exist is asked for, piece by piece, until the page has it all. A run that is faster
+   than the page is told of by how far the page is behind; the run is never waited for, nor does it wait. */
+(() => {
+  const PAUSE_MS = 15; // between pieces, for frames to be painted
+
+  Sniffer.Following = class {
+    constructor(model, source, told) {
+      Object.assign(this, { model, source, told });
+      this.goal = { messages: 0, steps: 0, decisions: 0 };
+      this.gone = false;
+      this.trouble = "";
+    }
+
+    get behind() {
+      return Math.max(this.goal.messages - this.model.messageCount, 0);
+    }
+
+    /* Whether all there will ever be is here. */
+    get whole() {
+      const { model, goal } = this;
+      return Boolean(model.about.over) && model.messageCount >= goal.messages && model.stepCount >= goal.steps;
+    }
+
+    /* `news`: about's numbers as they are by now. */
+    async news(news) {
+      const { model } = this;
+      if (news.generation !== undefined && news.generation !== model.about.generation) return this.told.anew();
+      for (const name of ["messages", "steps", "decisions"]) this.goal[name] = Math.max(news[name] ?? 0, this.goal[name]);
+      const { about } = model;
+      const lists = { robots_count: "robots", kinds_count: "kinds", runs_count: "runs", notes_count: "notes" };
+      this._stale = this._stale || Object.entries(lists).some(([count, list]) => news[count] !== undefined && news[count] !== about[list + "_told"]);
+      for (const [count, list] of Object.entries(lists)) if (news[count] !== undefined) about[list + "_told"] = news[count];
+      if (news.over !== undefined) this._stale = this._stale || news.over !== about.over;
+      for (const name of ["over", "verdict", "damage", "unseen"]) if (news[name] !== undefined) about[name] = news[name];
+      this.told.changed();
+      return this.pull();
+    }
+
+    async pull() {
+      if (this._pulling) return;
+      this._pulling = true;
+      try {
+        while (await this._piece()) await new Promise((done) => setTimeout(done, PAUSE_MS));
+        this.trouble = "";
+      } catch (trouble) {
+        this.trouble = trouble.message;
+      } finally {
+        this._pulling = false;
+        this.told.changed();
+      }
+    }
+
+    /* One round: messages, then the steps that may speak of them, then decisions. Whether there was anything. */
+    async _piece() {
+      const { model, source, goal } = this;
+      if (this._stale || model.outgrown) {
+        this._stale = false;
+        const about = await source.about();
+        if (about.generation !== model.about.generation) return this.told.anew();
+        for (const list of ["robots", "kinds", "runs", "notes"]) about[list + "_told"] = model.about[list + "_told"];
+        model.update(about);
+        this.told.about();
+        for (const name of ["messages", "steps", "decisions"]) goal[name] = Math.max(about[name], goal[name]);
+      }
+      const upTo = (from, to) => Math.min(to, from + source.span);
+      const before = [model.messageCount, model.stepCount, model.decisionCount];
+      const target = { ...goal }; // steps that came later speak of messages that are not here yet
+      if (before[0] < target.messages) {
+        const to = upTo(before[0], target.messages);
+        model.addMessages(await source.columns(before[0], to), to - before[0]);
+      }
+      if (before[1] < target.steps) {
+        const to = upTo(before[1], target.steps);
+        model.addSteps(await source.steps(before[1], to), to - before[1]);
+      }
+      if (before[2] < target.decisions) {
+        const list = await source.decisions(before[2], upTo(before[2], target.decisions));
+        const known = list.findIndex(([step]) => step >= model.stepCount);
+        model.addDecisions(known < 0 ? list : list.slice(0, known));
+      }
+      const more = before[0] < model.messageCount || before[1] < model.stepCount || before[2] < model.decisionCount;
+      model.whole = this.whole;
+      if (more) this.told.grown();
+      return more || Boolean(this._stale);
+    }
+
+    begin() {
+      const { about } = this.model;
+      for (const list of ["robots", "kinds", "runs", "notes"]) about[list + "_told"] = about[list + "_count"] ?? (about[list] || []).length;
+      this.news(about);
+      if (!about.over) this._listen();
+    }
+
+    _listen() {
+      this.source.onNews((news) => this.news(news), (over) => {
+        this.gone = !over;
+        this.told.changed();
+      });
+    }
+  };
+})();

@@ -1,0 +1,148 @@
+"use strict";
+/* The messages as a table: the same rows as the chart's, for who reads rather than looks, and for screen readers. Only
+   the rows in the window exist; `aria-rowindex` tells which they are of all. */
+(() => {
+  const NARROW = matchMedia("(max-width: 40rem)"); // there the words stand below the names
+  const MOST = 8_000_000; // pixels: browsers do not draw elements much taller than that
+  const COLUMNS = [["#", "number"], ["Time", "time"], ["From", "from"], ["To", "to"], ["Type", "type"], ["What it says", "says"]];
+
+  Sniffer.List = class {
+    constructor(model, view, filter, source, told) {
+      Object.assign(this, { model, view, filter, source, told });
+      this.grid = Sniffer.byId("grid");
+      this.table = Sniffer.byId("table");
+      this.rows = [];
+      this.said = new Map(); // chunk -> its details, for those in the window
+      this._build();
+    }
+
+    _build() {
+      const { grid } = this;
+      const heads = COLUMNS.map(([text, name], at) =>
+        Sniffer.make("span", { role: "columnheader", class: name, "aria-colindex": String(at + 1) }, text));
+      this.header = Sniffer.make("div", { role: "row", class: "row header", "aria-rowindex": "1" }, ...heads);
+      this.spacer = Sniffer.make("div", { role: "presentation", class: "spacer" });
+      grid.append(this.header, this.spacer);
+      grid.setAttribute("aria-colcount", String(COLUMNS.length));
+      grid.addEventListener("scroll", () => this.draw());
+      grid.addEventListener("wheel", (event) => this._wheel(event), { passive: false });
+      grid.addEventListener("click", (event) => {
+        const row = event.target.closest(".row[data-message]");
+        if (row) this.told.message(Number(row.dataset.message));
+      });
+      new ResizeObserver(() => this.draw()).observe(grid);
+    }
+
+    get tall() {
+      return NARROW.matches ? 48 : 28;
+    }
+
+    get inWindow() {
+      return Math.max(Math.floor((this.grid.clientHeight - this.tall) / this.tall), 1);
+    }
+
+    /* Where the whole is taller than a browser can draw, a pixel of its scrollbar stands for more than one. */
+    get scale() {
+      const room = this.grid.clientHeight - this.tall;
+      const whole = this.filter.length * this.tall;
+      return whole <= MOST ? 1 : (whole - room) / (MOST - room);
+    }
+
+    get top() {
+      return (this.grid.scrollTop * this.scale) / this.tall;
+    }
+
+    set top(row) {
+      this._stretch(); // a browser scrolls no farther than the element is tall by now
+      this.grid.scrollTop = (row * this.tall) / this.scale;
+    }
+
+    _wheel(event) {
+      if (this.scale === 1 || event.ctrlKey) return;
+      event.preventDefault();
+      this.top = this.top + event.deltaY / this.tall;
+    }
+
+    draw() {
+      if (this._waiting) return;
+      this._waiting = true;
+      requestAnimationFrame(() => {
+        this._waiting = false;
+        this.paint();
+      });
+    }
+
+    _stretch() {
+      const tall = `${Math.min(this.filter.length * this.tall, MOST)}px`;
+      if (this.spacer.style.height !== tall) this.spacer.style.height = tall;
+    }
+
+    paint() {
+      const { filter, grid, rows } = this;
+      this._stretch();
+      grid.setAttribute("aria-rowcount", String(filter.length + 1));
+      const first = Math.max(Math.floor(this.top), 0);
+      const shown = Math.min(this.inWindow + 2, Math.max(filter.length - first, 0));
+      const offset = this.scale === 1 ? first * this.tall : grid.scrollTop - (this.top - first) * this.tall;
+      while (rows.length < shown) rows.push(this._row());
+      rows.forEach((row, at) => {
+        row.hidden = at >= shown;
+        if (row.hidden) return;
+        row.style.transform = `translateY(${offset + at * this.tall}px)`;
+        this._fill(row, first + at);
+      });
+      this._words(first, shown);
+      const active = rows.find((row) => !row.hidden && Number(row.dataset.message) === this.view.selected);
+      if (active) grid.setAttribute("aria-activedescendant", active.id);
+      else grid.removeAttribute("aria-activedescendant");
+    }
+
+    _row() {
+      const cells = COLUMNS.map(([, name], at) => Sniffer.make("span", { role: "gridcell", class: name, "aria-colindex": String(at + 1) }));
+      const row = Sniffer.make("div", { role: "row", class: "row", id: `row-${this.rows.length}` }, ...cells);
+      this.spacer.append(row);
+      return row;
+    }
+
+    _fill(row, at) {
+      const { model, view } = this;
+      const m = this.filter.at(at);
+      const words = this.told.words(m);
+      const hit = this.marks && this.marks.has(m);
+      const key = `${m}|${at}|${view.selected === m}|${words.length}|${hit}|${view.colourBy}|${Sniffer.palette.dark}`;
+      if (row.dataset.shown === key) return;
+      row.dataset.shown = key;
+      row.dataset.message = m;
+      row.setAttribute("aria-rowindex", String(at + 2));
+      row.setAttribute("aria-selected", String(view.selected === m));
+      row.classList.toggle("hit", Boolean(hit));
+      row.classList.toggle("odd", at % 2 === 1);
+      const { sender, receiver, t } = model.messages;
+      const kind = model.kindOf(m);
+      const texts = [Sniffer.count(m), Sniffer.moment(t[m]), model.nameOf(sender[m]), model.nameOf(receiver[m]),
+        kind.performative ? `${kind.name} · ${kind.performative.toLowerCase()}` : kind.name, words];
+      texts.forEach((text, cell) => {
+        row.children[cell].textContent = text;
+        row.children[cell].title = cell === 5 ? text : "";
+      });
+      row.children[4].style.color = Sniffer.palette.colour(Sniffer.colouring(model, view.colourBy)(m));
+    }
+
+    /* The words of what is in the window; what is there already is not asked for. */
+    _words(first, shown) {
+      const chunks = new Set();
+      for (let at = 0; at < shown; at++) chunks.add(this.filter.at(first + at) >> 10);
+      const missing = [...chunks].filter((chunk) => !this.told.has(chunk, this.model.messageCount));
+      if (!missing.length) return;
+      clearTimeout(this._asking);
+      this._asking = setTimeout(() => this.told.ask(missing.slice(0, 4)), 120); // not for each that is scrolled past
+    }
+
+    reveal(row) {
+      const first = this.top;
+      const rows = this.inWindow;
+      if (row < first) this.top = row;
+      else if (row > first + rows - 1.5) this.top = row - rows + 1.5;
+    }
+  };
+})();

@@ -1,0 +1,339 @@
+"use strict";
+/* Puts the parts together: what the user does changes the view, news change the model, and both are shown once a frame. */
+(() => {
+  const { byId } = Sniffer;
+  const FILTERS = ["chosen", "off", "senders", "receivers", "run", "from", "to", "concern", "about", "hitsOnly"];
+  const LANES = ["chosen", "order", "collapsed", "patterns"];
+  const has = (changed, names) => names.some((name) => changed.has(name));
+
+  class Page {
+    constructor(source, about) {
+      this.source = source;
+      this.model = new Sniffer.Model(about);
+      this.view = new Sniffer.View();
+      const { model, view } = this;
+      this.windows = Sniffer.frame(() => this.repaint());
+      if (innerWidth <= 600) view.layout = "table";
+      view.follow = Boolean(about.live && !about.over);
+      this.lanes = new Sniffer.Lanes(model, view);
+      this.lanes.begin();
+      this.texts = new Sniffer.Texts(model, source, () => this.list.draw());
+      this.search = new Sniffer.Search(model, source, (found) => this.searched(found));
+      this.filter = new Sniffer.Filter(model, view, this.search);
+      this.saving = new Sniffer.Saving(model, this.filter, this.texts, source);
+      this.time = new Sniffer.Time(model, view);
+      const told = { message: (m) => this.message(m), step: (step) => this.time.go(step), robot: (robot) => this.robot(robot),
+        words: (m) => this.texts.words(m), has: (chunk) => this.texts.has(chunk), ask: (chunks) => this.texts.ask(chunks),
+        begin: () => this.again() };
+      this.chart = new Sniffer.Chart(model, view, this.lanes, this.filter, told);
+      this.list = new Sniffer.List(model, view, this.filter, source, { ...told, message: (m) => {
+        this.message(m);
+        if (this.windows.narrow()) this.windows.right(true); // there is no room for it beside the table
+      } });
+      this.robots = new Sniffer.RobotList(model, view, this.lanes, told);
+      this.filters = new Sniffer.FilterPane(model, view, this.filter);
+      this.detail = new Sniffer.Detail(model, view, this.texts, this.saving, told);
+      this.state = new Sniffer.StatePane(model, view, source, told);
+      this.following = new Sniffer.Following(model, source, {
+        grown: () => this.grown(), changed: () => this.status(), about: () => this.met(), anew: () => this.anew() });
+      this.notices = new Sniffer.Notices(model, this.following, told);
+      this.address = new Sniffer.Address(model, view, () => this.time.touched);
+      this.address.begin();
+      this.wanted = this.address.read();
+      Sniffer.controls(this);
+      this.slowly = Sniffer.seldom(80, () => this.robots.paint());
+      view.on((changed) => this.changed(changed));
+      this.lanes.arrange();
+      this._facts();
+      this._arrange();
+      byId("query").value = view.query;
+      this.filter.rebuild();
+      this.repaint();
+      this.following.begin();
+    }
+
+    // What the user does
+
+    message(m) {
+      if (m < 0 || m >= this.model.messageCount) return;
+      this.view.set({ selected: m, upper: "message", follow: false });
+      if (this.view.robot < 0) this.view.set({ robot: this.model.messages.sender[m] });
+      this.time.go(this.model.messages.step[m]);
+      if (!this.filter.shows(m)) Sniffer.say("The filters leave this message out of the chart");
+    }
+
+    robot(robot) {
+      this.view.set({ robot, upper: "robot" });
+    }
+
+    move(rows) {
+      const { filter, view } = this;
+      if (!filter.length) return;
+      const from = view.selected < 0 ? Math.floor(view.top) - Math.sign(rows) : filter.rowOf(view.selected);
+      const off = view.selected >= 0 && rows > 0 && !filter.shows(view.selected) ? 1 : 0;
+      this.message(filter.at(Math.min(Math.max(from + rows - off, 0), filter.length - 1)));
+      byId("grid").focus({ preventScroll: true });
+    }
+
+    hit(step) {
+      const { view } = this;
+      const from = view.selected >= 0 ? view.selected : step > 0 ? -1 : Infinity;
+      const found = this.search.next(from, step, (m) => this.filter.shows(m));
+      if (found >= 0) this.message(found);
+      else Sniffer.say(this.search.running ? "Still searching" : "No hit among the messages shown");
+    }
+
+    again() {
+      const { view } = this;
+      view.patterns = [];
+      this.lanes.begin();
+      view.touch("order", "chosen", "collapsed", "patterns");
+    }
+
+    cause(list) {
+      const { view } = this;
+      if (view.selected < 0 || view.selected >= this.model.messageCount) return;
+      const [first] = list(view.selected);
+      if (first === undefined) Sniffer.say("There is none");
+      else this.message(first);
+    }
+
+    // What is shown of it
+
+    changed(changed) {
+      const { view, model } = this;
+      if ([...changed].every((name) => name === "top" || name === "left")) { // scrolling is the most frequent, and the least
+        this.chart.draw();
+        this.address.save();
+        return;
+      }
+      if (has(changed, LANES)) this.lanes.arrange();
+      if (has(changed, FILTERS)) this._refilter();
+      if (changed.has("query")) this.search.find(view.query, view.selected);
+      if (changed.has("layout")) this._arrange();
+      if (changed.has("upper")) this.showUpper(view.upper);
+      if (changed.has("lower")) this.showLower(view.lower);
+      if (has(changed, ["colourBy"])) this.chart.minimap.refresh();
+      if (view.follow && changed.has("follow")) this._newest();
+      if (changed.has("moment") || changed.has("selected")) this._reveal(changed);
+      if (has(changed, ["robot", "moment", ...LANES])) this.slowly();
+      if (changed.has("moment") && model.stepCount) this._showMoment();
+      if (changed.has("robot") && view.robot < 0) view.set({ whose: "all" });
+      this.filters.paint();
+      this.detail.paint();
+      this.state.paint();
+      this.time.paint();
+      this.status();
+      this.chart.draw();
+      this.list.draw();
+      this.address.save();
+    }
+
+    repaint() {
+      if (!this.chart) return;
+      this.chart.minimap.refresh();
+      this.chart.draw();
+      this.list.draw();
+      for (const part of [this.filters, this.robots, this.detail, this.state, this.time]) part.paint();
+      this.status();
+    }
+
+    /* Other rows: the message at the top of the window stays there. */
+    _refilter() {
+      const { filter, view } = this;
+      const top = filter.length ? filter.at(Math.min(Math.floor(view.top), filter.length - 1)) : 0;
+      filter.rebuild();
+      view.set({ top: top ? filter.rowOf(top) : 0 });
+      this.chart.shape.clamp();
+      this.chart.minimap.refresh();
+      Sniffer.say(`${Sniffer.count(filter.length)} of ${Sniffer.many(this.model.messageCount, "message")} shown`, true);
+    }
+
+    _reveal(changed) {
+      const { view, filter, model, chart } = this;
+      if (changed.has("selected") && view.selected >= 0 && view.selected < model.messageCount) {
+        const row = filter.rowOf(view.selected);
+        chart.reveal(row, this.lanes.of[model.messages.sender[view.selected]]);
+        this.list.reveal(row);
+      } else if (this.time.moved && view.moment < model.stepCount) {
+        chart.reveal(filter.rowOf(model.rowOf(view.moment)), this.lanes.of[model.steps.robot[view.moment]]);
+        this.list.reveal(filter.rowOf(model.rowOf(view.moment)));
+      }
+      this.time.moved = false;
+    }
+
+    _showMoment() {
+      if (this.counters) this.counters.show(this.view.moment);
+      if (this.scene) this.scene.show(this.view.moment);
+    }
+
+    _newest() {
+      this.time.touched = false;
+      this.view.set({ top: this.chart.shape.lowest, moment: Math.max(this.model.stepCount - 1, 0) });
+      this.list.top = this.filter.length;
+    }
+
+    _arrange() {
+      const { layout } = this.view;
+      byId("centre").dataset.layout = layout;
+      for (const input of document.querySelectorAll("[name=layout]")) input.checked = input.value === layout;
+      byId("colour").value = this.view.colourBy;
+      byId("arrows").value = this.view.arrows;
+      this.chart.measure();
+      this.chart.draw();
+      this.list.draw();
+    }
+
+    _facts() {
+      const { about } = this.model;
+      document.title = `${about.title} · sniffer`;
+      byId("title").textContent = about.title;
+      const facts = [Sniffer.many(about.robots.length, "robot"), about.runtime, about.seed === undefined ? "" : `seed ${about.seed}`,
+        about.order ? `order ${about.order}` : "", about.channel ? `channel ${about.channel}` : ""];
+      byId("facts").textContent = facts.filter(Boolean).join(" · ");
+    }
+
+    // News
+
+    grown() {
+      const { view, model, filter } = this;
+      filter.extend();
+      if (view.follow) this._newest();
+      else if (!this.time.touched) view.set({ moment: Math.max(model.stepCount - 1, 0) });
+      this._restore();
+      if (this.counters) this.counters.update();
+      else if (model.stepCount) this.showLower(view.lower);
+      this._growScene();
+      this.chart.minimap.refresh();
+      if (view.query && !this.search.running) this.slowSearch();
+      this.changed(new Set(["grown"]));
+      this.slowly();
+    }
+
+    /* The places that the address named, once that much is here. */
+    _restore() {
+      const { wanted, model, view, filter, chart } = this;
+      const whole = model.messageCount >= this.following.goal.messages;
+      if (wanted.moment !== undefined && wanted.moment < model.stepCount) {
+        this.time.touched = true;
+        view.set({ moment: Math.max(Math.floor(wanted.moment), 0) });
+        wanted.moment = undefined;
+      }
+      if (wanted.selected !== undefined && wanted.selected < model.messageCount) {
+        view.selected = Math.max(Math.floor(wanted.selected), 0);
+        this.list.reveal(filter.rowOf(view.selected));
+        wanted.selected = undefined;
+      }
+      if (wanted.top !== undefined && (whole || filter.length > wanted.top + 200)) {
+        view.set({ top: wanted.top });
+        chart.shape.clamp();
+        wanted.top = undefined;
+      }
+    }
+
+    met() {
+      this.lanes.welcome();
+      this._facts();
+      this.filter.rebuild();
+      this.robots.paint();
+    }
+
+    /* What was numbered is numbered anew: the page begins again, at the same view. */
+    anew() {
+      this.address._save();
+      location.reload();
+      return false;
+    }
+
+    searched(found) {
+      const { search, view, model } = this;
+      this.chart.drawing.marks = this.list.marks = search.query ? search.marks : null;
+      this.chart.minimap.hits = search.hits;
+      const part = search.running ? ` · ${Math.floor((search.looked / Math.max(model.messageCount, 1)) * 100)} %` : "";
+      const at = search.hits.length && search.marks.has(view.selected) ? `${Sniffer.count(Sniffer.lowerBound(search.hits, view.selected) + 1)} of ` : "";
+      byId("hits").textContent = search.trouble || (search.query ? `${at}${Sniffer.count(search.hits.length)}${part}` : "");
+      if (view.hitsOnly && (found || !search.query)) this._refilter();
+      if (search.query && !search.running) Sniffer.say(Sniffer.many(search.hits.length, "hit"), true);
+      this.chart.draw();
+      this.list.draw();
+    }
+
+    status() {
+      const { model, filter, following, view } = this;
+      const { about } = model;
+      const { count } = Sniffer;
+      model.whole = following.whole;
+      const shown = filter.length === model.messageCount ? Sniffer.many(model.messageCount, "message")
+        : `${count(filter.length)} of ${Sniffer.many(model.messageCount, "message")}`;
+      const late = following.behind > 0 && !following.gone ? ` · ${Sniffer.many(following.behind, "message")} not drawn yet` : "";
+      byId("counts").textContent = shown + late;
+      const verdict = byId("verdict");
+      verdict.hidden = !about.verdict;
+      verdict.textContent = verdict.title = about.verdict || "";
+      verdict.dataset.over = String(Boolean(about.over));
+      const live = byId("live");
+      live.hidden = about.over || following.gone;
+      live.setAttribute("aria-pressed", String(view.follow));
+      live.textContent = view.follow ? "Following" : "Follow";
+      live.title = view.follow ? "What is newest is shown as it comes (f)" : "Show what is newest (f)";
+      const nothing = byId("nothing");
+      nothing.hidden = filter.length > 0 || !(following.whole || model.messageCount);
+      nothing.textContent = model.messageCount ? "The filters and the choice of robots leave nothing over." : "No message has been said.";
+      if (this.search.query) this.searchedQuietly();
+      this.notices.paint();
+    }
+
+    searchedQuietly() {
+      const { search, view } = this;
+      if (!search.running && search.marks.has(view.selected))
+        byId("hits").textContent = `${Sniffer.count(Sniffer.lowerBound(search.hits, view.selected) + 1)} of ${Sniffer.count(search.hits.length)}`;
+    }
+
+    // Controls
+
+    async showLower(id) {
+      const element = byId(id);
+      if (id === "counters" && !this.counters && Sniffer.counters && this.model.stepCount) {
+        this.counters = Sniffer.counters(element, this.model);
+        this.counters.update();
+        this._showMoment();
+      }
+      if (id !== "scene" || this.scene !== undefined || !Sniffer.scene) return;
+      this.scene = null;
+      try {
+        const scene = await this.source.scene();
+        this.sceneUpTo = scene ? scene.decisions : 0;
+        if (scene) this.scene = Sniffer.scene(element, scene);
+        else Sniffer.fill(element, Sniffer.make("p", { class: "hint" }, "This team's problem has no scene that could be drawn."));
+        this._showMoment();
+      } catch (trouble) {
+        Sniffer.fill(element, Sniffer.make("p", { class: "hint" }, `The scene cannot be shown: ${trouble.message}`));
+      }
+    }
+
+    /* What has been decided since goes to the scene, where that is to be seen; one question at a time. */
+    async _growScene() {
+      if (!this.scene || !this.scene.add || this._askingScene || !(this.sceneUpTo < this.model.decisionCount) || byId("scene").hidden) return;
+      this._askingScene = true;
+      try {
+        const scene = await this.source.scene(this.sceneUpTo);
+        this.sceneUpTo = scene ? scene.decisions : Infinity;
+        this.scene.add(scene);
+      } catch {
+        /* it stands still; that the server is gone is told elsewhere */
+      }
+      this._askingScene = false;
+    }
+  }
+
+  const begin = async () => {
+    const source = Sniffer.source();
+    try {
+      Sniffer.page = new Page(source, await source.about());
+    } catch (trouble) {
+      Sniffer.palette.apply();
+      Sniffer.fill(byId("notices"), Sniffer.make("p", { class: "notice" }, `The run cannot be shown: ${trouble.message}`));
+    }
+  };
+  begin();
+})();

@@ -1,0 +1,46 @@
+"use strict";
+/* What is to be known about the run as a whole, told calmly above it: damage, losses, what is missing, what has ended. */
+(() => {
+  const SHOWN = 3; // of one kind; the others are counted
+
+  Sniffer.Notices = class {
+    constructor(model, following, told) {
+      Object.assign(this, { model, following, told });
+      this.element = Sniffer.byId("notices");
+      this.closed = new Set();
+    }
+
+    paint() {
+      const { about } = this.model;
+      const { following } = this;
+      const said = [];
+      if (following.gone) said.push(["gone", "The run's server has ended. What you see stays; what was not loaded can no longer be had."]);
+      else if (following.trouble) said.push(["trouble", `Not all could be loaded: ${following.trouble}`]);
+      if (about.damage) said.push(["damage", `The journal is damaged, and ends early: ${about.damage}`]);
+      if (about.over && !about.outcome && !about.damage) said.push(["broken", "The run broke off: the journal does not say how it ended. All it has is shown."]);
+      if (about.over && !about.messages) said.push(["empty", "Nobody has said anything in this run."]);
+      if (about.unseen) said.push(["unseen", `${Sniffer.many(about.unseen, "message was", "messages were")} taken in that nobody was seen to say; they have no arrow.`]);
+      if (about.replay) said.push(["replay", `What robots knew cannot be worked out again: ${about.replay}`]);
+      const kept = [...(about.notes || []), ...(about.losses || []), ...(about.refusals || [])].filter((note) => !note.kind || ["lost", "refused"].includes(note.kind));
+      const shown = kept.slice(0, SHOWN);
+      for (const note of shown) said.push([`note ${note.step} ${note.text}`, `${note.text} (t = ${Sniffer.moment(note.t)})`, note.step]);
+      if (kept.length > SHOWN) said.push(["notes", `and ${Sniffer.count(kept.length - SHOWN)} more losses and refusals`]);
+      const open = said.filter(([key]) => !this.closed.has(key));
+      const all = JSON.stringify(open);
+      if (all === this._shown) return;
+      this._shown = all;
+      Sniffer.fill(this.element, ...open.map(([key, text, step]) => this._notice(key, text, step)));
+      if (open.length) Sniffer.say(open[0][1]);
+    }
+
+    _notice(key, text, step) {
+      const { make } = Sniffer;
+      return make("p", { class: `notice ${key.split(" ")[0]}` }, make("span", {}, text),
+        step === undefined ? null : make("button", { type: "button", onclick: () => this.told.step(step) }, "Show"),
+        make("button", { type: "button", class: "plain", "aria-label": `Close: ${text}`, title: "Close", onclick: () => {
+          this.closed.add(key);
+          this.paint();
+        } }, "×"));
+    }
+  };
+})();

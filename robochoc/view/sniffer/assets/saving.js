@@ -1,0 +1,85 @@
+"use strict";
+/* Saving: one message, what two robots said to each other, or all that is shown; as ACL text or as JSON lines. */
+(() => {
+  const nameOfFile = (text) => text.replace(/[^A-Za-z0-9._-]+/g, "-").slice(0, 80) || "run";
+
+  const download = (parts, type, name) => {
+    const address = URL.createObjectURL(new Blob(parts, { type }));
+    Sniffer.make("a", { href: address, download: name }).click();
+    setTimeout(() => URL.revokeObjectURL(address), 60_000);
+  };
+
+  Sniffer.Saving = class {
+    constructor(model, filter, texts, source) {
+      Object.assign(this, { model, filter, texts, source });
+      source.journal().then((address) => (this.journal = address));
+    }
+
+    /* All that is known of a message, as JSON. */
+    entry(m, detail) {
+      const { model } = this;
+      const { sender, receiver, t, step, bytes, clock, run } = model.messages;
+      const taken = model.receivedStep[m];
+      const kind = model.kindOf(m);
+      return { number: m, t: t[m], sender: model.nameOf(sender[m]), receiver: model.nameOf(receiver[m]), type: kind.name,
+        performative: kind.performative, run: run[m], step: step[m], taken_in: taken === Sniffer.NONE ? null : taken,
+        clock: clock[m], bytes: bytes[m], words: detail.words, content: detail.content, acl: detail.fields };
+    }
+
+    scopes(m) {
+      const { model, filter } = this;
+      const { sender, receiver, run } = model.messages;
+      const [one, other] = [sender[m], receiver[m]];
+      return {
+        message: { name: `message-${m}`, every: () => [m] },
+        pair: { name: `${model.nameOf(one)}-${model.nameOf(other)}`, every: () => {
+          const found = [];
+          for (let i = 0; i < model.messageCount; i++)
+            if (run[i] === run[m] && ((sender[i] === one && receiver[i] === other) || (sender[i] === other && receiver[i] === one))) found.push(i);
+          return found;
+        } },
+        shown: { name: "shown", every: () => Array.from({ length: filter.length }, (_, row) => filter.at(row)) },
+      };
+    }
+
+    async save(m, scope, format, told) {
+      const { name, every } = this.scopes(m)[scope];
+      const messages = every();
+      const parts = [];
+      let text = "";
+      for (let i = 0; i < messages.length; i++) {
+        const detail = await this.texts.detail(messages[i]);
+        if (format === "acl") text += `${detail.acl}\n`;
+        else if (scope === "message") text += `${JSON.stringify(this.entry(messages[i], detail), null, 2)}\n`;
+        else text += `${JSON.stringify(this.entry(messages[i], detail))}\n`;
+        if (text.length < 1 << 20) continue;
+        parts.push(text);
+        text = "";
+        told(`${Sniffer.count(i + 1)} of ${Sniffer.many(messages.length, "message")}`);
+      }
+      parts.push(text);
+      const ending = format === "acl" ? "acl" : scope === "message" ? "json" : "jsonl";
+      download(parts, "text/plain;charset=utf-8", nameOfFile(`${this.model.about.team}-${name}.${ending}`));
+      told(`Saved ${Sniffer.many(messages.length, "message")}`);
+    }
+
+    panel(m) {
+      const { make } = Sniffer;
+      const { sender, receiver } = this.model.messages;
+      const scope = make("select", { "aria-label": "What is saved" },
+        make("option", { value: "message" }, "this message"),
+        make("option", { value: "pair" }, `${this.model.nameOf(sender[m])} with ${this.model.nameOf(receiver[m])}`),
+        make("option", { value: "shown" }, "all that is shown"));
+      const news = make("span", { class: "soft", role: "status" });
+      const button = (format, text) => make("button", { type: "button", onclick: () => {
+        this.save(m, scope.value, format, (told) => (news.textContent = told))
+          .catch((trouble) => (news.textContent = `This could not be saved: ${trouble.message}`));
+      } }, text);
+      return make("section", {},
+        make("h3", {}, "Save"),
+        make("div", { class: "buttons" }, scope, button("acl", "ACL text"), button("json", "JSON"),
+          this.journal ? make("a", { class: "button", href: this.journal, download: "" }, "Whole journal") : null),
+        news);
+    }
+  };
+})();

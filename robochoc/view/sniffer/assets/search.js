@@ -1,0 +1,94 @@
+"use strict";
+/* Text search through what messages say. Words are made by the feed on demand, a thousand messages at a time, so a
+   search goes through them in the background, from where the user looks, and can be given up. */
+(() => {
+  const CHUNK = 1024;
+
+  Sniffer.CHUNK = CHUNK;
+
+  Sniffer.Search = class {
+    constructor(model, source, told) {
+      Object.assign(this, { model, source, told });
+      this.clear();
+    }
+
+    clear() {
+      this.query = "";
+      this.hits = []; // messages, in order
+      this.marks = new Set();
+      this.looked = 0;
+      this.running = false;
+      this.trouble = "";
+      this._searched = new Map(); // chunk -> how many of its messages
+      this._turn = (this._turn || 0) + 1;
+    }
+
+    /* Begins anew where the query is another one; goes on where messages have come since. */
+    async find(query, near = 0) {
+      const wanted = query.trim().toLowerCase();
+      if (wanted !== this.query) {
+        this.clear();
+        this.query = wanted;
+      }
+      if (!wanted || this.running) return this.told();
+      const turn = this._turn;
+      this.running = true;
+      this.told();
+      try {
+        await this._through(turn, Math.max(near, 0) >> 10);
+      } catch (trouble) {
+        if (turn === this._turn) this.trouble = trouble.message;
+      }
+      if (turn !== this._turn) return undefined;
+      this.running = false;
+      return this.told();
+    }
+
+    async _through(turn, first) {
+      const chunks = Math.ceil(this.model.messageCount / CHUNK);
+      for (let i = 0; i < chunks; i++) {
+        const chunk = (first + i) % chunks;
+        const there = Math.min(this.model.messageCount - chunk * CHUNK, CHUNK);
+        const before = this._searched.get(chunk) || 0;
+        if (before >= there) continue;
+        const details = await this.source.details(chunk, there);
+        if (turn !== this._turn) return;
+        const found = [];
+        for (let at = before; at < details.length; at++)
+          if (this._isHit(chunk * CHUNK + at, details[at])) found.push(chunk * CHUNK + at);
+        this._searched.set(chunk, details.length);
+        this.looked += details.length - before;
+        this._keep(found);
+        this.told(found.length > 0);
+      }
+    }
+
+    _isHit(message, detail) {
+      const { model } = this;
+      const names = `${model.nameOf(model.messages.sender[message])} ${model.nameOf(model.messages.receiver[message])}`;
+      const kind = model.kindOf(message);
+      return `${detail.words}\n${names}\n${kind.name} ${kind.performative}\n${JSON.stringify(detail.content)}`
+        .toLowerCase().includes(this.query);
+    }
+
+    _keep(found) {
+      if (!found.length) return;
+      for (const message of found) this.marks.add(message);
+      const at = Sniffer.lowerBound(this.hits, found[0]);
+      this.hits = this.hits.slice(0, at).concat(found, this.hits.slice(at));
+    }
+
+    /* The next hit after `message` that passes `shown` (before it: `step` -1), around the end; -1: none. */
+    next(message, step, shown) {
+      const { hits } = this;
+      if (!hits.length) return -1;
+      const at = Sniffer.lowerBound(hits, step > 0 ? message + 1 : message);
+      for (let i = 0; i < hits.length; i++) {
+        const place = step > 0 ? at + i : at - 1 - i;
+        const hit = hits[(((place % hits.length) + hits.length) % hits.length)];
+        if (shown(hit)) return hit;
+      }
+      return -1;
+    }
+  };
+})();

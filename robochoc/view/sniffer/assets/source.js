@@ -1,0 +1,124 @@
+"use strict";
+/* Where a page's answers come from: a server on this machine, or the page itself (an export that can be mailed). */
+(() => {
+  const KEPT = 24; // chunks of details, and of states, that are kept
+
+  /* Remembers the last few answers, lists that may have grown since: one that is shorter than `least`, or that failed,
+     is asked for again. */
+  const remembering = (ask) => {
+    const kept = new Map();
+    const asked = (key) => {
+      const answer = ask(key).catch((trouble) => (kept.delete(key), Promise.reject(trouble)));
+      kept.set(key, answer);
+      if (kept.size > KEPT) kept.delete(kept.keys().next().value);
+      return answer;
+    };
+    return async (key, least) => {
+      const old = kept.get(key);
+      if (!old) return asked(key);
+      kept.delete(key);
+      kept.set(key, old); // the last one used goes last
+      const list = await old;
+      return list.length >= least || kept.get(key) !== old ? list : asked(key);
+    };
+  };
+
+  class Answers {
+    constructor() {
+      const details = remembering((chunk) => this._details(chunk));
+      const states = remembering((key) => this._states(...key.split(":").map(Number)));
+      this.details = (chunk, least = 0) => details(chunk, least);
+      this.states = (robot, chunk, least = 0) => states(`${robot}:${chunk}`, least);
+    }
+  }
+
+  Sniffer.Served = class extends Answers {
+    constructor(base = ".") {
+      super();
+      this.base = base;
+      this.span = 1 << 16; // messages or steps a request: 2 MB, so that the first picture comes at once
+    }
+
+    async _get(what) {
+      const answer = await fetch(`${this.base}/${what}`, { cache: "no-store" });
+      if (!answer.ok) throw new Error((await answer.text()) || `the server says ${answer.status}`);
+      return answer;
+    }
+
+    async _json(what) {
+      return (await this._get(what)).json();
+    }
+
+    async _bytes(what) {
+      return (await this._get(what)).arrayBuffer();
+    }
+
+    about() { return this._json("about"); }
+    columns(from, to) { return this._bytes(`columns?from=${from}&to=${to}`); }
+    steps(from, to) { return this._bytes(`steps?from=${from}&to=${to}`); }
+    decisions(from, to) { return this._json(`decisions?from=${from}&to=${to}`); }
+    _details(chunk) { return this._json(`details?chunk=${chunk}`); }
+    _states(robot, chunk) { return this._json(`states?robot=${robot}&chunk=${chunk}`); }
+    scene(from = 0) { return this._json(`scene?from=${from}`); }
+
+    /* The address of the journal's file, where the server has one. */
+    async journal() {
+      try {
+        const answer = await fetch(`${this.base}/journal`, { method: "HEAD" });
+        return answer.ok ? `${this.base}/journal` : null;
+      } catch {
+        return null;
+      }
+    }
+
+    /* `news(about's small fields)` as the run goes on; `gone()` when the server has ended. */
+    onNews(news, gone) {
+      const address = new URL(`${this.base}/news`, location.href);
+      address.protocol = address.protocol.replace("http", "ws");
+      const socket = new WebSocket(address);
+      let over = false;
+      socket.addEventListener("message", (event) => {
+        const told = JSON.parse(event.data);
+        over = told.over;
+        news(told);
+      });
+      socket.addEventListener("close", () => gone(over));
+    }
+  };
+
+  /* The same answers, as base64 of zlib's bytes, in `<script type="application/octet-stream" id="feed:...">`. */
+  Sniffer.Embedded = class extends Answers {
+    constructor() {
+      super();
+      this.span = Infinity; // columns are there as a whole
+    }
+
+    static here() {
+      return document.getElementById("feed:about") !== null;
+    }
+
+    async _bytes(name) {
+      const element = document.getElementById("feed:" + name);
+      if (!element) throw new Error("this page was made without them");
+      const packed = Uint8Array.from(atob(element.textContent.trim()), (sign) => sign.charCodeAt(0));
+      const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+      return new Response(stream).arrayBuffer();
+    }
+
+    async _json(name) {
+      return JSON.parse(new TextDecoder().decode(await this._bytes(name)));
+    }
+
+    about() { return this._json("about"); }
+    columns() { return this._bytes("columns"); }
+    steps() { return this._bytes("steps"); }
+    decisions() { return this._json("decisions"); }
+    _details(chunk) { return this._json(`details:${chunk}`); }
+    _states(robot, chunk) { return this._json(`states:${robot}:${chunk}`); }
+    scene() { return this._json("scene"); }
+    async journal() { return null; }
+    onNews() {}
+  };
+
+  Sniffer.source = () => (Sniffer.Embedded.here() ? new Sniffer.Embedded() : new Sniffer.Served());
+})();

@@ -1,0 +1,113 @@
+"use strict";
+/* One robot at the moment: what it knows, which values it has left and why, what it does in this step, and whether it
+   changes its mind. */
+(() => {
+  const CHUNK = 64;
+  const MOST = 200; // entries of a list
+
+  Sniffer.StatePane = class {
+    constructor(model, view, source, told) {
+      Object.assign(this, { model, view, source, told });
+      this.element = Sniffer.byId("robot");
+      this._turn = 0;
+    }
+
+    paint() {
+      const { view, model } = this;
+      const { robot } = view;
+      if (robot < 0 || robot >= model.ownSteps.length) {
+        this._key = "";
+        Sniffer.fill(this.element, Sniffer.make("p", { class: "hint" },
+          "Choose a robot: press its name above its lifeline. Its agent view, domain and nogoods at the moment then stand here."));
+        return;
+      }
+      const own = model.ownStepAt(robot, view.moment);
+      const key = `${robot}|${own}|${model.whole}|${Sniffer.palette.dark}|${own < model.ownSteps[robot].length - 1}`;
+      if (key === this._key) return;
+      this._key = key;
+      this._show(robot, own);
+    }
+
+    _show(robot, own) {
+      const { make, count } = Sniffer;
+      const { model, told } = this;
+      const steps = model.ownSteps[robot];
+      const step = own >= 0 ? steps.all[own] : -1;
+      const go = (to, text) => make("button", { type: "button", disabled: to < 0 || to >= steps.length, onclick: () => told.step(steps.all[to]) }, text);
+      const changes = model.decided[robot].step;
+      const change = Sniffer.lowerBound(changes.all, step, changes.length);
+      const next = changes.all[change] === step && change < changes.length ? change + 1 : change;
+      const mind = (at, text) => make("button", { type: "button", disabled: at < 0 || at >= changes.length, onclick: () => told.step(changes.all[at]) }, text);
+      const held = this.element.contains(document.activeElement) ? document.activeElement.textContent : "";
+      this.state = make("div", { class: "state" }, make("p", { class: "soft" }, "…"));
+      const variables = (model.about.robots[robot] || {}).variables || [];
+      Sniffer.fill(this.element,
+        make("h2", {}, model.nameOf(robot)),
+        make("p", { class: "value" }, own < 0 ? "has not begun" : model.valueAt(robot, step) || "no value"),
+        make("p", { class: "soft" }, own < 0 ? variables.join(", ")
+          : `its step ${count(own + 1)} of ${count(steps.length)}; step ${count(step)} of all, t = ${Sniffer.moment(model.steps.t[step])}`),
+        make("div", { class: "buttons" }, go(own - 1, "‹ Step"), go(own + 1, "Step ›"),
+          mind(change - 1, "‹ Value"), mind(next, "Value ›")),
+        this.state,
+        ...(own < 0 ? [] : this._doing(step)));
+      if (held) {
+        const again = [...this.element.querySelectorAll("button")].find((button) => button.textContent === held && !button.disabled);
+        if (again) again.focus({ preventScroll: true });
+      }
+      this._states(robot, own);
+    }
+
+    /* What the columns tell of a step: it stands here with replay and without. */
+    _doing(step) {
+      const { make } = Sniffer;
+      const { model, told } = this;
+      return [
+        make("h3", {}, "Took in"), Sniffer.links(model, model.packetOf(step), told, "nothing: this is how it began"),
+        make("h3", {}, "Said"), Sniffer.links(model, model.saidIn(step), told, "nothing"),
+        make("h3", {}, "Counters"),
+        Sniffer.facts([["NCCC clock", Sniffer.count(model.steps.clock[step])], ["Constraint checks", Sniffer.count(model.steps.checks[step])]]),
+      ];
+    }
+
+    async _states(robot, own) {
+      const turn = ++this._turn;
+      const { make } = Sniffer;
+      const target = this.state;
+      const { replay } = this.model.about;
+      if (own < 0) return void Sniffer.fill(target);
+      if (replay) return void Sniffer.fill(target, make("p", { class: "notice" }, `What it knew cannot be worked out: ${replay}`));
+      try {
+        const states = await this.source.states(robot, Math.floor(own / CHUNK), (own % CHUNK) + 1);
+        if (turn !== this._turn) return undefined;
+        const state = states[own % CHUNK];
+        if (!state) Sniffer.fill(target, make("p", { class: "soft" }, "What it knew after this step has not been worked out yet."));
+        else this._fill(target, state);
+      } catch (trouble) {
+        if (turn === this._turn) Sniffer.fill(target, make("p", { class: "notice" }, `What it knew cannot be had: ${trouble.message}`));
+      }
+      return undefined;
+    }
+
+    _fill(target, state) {
+      const { make } = Sniffer;
+      const list = (entries, none, entry) => (entries.length
+        ? make("ul", { class: "knows" }, ...entries.slice(0, MOST).map(entry),
+          entries.length > MOST ? make("li", { class: "soft" }, `and ${Sniffer.count(entries.length - MOST)} more`) : null)
+        : make("p", { class: "soft" }, none));
+      const why = [state.why || []].flat();
+      const left = state.domain.filter((value) => !value.ruled_out_by).length;
+      Sniffer.fill(target,
+        why.length ? make("div", { class: "why" }, make("h3", {}, "Why"), make("ul", {}, ...why.slice(0, MOST).map((reason) => make("li", {}, reason)))) : null,
+        make("h3", {}, "Agent view"),
+        state.view.length ? Sniffer.facts(state.view.map(([who, text]) => [who, text || "–"])) : make("p", { class: "soft" }, "It knows of nobody's value."),
+        make("h3", {}, `Domain, ${Sniffer.count(left)} of ${Sniffer.count(state.domain.length)} left`),
+        list(state.domain, "none", (value) => make("li", { class: value.ruled_out_by ? "out" : "left" },
+          make("b", {}, value.ruled_out_by ? make("s", {}, value.value) : value.value),
+          value.ruled_out_by ? make("span", {}, ` ruled out by ${value.ruled_out_by}`) : null)),
+        make("h3", {}, `Stored nogoods, ${Sniffer.count(state.nogoods.length)}`),
+        list(state.nogoods, "none", (nogood) => make("li", {}, nogood)),
+        Object.keys(state.more).length ? make("h3", {}, "Besides") : null,
+        Object.keys(state.more).length ? Sniffer.facts(Object.entries(state.more)) : null);
+    }
+  };
+})();

@@ -1,0 +1,32 @@
+"""Answers that took some work, kept as long as there is room."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Hashable
+
+
+class Cache:
+    """The answers that were asked for last, of `most` bytes together."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._held = 0
+        self._answers: OrderedDict[Hashable, bytes] = OrderedDict()
+
+    def get(self, key: Hashable) -> bytes | None:
+        """The answer, if it is kept."""
+        if key not in self._answers:
+            return None
+        self._answers.move_to_end(key)
+        return self._answers[key]
+
+    def put(self, key: Hashable, answer: bytes) -> bytes:
+        """Keep `answer`, unless it takes all the room; and return it."""
+        self._held -= len(self._answers.pop(key, b""))
+        if len(answer) < self._most:
+            self._answers[key] = answer
+            self._held += len(answer)
+        while self._held > self._most:
+            self._held -= len(self._answers.popitem(last=False)[1])
+        return answer

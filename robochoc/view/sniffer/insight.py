@@ -1,0 +1,110 @@
+"""What robots knew after each of their steps, in chunks, from the journal's file.
+
+A robot is played again with what it was told. Its events are read from the file when somebody asks, those of the
+other robots are not kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from io import BufferedReader
+from itertools import islice
+from typing import NamedTuple
+
+import msgspec
+
+from robochoc.observers.events import AnyEvent, Began, Concluded, Decided, Given, Heard, Received, Sent, Settled
+from robochoc.observers.journal import Ended, Follower, Header
+from robochoc.replay import CannotReplay
+from robochoc.replay.insight import states_of
+from robochoc.view.sniffer.cache import Cache
+from robochoc.view.sniffer.feed import STATES, BadRequest
+from robochoc.view.sniffer.following import entries_of
+from robochoc.view.sniffer.window import Window
+
+MOST_EVENTS = 1_000_000
+"""Of one robot: some hundred MB."""
+_KEPT_BYTES = 1 << 26
+
+
+class _Playing(NamedTuple):
+    robot: str
+    size: int
+    """How long the file was."""
+    states: Iterator[object]
+
+
+class Insight:
+    """Plays the robot again that was asked about last, and keeps what it has shown."""
+
+    def __init__(self) -> None:
+        self._cache = Cache(_KEPT_BYTES)
+        self._playing: _Playing | None = None
+        self._next = 0
+        self.stopped = False
+
+    def chunk(self, window: Window, robot: str, number: int, *, final: bool) -> bytes:
+        """The states after the steps of chunk `number`, as JSON; `[]` past the last one. Raises `BadRequest`.
+
+        `window` is not touched; the file is read up to its present end. What is kept is what is `final`: in mid-run
+        something may be missing yet of what a robot was told.
+        """
+        kept = self._cache.get((robot, number))
+        if kept is not None:
+            return kept
+        playing = self._playing
+        if playing is None or playing.robot != robot or number < self._next or playing.size != window.end:
+            try:
+                playing = _Playing(robot, window.end, iter(states_of(self._events(window, robot), robot)))
+            except CannotReplay as reason:
+                raise BadRequest(str(reason)) from reason
+            self._playing, self._next = playing, 0
+        answer = b"[]"
+        while self._next <= number and not self.stopped:
+            try:
+                states = list(islice(playing.states, STATES))
+            except CannotReplay as reason:
+                raise BadRequest(str(reason)) from reason
+            answer = msgspec.json.encode(states)
+            if len(states) < STATES:
+                self._playing = None
+                return answer if self._next == number else b"[]"
+            if final:
+                self._cache.put((robot, self._next), answer)
+            self._next += 1
+        return answer
+
+    def _events(self, window: Window, robot: str) -> Iterator[AnyEvent]:
+        """What concerns `robot`, each run's in the order of their times."""
+        here = window.again()
+        follower = Follower(BufferedReader(here))
+        run: list[AnyEvent] = []
+        count = 0
+        while not self.stopped and (lines := entries_of(follower, here, window.end)):
+            for line in lines:
+                if isinstance(line, Header | Ended) or not _concerns(line, robot):
+                    continue
+                count += 1
+                if count > MOST_EVENTS:
+                    raise BadRequest(f"{robot} has done too much to be played again here (see robochoc replay)")
+                if isinstance(line, Began):
+                    yield from sorted(run, key=_time)
+                    run.clear()
+                run.append(line)
+        yield from sorted(run, key=_time)
+
+
+def _time(event: AnyEvent) -> float:
+    return event.t
+
+
+def _concerns(event: AnyEvent, robot: str) -> bool:
+    match event:
+        case Sent():
+            return robot in {event.sender, event.receiver}
+        case Received():
+            return event.receiver == robot
+        case Decided() | Heard() | Settled() | Concluded():
+            return event.robot == robot
+        case _:
+            return isinstance(event, Began | Given)

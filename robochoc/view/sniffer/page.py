@@ -1,0 +1,66 @@
+"""The sniffer's page: its document, style and scripts (`assets/`) joined into one, with meshcat's viewer.
+
+Served, it asks the server that it came from for what it shows; embedded, all of that stands in it, and it opens from
+a file, anywhere. Its scripts are classic ones, each adding to one object `Sniffer`: `model.js` makes it, `main.js`
+begins, and between them the others stand by their names, as they name each other when they are called, not before.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from html import escape
+from importlib.resources import files
+from typing import Literal
+
+from robochoc.view.label import printable
+from robochoc.view.policy import policy
+from robochoc.view.script import viewer_script
+
+Mode = Literal["served", "embedded"]
+
+_FIRST, _LAST = "model.js", "main.js"
+_TITLE = "<title>Sniffer</title>"
+"""Of the document, until something has one."""
+
+
+def page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title: str = "Sniffer") -> bytes:
+    """The page, UTF-8. The same answers make the same page.
+
+    `embedded` are the feed's answers by name (`columns`, `details:0`), zlib-compressed: their names are ours, what
+    they hold is strangers'. `title` is plain text, of anybody's. Meshcat's viewer, a megabyte, is left out of an
+    embedded page without a `scene`.
+    """
+    answers = embedded or {}
+    connections = "'self'" if mode == "served" else "'none'"
+    scripts = [_asset(name) for name in _scripts()]
+    if mode == "served" or "scene" in answers:
+        scripts.append(viewer_script())  # the last: the page need not wait until it has been read
+    head = (
+        f'<meta http-equiv="Content-Security-Policy" content="{policy(scripts, connections)}">\n'
+        f'<link rel="icon" href="data:,">\n<style>\n{_asset("style.css")}</style>\n'
+    )
+    body = [_block(name, content) for name, content in answers.items()] + [_script(script) for script in scripts]
+    before, _, after = _asset("index.html").partition(_TITLE)
+    top, _, middle = after.partition("</head>")
+    document = [before, f"<title>{escape(printable(title))}</title>", top, head, "</head>"]
+    return "".join([*document, middle.replace("</body>", "\n".join([*body, "</body>"]))]).encode()
+
+
+def _script(script: str) -> str:
+    return f"<script>{script}</script>"
+
+
+def _block(name: str, content: bytes) -> str:
+    """An answer of the feed as a script that no browser runs."""
+    text = base64.b64encode(content).decode()
+    return f'<script id="feed:{escape(name)}" type="application/octet-stream">{text}</script>'
+
+
+def _scripts() -> list[str]:
+    names = sorted(entry.name for entry in (files(__package__) / "assets").iterdir() if entry.name.endswith(".js"))
+    return [_FIRST, *(name for name in names if name not in {_FIRST, _LAST}), _LAST]
+
+
+def _asset(name: str) -> str:
+    return (files(__package__) / "assets" / name).read_text(encoding="utf-8")
