@@ -23,6 +23,7 @@ from robochoc.communication.network.local import LOOPBACK
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.post import Post
+from robochoc.communication.network.publication import Publication
 from robochoc.communication.network.robot import Ending, Manner, NetworkRobot
 from robochoc.communication.network.words import Word
 from robochoc.communication.run_result import RunResult
@@ -67,6 +68,7 @@ class NetworkRun:
         absent: Iterable[str] = (),
         through: str = "",
         seconds: float | None = 60,
+        publication: Publication | None = None,
     ) -> None:
         self.team = team
         self.household = Household(team.order)
@@ -78,6 +80,7 @@ class NetworkRun:
         self.threads: dict[str, threading.Thread] = {}
         self.conditions = conditions
         self._seconds = seconds
+        self._publication = publication
         self._absent = set(absent)
         self._through = through
         self._gate = folder / "go"
@@ -91,6 +94,8 @@ class NetworkRun:
         master = Master(
             self.household, identity, endpoint, members, self.conditions, observer=self.events.append, watched=True
         )
+        if self._publication:
+            master.publish(self._publication)
         self.master = self._stack.enter_context(master)
         self.endpoint = endpoint
         self._search = threading.Thread(target=self._run)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from problems import random_team
 from sparse_teams import profiles_of, sparse_team
 
-from robochoc.communication.network.access import ALL, access_control, letter_key, life_key, name_in
+from robochoc.communication.network.access import ALL, access_control, journal_key, letter_key, life_key, name_in
 from robochoc.communication.network.letters import MASTER
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.profile import acquaintances
@@ -171,6 +171,24 @@ def test_rules_name_everybody_once() -> None:
 def test_names_in_keys() -> None:
     assert name_in(letter_key("R1", "R2.1")) == "R2.1"
     assert name_in(life_key("R2.1")) == "R2.1"
+    assert name_in(journal_key("R2.1")) == "R2.1"
+
+
+@pytest.mark.parametrize("sniffers", [None, (), ("R1",), ("R1", "r2")])
+def test_who_may_sniff_asks_in_its_own_name_and_the_master_alone_answers(sniffers: tuple[str, ...] | None) -> None:
+    control = access_control(dict.fromkeys(NAMES, (ALL,)), sniffers)
+    for who, other in itertools.product(EVERYBODY, repeat=2):
+        key = journal_key(other)
+        asks = who == other and who in (sniffers or ())
+        answers = who == MASTER and sniffers is not None
+        assert allows(control, who, "ingress", "query", key) is asks
+        assert allows(control, who, "egress", "reply", key) is asks
+        assert allows(control, who, "egress", "query", key) is answers
+        assert allows(control, who, "ingress", "reply", key) is answers
+        assert allows(control, who, "ingress", "declare_queryable", key) is answers
+        assert not allows(control, who, "ingress", "put", key)
+        assert not allows(control, who, "ingress", "declare_subscriber", key)
+    assert not any(allows(control, who, "ingress", "query", journal_key(ALL)) for who in EVERYBODY)
 
 
 @given(seed=st.integers(0, 2**32), make=st.sampled_from([lambda s: random_team(Random(s)), sparse_team]))

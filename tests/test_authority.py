@@ -39,7 +39,7 @@ from robochoc.authority.certificates import (
 )
 from robochoc.authority.events import Granted, Refused
 from robochoc.authority.identity import BadIdentity, Identity, save
-from robochoc.authority.registry import BadAuthority, Role, State
+from robochoc.authority.registry import BadAuthority, Right, Role, State
 from robochoc.authority.token import BadToken, Token
 
 ENROLLER = """
@@ -273,6 +273,23 @@ def test_revocation_takes_an_unused_token_as_well(authority: Authority) -> None:
     authority.revoke("A")
     with pytest.raises(NotGranted, match="unknown"):
         authority.redeem(token.secret, signing_request(new_key(), "A"))
+
+
+def test_rights_are_given_by_enrolment_renewed_and_revoked_with_the_name(authority: Authority, tmp_path: Path) -> None:
+    identity_of(authority, "A", tmp_path / "a")
+    assert authority.names(right=Right.SNIFF) == ()
+    token = authority.enrol("A", may=[Right.SNIFF])
+    assert authority.names(right=Right.SNIFF) == ("A",)  # at once, as it has a certificate
+    key = new_key()
+    current = read_certificate(authority.redeem(token.secret, signing_request(key, "A")))
+    authority.renew(signing_request(key, "A"), current)
+    assert authority.names(right=Right.SNIFF) == authority.names(Role.ROBOT, Right.SNIFF) == ("A",)
+    assert authority.names(Role.OBSERVER, Right.SNIFF) == ()
+    authority.revoke("A")
+    assert authority.names(right=Right.SNIFF) == ()
+    again = authority.enrol("A")
+    authority.redeem(again.secret, signing_request(new_key(), "A"))
+    assert (authority.names(), authority.names(right=Right.SNIFF)) == (("A",), ())
 
 
 def test_who_is_readmitted_stays_out_until_the_token_is_shown_and_old_certificates_stay_revoked(

@@ -94,9 +94,26 @@ def test_the_table(folder: Path) -> None:
     say(folder, "enrol", "Robot1.1", "A" * 64)
     say(folder, "revoke", "Robot1.1")
     heading, *rows = say(folder, "list").stdout.splitlines()
-    assert heading.split() == ["name", "role", "state", "expires", "(UTC)"]
-    assert rows[0].split()[:3] == ["A" * 64, "robot", "invited"]
-    assert rows[1].split() == ["Robot1.1", "robot", "revoked", "-"]
+    assert heading.split() == ["name", "role", "may", "state", "expires", "(UTC)"]
+    assert rows[0].split()[:4] == ["A" * 64, "robot", "-", "invited"]
+    assert rows[1].split() == ["Robot1.1", "robot", "-", "revoked", "-"]
+
+
+def test_who_may_sniff(folder: Path) -> None:
+    def rights() -> dict[str, list[str]]:
+        rows = (json.loads(line) for line in say(folder, "list", "--json").stdout.splitlines())
+        return {row["name"]: row["may"] for row in rows}
+
+    say(folder, "enrol", "Robot1.1")
+    say(folder, "enrol", "Eye", "--role", "observer", "--may", "sniff")
+    assert rights() == {"Eye": ["sniff"], "Robot1.1": []}
+    assert say(folder, "list").stdout.splitlines()[1].split()[:4] == ["Eye", "observer", "sniff", "invited"]
+    say(folder, "revoke", "Eye")
+    assert rights()["Eye"] == []
+    say(folder, "enrol", "Robot1.1", "Eye", "--may", "sniff")
+    assert rights() == {"Eye": ["sniff"], "Robot1.1": ["sniff"]}
+    say(folder, "enrol", "Robot1.1")
+    assert rights()["Robot1.1"] == []
 
 
 def test_revoked_and_readmitted(folder: Path) -> None:
@@ -116,6 +133,7 @@ def test_revoked_and_readmitted(folder: Path) -> None:
         (["enrol", "A\x1b[2J"], 2, r"\x1b"),
         (["enrol", "Good", "MASTER"], 2, "MASTER"),
         (["enrol", "A", "--role", "master"], 2, "--role"),
+        (["enrol", "A", "--may", "fly"], 2, "--may"),
         (["enrol", "A", "--token-ttl", "0"], 2, "--token-ttl"),
         (["enrol", "A", "--token-ttl", "nan"], 2, "--token-ttl"),
         (["enrol", "--team", "/no/such/folder"], 1, "does not exist"),

@@ -22,6 +22,8 @@ from robochoc.communication.network.words import (
     Leave,
     Register,
     Said,
+    Sniff,
+    Sniffable,
     Task,
     Told,
     ToMaster,
@@ -34,7 +36,7 @@ from robochoc.observers.events import Received
 from robochoc.problem import Kind
 
 PROFILE = Profile("R1", Kind.DISCSP, ("R0",), (), {"X": ((1, 3), (5, 5))}, {}, 1, 0, ("/R1/goal",))
-OUTSIDE = (Register, Welcome, Denied, Ask, Told)
+OUTSIDE = (Register, Welcome, Denied, Ask, Told, Sniff, Sniffable)
 WORDS = get_args(ToMaster), get_args(ToRobot), get_args(ToPeer)
 
 

@@ -90,7 +90,7 @@ def test_what_robots_keep_to_themselves(site: Site) -> None:
     said = {name: robot.output.rpartition(" = ")[2].strip() for name, robot in robots.items()}
     assert set(said.values()) == {"1", "2"}, said
     written_down = {entry["event"] for entry in entries_of(journal)}
-    assert written_down == {"Journal", "Granted", "Registered", "Ended"}
+    assert written_down == {"Journal", "Granted", "Registered", "Began", "Ended"}
 
 
 def test_a_robot_comes_back_while_others_are_awaited(site: Site) -> None:

@@ -10,7 +10,7 @@ from typing import Protocol
 
 from robochoc.authority.certificates import MASTER, ca_certificate, leaf_certificate, moment, new_key
 from robochoc.authority.identity import Identity
-from robochoc.authority.registry import Role
+from robochoc.authority.registry import Right, Role
 
 _LIFETIME = timedelta(hours=24)
 
@@ -18,8 +18,8 @@ _LIFETIME = timedelta(hours=24)
 class Admission(Protocol):
     """Who may take part, and who may not any more. `Authority` is one."""
 
-    def names(self, role: Role | None = None) -> tuple[str, ...]:
-        """Who has a certificate in force now (in the role `role`), sorted."""
+    def names(self, role: Role | None = None, right: Right | None = None) -> tuple[str, ...]:
+        """Who has a certificate in force now (in the role `role`, with the right `right`), sorted."""
 
     def is_revoked(self, who: str | int) -> bool:
         """Whether `who` is to be turned away."""
@@ -34,6 +34,7 @@ class Household:
         self._certificate = ca_certificate(self._key, moment(self._now))
         self._robots = tuple(sorted(robots))
         self._turned_away: set[str] = set()
+        self._sniffers: set[str] = set()
 
     def identity(self, name: str) -> Identity:
         """A new identity of the robot `name`."""
@@ -43,17 +44,19 @@ class Household:
         """A new identity of the master, who is reached at `hosts`."""
         return self._identity(MASTER, hosts)
 
-    def names(self, role: Role | None = None) -> tuple[str, ...]:
-        """All robots that were not revoked."""
-        return tuple(n for n in self._robots if n not in self._turned_away) if role in {None, Role.ROBOT} else ()
+    def names(self, role: Role | None = None, right: Right | None = None) -> tuple[str, ...]:
+        """All robots that were not revoked; of these, who has the right."""
+        there = tuple(n for n in self._robots if n not in self._turned_away) if role in {None, Role.ROBOT} else ()
+        return there if right is None else tuple(n for n in there if n in self._sniffers)
 
     def is_revoked(self, who: str | int) -> bool:
         """Whether `who` is none of the household, or was revoked."""
         return who not in self._robots or who in self._turned_away
 
-    def enrol(self, name: str) -> None:
-        """Let `name` take part from now on, as well."""
+    def enrol(self, name: str, *, sniffs: bool = False) -> None:
+        """Let `name` take part from now on, as well; and have the right to sniff, or not."""
         self._turned_away.discard(name)
+        (self._sniffers.add if sniffs else self._sniffers.discard)(name)
         self._robots = tuple(sorted({*self._robots, name}))
 
     def revoke(self, name: str) -> None:

@@ -42,6 +42,7 @@ from robochoc.authority.registry import (
     Issued,
     Member,
     Registry,
+    Right,
     Role,
     locked,
 )
@@ -146,18 +147,26 @@ class Authority:
             raise BadAuthority(f"the Authority in {folder} has expired, or the clock is wrong")
         return cls(folder, key, certificate, observer=observer, clock=clock, lifetime=lifetime)
 
-    def enrol(self, name: str, role: Role = Role.ROBOT, ttl: timedelta = TOKEN_LIFETIME) -> Token:
+    def enrol(
+        self, name: str, role: Role = Role.ROBOT, ttl: timedelta = TOKEN_LIFETIME, may: Iterable[Right] = ()
+    ) -> Token:
         """A token for `name`, which works once, within `ttl`. See `enrol_all`."""
-        return self.enrol_all([name], role, ttl)[name]
+        return self.enrol_all([name], role, ttl, may)[name]
 
     def enrol_all(
-        self, names: Iterable[str], role: Role = Role.ROBOT, ttl: timedelta = TOKEN_LIFETIME
+        self,
+        names: Iterable[str],
+        role: Role = Role.ROBOT,
+        ttl: timedelta = TOKEN_LIFETIME,
+        may: Iterable[Right] = (),
     ) -> dict[str, Token]:
         """A token for each of `names`, or for none of them. Raises `BadName`.
 
         A name that is enrolled gets a new token as well; when that is redeemed, its certificates so far are revoked:
-        a name has one key. One that was revoked is readmitted then.
+        a name has one key. One that was revoked is readmitted then. The role, and the rights that it has from now on
+        (`may`, and no others), hold at once.
         """
+        rights = tuple(sorted(set(may)))
         names = list(names)
         for name in names:
             check_name(name, role)
@@ -166,7 +175,7 @@ class Authority:
             for name, token in tokens.items():
                 invitation = Invitation(digest(token.secret), self.clock() + ttl.total_seconds())
                 member = members.get(name) or Member(name, role)
-                members[name] = msgspec.structs.replace(member, role=role, invitation=invitation)
+                members[name] = msgspec.structs.replace(member, role=role, invitation=invitation, may=rights)
         return tokens
 
     def redeem(self, secret: bytes, request: bytes, origin: str = "") -> bytes:
@@ -194,6 +203,7 @@ class Authority:
                 msgspec.structs.replace(member.invitation, used=True),
                 (issued,),
                 (*member.withdrawn, *member.certificates),
+                may=member.may,
             ).since(now)
         self.report(Granted(t=now, who=name, what=what, origin=origin))
         return certificate
@@ -242,7 +252,7 @@ class Authority:
             return Identity.load(place, now)
 
     def revoke(self, name: str) -> None:
-        """From now on nothing that `name` was given is good: neither certificates nor an unused token.
+        """From now on nothing that `name` was given is good: neither certificates nor an unused token, nor a right.
 
         Raises `UnknownName`, or `BadName` for the master: robots could not hear of it.
         """
@@ -267,14 +277,17 @@ class Authority:
         serial = f"{who:x}"
         return not any(one.serial == serial for member in members.values() for one in member.certificates)
 
-    def names(self, role: Role | None = None) -> tuple[str, ...]:
-        """Who has a certificate in force now (in the role `role`), sorted."""
+    def names(self, role: Role | None = None, right: Right | None = None) -> tuple[str, ...]:
+        """Who has a certificate in force now (in the role `role`, with the right `right`), sorted."""
         now = self.clock()
         return tuple(
             sorted(
                 member.name
                 for member in self.members()
-                if not member.revoked and role in (None, member.role) and member.since(now).certificates
+                if not member.revoked
+                and role in (None, member.role)
+                and right in (None, *member.may)
+                and member.since(now).certificates
             )
         )
 

@@ -35,6 +35,12 @@ class Role(StrEnum):
     MASTER = "master"
 
 
+class Right(StrEnum):
+    """What a name may besides taking part in its role. Nobody has a right that was not given."""
+
+    SNIFF = "sniff"  # follow runs: have the master's journal, with what robots say to each other
+
+
 class State(StrEnum):
     """How it stands with a name."""
 
@@ -70,6 +76,7 @@ class Member(msgspec.Struct, frozen=True):
     withdrawn: tuple[Issued, ...] = ()
     """Revoked, or replaced by those of a new key."""
     revoked: bool = False
+    may: tuple[Right, ...] = ()
 
     def state(self, now: float) -> State:
         """How it stands with this name at Unix time `now`."""

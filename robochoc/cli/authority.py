@@ -74,6 +74,13 @@ def init(folder: Path | None) -> None:
     help="What the names take part as.",
 )
 @click.option(
+    "--may",
+    type=click.Choice(["sniff"]),
+    multiple=True,
+    metavar="sniff",
+    help="A right besides: sniff, to follow runs (robochoc sniff). Without it the names do not have it (any more).",
+)
+@click.option(
     "--token-ttl",
     "hours",
     type=float,
@@ -87,12 +94,20 @@ def init(folder: Path | None) -> None:
 @_folder_option
 @invalid_input_fails
 def enrol(
-    names: tuple[str, ...], team: Path | None, role: str, hours: float, folder: Path | None, *, as_json: bool
+    names: tuple[str, ...],
+    team: Path | None,
+    folder: Path | None,
+    *,
+    as_json: bool,
+    role: str,
+    may: tuple[str, ...],
+    hours: float,
 ) -> None:
     """Give each NAME a token, and print both, a line a name.
 
     Carry each token to its robot: it works once. A name that is enrolled already can be enrolled again, for a robot
-    that has lost its key, or was revoked: when it shows the new token, its certificates so far are revoked.
+    that has lost its key, or was revoked: when it shows the new token, its certificates so far are revoked. Its role
+    and its rights change at once.
     """
     if team:
         from robochoc.formats import robot_names
@@ -101,9 +116,9 @@ def enrol(
     if not names:
         raise Failure(USAGE, "nobody to enrol: give names, or --team DIR")
     with _failures_told(), _opened(folder) as found:
-        from robochoc.authority.registry import Role
+        from robochoc.authority.registry import Right, Role
 
-        tokens = found.enrol_all(names, Role(role), timedelta(hours=hours))
+        tokens = found.enrol_all(names, Role(role), timedelta(hours=hours), map(Right, may))
     if as_json:
         import msgspec
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,10 +17,12 @@ from robochoc.cli.recording import recording, shown_and_flushed
 from robochoc.cli.solve_settings import WITHDRAWALS, SolveCommand, protocol_settings
 
 if TYPE_CHECKING:
+    from robochoc.communication.network.publication import Publication
     from robochoc.machines.lead import Led, Plan
     from robochoc.machines.place import Place
     from robochoc.observers.events import AnyEvent
     from robochoc.observers.journal import Header, Recorder
+    from robochoc.outcome import Outcome
 
 
 @click.command(cls=SolveCommand, short_help="Lead a team whose robots are on machines of their own.")
@@ -96,6 +100,11 @@ if TYPE_CHECKING:
     metavar="FILE",
     help="Write down every event while the run goes on, in a compact file (docs/journal.md).",
 )
+@click.option(
+    "--sniffable",
+    is_flag=True,
+    help="Let those follow the run who may (authority enrol --may sniff): they say robochoc sniff --master.",
+)
 @click.pass_context
 def master(
     context: click.Context,
@@ -103,6 +112,7 @@ def master(
     *,
     as_json: bool,
     journal: Path | None,
+    sniffable: bool,
     authority: Path | None,
     team: Path | None,
     **given: Any,  # noqa: ANN401 - the fields of `Plan` and `Conditions`, by their names
@@ -122,8 +132,11 @@ def master(
             raise click.UsageError(f"--{option.removesuffix('_s')} takes a number of seconds, more than 0")
     with network_failures_told("master"):
         plan = _plan(authority, team, given)
-        with recording(journal, lambda: _header(plan)) as recorder:
-            led = _led(plan, recorder)
+        with (
+            _publication(sniffable=sniffable) as publication,
+            recording(journal, lambda: _header(plan), None, [publication.write] if publication else []) as recorder,
+        ):
+            led = _led(plan, recorder, publication)
             _tell(led, as_json=as_json)
     context.exit(LIMIT if led.outcome.verdict == "unknown" else 0)
 
@@ -159,10 +172,26 @@ def _plan(authority: Path | None, team: Path | None, given: dict[str, Any]) -> P
     )
 
 
-def _led(plan: Plan, recorder: Recorder | None) -> Led:
+@contextmanager
+def _publication(*, sniffable: bool) -> Iterator[Publication | None]:
+    """What those get who may sniff, in a file without a name, if they are to get anything."""
+    if not sniffable:
+        yield None
+        return
+    import tempfile
+
+    from robochoc.communication.network.publication import Publication
+
+    with tempfile.TemporaryFile(buffering=0) as file, closing(Publication(file.fileno())) as publication:
+        yield publication
+
+
+def _led(plan: Plan, recorder: Recorder | None, publication: Publication | None) -> Led:
     """The run, with whatever watches it."""
     from robochoc.machines.lead import lead
 
+    if recorder and publication:
+        publication.fresh = recorder.flush_if_due
     with progress_line(plan.name) as show:
         progress = shown_and_flushed(recorder, show)
 
@@ -174,11 +203,23 @@ def _led(plan: Plan, recorder: Recorder | None) -> Led:
         def listening() -> None:
             click.echo(f"listening at {plan.place}; robots say: --master {_address(plan.place)}", err=True)
 
-        led = lead(plan, observer=observe, watched=recorder is not None, progress=progress, listening=listening)
-        if recorder:
-            recorder.outcome = led.outcome
-            recorder.close()  # before anything else goes to where it may be written
-        return led
+        def concluded(outcome: Outcome | None) -> None:
+            if recorder:
+                recorder.outcome = outcome
+                recorder.close()  # before anything else goes to where it may be written
+            if publication:
+                publication.end()
+
+        watched = recorder is not None
+        return lead(
+            plan,
+            observer=observe,
+            watched=watched,
+            progress=progress,
+            listening=listening,
+            publication=publication,
+            concluded=concluded,
+        )
 
 
 def _tell(led: Led, *, as_json: bool) -> None:

@@ -42,7 +42,11 @@ if TYPE_CHECKING:
     metavar="SECONDS",
     help="How long the master may be out of reach, at the beginning and later.",
 )
-@click.option("--sniff", is_flag=True, help="Let the master's journal have all that this robot says and hears.")
+@click.option(
+    "--sniff",
+    is_flag=True,
+    help="Let the master's journal, and so who may sniff, have all that this robot says and hears.",
+)
 @local_options
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
 @click.pass_context

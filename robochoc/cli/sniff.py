@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from robochoc.cli.failure import INVALID, USAGE, Failure, invalid_input_fails
 from robochoc.cli.paths import InputPath
+from robochoc.cli.sniff_master import Page, asks_master, master_options, sniff_master
 
 if TYPE_CHECKING:
     from robochoc.view.sniffer.session import Session
@@ -17,7 +18,8 @@ NEXT_STEP = "give what 'robochoc solve --journal' wrote"
 
 
 @click.command(short_help="Look into what robots said: a page on this machine.")
-@click.argument("journal", type=InputPath(), metavar="JOURNAL")
+@click.argument("journal", type=InputPath(), metavar="[JOURNAL]", required=False)
+@master_options
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port of the page; 0 is any free one.")
 @click.option("--open", "open_browser", is_flag=True, help="Show the page in a browser.")
 @click.option(
@@ -34,12 +36,29 @@ NEXT_STEP = "give what 'robochoc solve --journal' wrote"
     metavar="DIR",
     help="The team's folder, for the 3D scene.  [default: what the journal says]",
 )
+@click.pass_context
 @invalid_input_fails
-def sniff(journal: Path, port: int, chosen: str, folder: Path | None, *, open_browser: bool) -> None:
+def sniff(
+    context: click.Context,
+    /,
+    journal: Path | None,
+    port: int,
+    chosen: str,
+    folder: Path | None,
+    *,
+    open_browser: bool,
+    **asked: Any,  # noqa: ANN401 - who follows a master, and how
+) -> None:
     """Show the conversations in JOURNAL on a page of this machine, until Ctrl-C: who said what, and why.
 
-    JOURNAL is what 'robochoc solve --journal' writes; while it is still written, the page follows it.
+    JOURNAL is what 'robochoc solve --journal' writes; while it is still written, the page follows it. With --master
+    it is what a master on another machine gives out of its run, to those who may sniff: docs/several-machines.md.
     """
+    elsewhere = asks_master(journal, folder, asked)
+    if elsewhere or journal is None:
+        from robochoc.view.sniffer.patterns import patterns_in
+
+        context.exit(sniff_master(Page(tuple(patterns_in(chosen)), port, open_browser), **asked))
     from robochoc.view.sniffer.server import serve
 
     session = _session(journal, chosen, folder)

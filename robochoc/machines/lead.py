@@ -12,24 +12,24 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
-import msgspec
+from msgspec import UNSET
 
 from robochoc.answers import Refuted
 from robochoc.anytime import bound_of, joined, tree_of
 from robochoc.authority.authority import Authority
 from robochoc.authority.enrolment_server import EnrolmentServer
-from robochoc.authority.events import AuthorityEvent, AuthorityObserver
 from robochoc.authority.identity import Identity
 from robochoc.communication.host import BadSettings, settings_of
 from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
+from robochoc.communication.network.publication import Publication
 from robochoc.communication.network.router import RouterFailed
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.defaults import FIRST_FIT, MINIMISES, SATISFIES, suits
 from robochoc.machines.place import LOOPBACK, Place
-from robochoc.observers.events import Observer
+from robochoc.observers.events import Began, Observer
 from robochoc.options import Withdrawal
 from robochoc.outcome import Outcome, Verdict
 from robochoc.problem import Domain, Kind, Team, Variable
@@ -88,14 +88,18 @@ def lead(
     watched: bool = False,
     progress: Callable[[Progress], None] | None = None,
     listening: Callable[[], None] = lambda: None,
+    publication: Publication | None = None,
+    concluded: Callable[[Outcome | None], None] = lambda _outcome: None,
 ) -> Led:
     """Be the master of one run. `listening` is called once robots can come.
 
+    Who has the right to sniff may have what is written to `publication`, while the run lasts and until a moment after
+    `concluded` was called with its outcome (None: it broke off), which writes the last of it.
     Raises `BadAuthority`, `BadHost`, `RouterFailed`, `NotComplete`, `RobotsLost`, `Unsupported`, `UnknownProtocol`,
     `Refuted`.
     """
     _check_settings_early(plan)
-    authority = Authority.open(plan.authority, observer=_in_run_time(observer))
+    authority = Authority.open(plan.authority)
     hosts = [*([] if plan.place.anywhere else [plan.place.host]), *plan.hosts]
     called = [host for host in hosts if ":" not in host]
     if not called:
@@ -108,9 +112,12 @@ def lead(
     master = Master(
         authority, identity, endpoint, members, conditions, observer=observer, watched=watched, progress=progress
     )
+    authority.observer = master.chronicle.relay
+    if publication:
+        master.publish(publication)
     with _enrolling(authority, identity, plan.place), master:
         listening()
-        return _Lead(plan, master).run()
+        return _Lead(plan, master, observer, concluded).run()
 
 
 @contextmanager
@@ -126,23 +133,16 @@ def _enrolling(authority: Authority, identity: Identity, place: Place) -> Iterat
         yield
 
 
-def _in_run_time(observer: Observer | None) -> AuthorityObserver:
-    """Has `observer` hear of the Authority's events in the time of this run, which is about to begin."""
-    began = time.time()
-
-    def told(event: AuthorityEvent) -> None:
-        if observer:
-            observer(msgspec.structs.replace(event, t=max(0.0, event.t - began)))
-
-    return told
-
-
 class _Lead:
     """One run, once the master listens."""
 
-    def __init__(self, plan: Plan, master: Master) -> None:
+    def __init__(
+        self, plan: Plan, master: Master, observer: Observer | None, concluded: Callable[[Outcome | None], None]
+    ) -> None:
         self._plan = plan
         self._master = master
+        self._observer = observer
+        self._concluded = concluded
         self._lost: dict[str, str] = {}
         self._deadline: float | None = None
         self._values: dict[str, dict[str, int]] = {}
@@ -153,8 +153,10 @@ class _Lead:
             outcome = self._solved()
         except BaseException as error:
             failure = isinstance(error, RobotsLost | Unsupported | Refuted | NotComplete)
+            self._concluded(None)
             self._master.leave(f"the run was broken off: {error if failure else 'the master has stopped'}", failed=True)
             raise
+        self._concluded(outcome)
         self._master.leave(_in_words(outcome))
         return Led(outcome, self._seen())
 
@@ -186,6 +188,8 @@ class _Lead:
         plan, master = self._plan, self._master
         while True:
             left = None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
+            if self._observer:
+                self._observer(Began(t=0, protocol=protocol, minimises=True if traits.costs else UNSET))
             result = master.search(protocol, traits, brief, left, plan.messages)
             self._outcome = replace(self._outcome, metrics=self._outcome.metrics + result.metrics)
             if not result.lost:

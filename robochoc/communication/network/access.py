@@ -4,11 +4,13 @@ The key of a letter is `rc/msg/RECEIVER/SENDER`. A robot may put on keys that en
 that begin with it, so that nobody writes in another's name or reads another's letters. Of the keys that end with its
 name it may use those to the master, and once the team is closed those to the robots it has to do with. Recovery
 (zenoh's advanced publishers) asks for what was missed under `@adv` below the same keys, and has the same rules.
+
+The journal is asked for on `rc/journal/NAME`: by NAME only, if it may sniff; the master answers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from robochoc.communication.network.letters import MASTER
@@ -28,14 +30,20 @@ def life_key(name: str) -> str:
     return f"rc/live/{name}"
 
 
+def journal_key(name: str) -> str:
+    """Where `name` asks for the run's journal."""
+    return f"rc/journal/{name}"
+
+
 def name_in(key: str) -> str:
-    """The sender in a letter's key, or whose life a token is."""
+    """The sender in a letter's key, whose life a token is, or who asks for the journal."""
     return key.rpartition("/")[2]
 
 
-def access_control(reach: Mapping[str, Sequence[str]]) -> dict[str, Any]:
+def access_control(reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None = None) -> dict[str, Any]:
     """Zenoh's `access_control`: those in `reach` may take part, and each may write to the master and whom it lists.
 
+    Those of them who are `sniffers` may ask the master for the journal (None: it answers nobody).
     Raises `ValueError` for names that would be more than names in a key: `*` writes in everybody's name.
     """
     strange = next((name for name in reach if not is_name(name) or name == MASTER), None)
@@ -46,6 +54,10 @@ def access_control(reach: Mapping[str, Sequence[str]]) -> dict[str, Any]:
     for name, others in {**reach, MASTER: [ALL]}.items():
         receivers = [ALL] if ALL in others else dict.fromkeys([MASTER, *others])
         mine = _rules(name, [letter_key(other, name) for other in receivers])
+        if sniffers is not None and name in sniffers:
+            mine += _sniffing(name, journal_key(name), asks="ingress", answers="egress")
+        elif sniffers is not None and name == MASTER:
+            mine += _sniffing(name, journal_key(ALL), asks="egress", answers="ingress")
         rules += mine
         policies.append({"rules": [rule["id"] for rule in mine], "subjects": [name]})
     subjects = [{"id": name, "cert_common_names": [name]} for name in (*reach, MASTER)]
@@ -55,6 +67,20 @@ def access_control(reach: Mapping[str, Sequence[str]]) -> dict[str, Any]:
         "rules": rules,
         "subjects": subjects,
         "policies": policies,
+    }
+
+
+def yielding() -> dict[str, Any]:
+    """Zenoh's `qos` for the journal: it yields to letters, and what a slow sniffer does not take is dropped.
+
+    Answers are sent as the question is, and a sniffer might ask for one that is waited for, and stop to read.
+    """
+    return {
+        "id": "the journal yields",
+        "messages": ["query"],
+        "key_exprs": [journal_key(ALL)],
+        "flows": ["ingress", "egress"],
+        "overwrite": {"congestion_control": "drop", "priority": "background"},
     }
 
 
@@ -71,6 +97,14 @@ def _rules(name: str, written: Sequence[str]) -> list[dict[str, Any]]:
         _rule(f"{name} lives", "ingress", ["liveliness_token"], [life_key(name)]),
         _rule(f"{name} watches", "ingress", ["declare_liveliness_subscriber", "liveliness_query"], [life_key(ALL)]),
         _rule(f"{name} sees", "egress", ["liveliness_token"], [life_key(ALL)]),
+    ]
+
+
+def _sniffing(name: str, key: str, *, asks: str, answers: str) -> list[dict[str, Any]]:
+    """Rules for questions on `key`, which go one way, and their answers, which go the other."""
+    return [
+        _rule(f"{name} sniffs: questions", asks, ["query"], [key]),
+        _rule(f"{name} sniffs: answers", answers, ["reply", "declare_queryable"], [key]),
     ]
 
 

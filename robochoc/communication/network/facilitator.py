@@ -63,13 +63,17 @@ class DirectoryFacilitator:
         """Forget those whose lease has ended."""
         self._directory.expire(time.time())
 
-    def answer(self, requester: str, ask: Ask) -> Told:
-        """The answer to what `requester` asks in SL0; `notices` has what it subscribes to. Raises `TooOften`."""
+    def count(self, requester: str) -> None:
+        """`requester` asks for something, of the directory or of the master. Raises `TooOften`."""
         now = time.time()
         recent = [t for t in self._asked.get(requester, []) if now - t < 1]
         self._asked[requester] = [*recent, now]
         if len(recent) >= ASKED_AT_MOST:
             raise TooOften(f"more than {ASKED_AT_MOST} requests a second")
+
+    def answer(self, requester: str, ask: Ask) -> Told:
+        """The answer to what `requester` asks in SL0; `notices` has what it subscribes to."""
+        now = time.time()
         aid = self._aid(requester)
         if not ask.subscribe:
             return _told(ask.number, handle(self._directory, aid, ask.content, now))

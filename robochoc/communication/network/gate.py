@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from robochoc.authority.admission import Admission
 from robochoc.authority.identity import Identity
-from robochoc.authority.registry import Role
+from robochoc.authority.registry import Right, Role
 from robochoc.communication.network.router import RefusalObserver, Router
 
 Reach = Mapping[str, tuple[str, ...]]
@@ -32,7 +32,9 @@ class Gate:
         self._admission = admission
         self._router = Router(endpoint, identity, refused, lease_ms)
         self._ways = ways
-        self._admitted: dict[str, tuple[str, ...]] | None = None
+        self.sniffable = False
+        """Whether those who may sniff may have the journal of this run."""
+        self._admitted: tuple[dict[str, tuple[str, ...]], tuple[str, ...] | None] | None = None
 
     def open(self) -> None:
         """Let in all whom the Authority has certified; they may write to the master, and where the ways lead."""
@@ -47,9 +49,17 @@ class Gate:
         """Let in who was enrolled since, and keep out who was revoked. Raises `RouterFailed`."""
         names = [*self._admission.names(Role.ROBOT), *self._admission.names(Role.OBSERVER)]
         admitted = {name: self._ways.get(name, ()) for name in names if not self.is_revoked(name)}
-        if admitted != self._admitted:
-            self._admitted = admitted
-            self._router.open(admitted)
+        sniffers = tuple(name for name in self._sniffers() if name in admitted) if self.sniffable else None
+        if (admitted, sniffers) != self._admitted:
+            self._admitted = admitted, sniffers
+            self._router.open(admitted, sniffers)
+
+    def may_sniff(self, name: str) -> bool:
+        """Whether this run's journal is given out, and `name` has the right to it."""
+        return name in self._sniffers()
+
+    def _sniffers(self) -> tuple[str, ...]:
+        return self._admission.names(right=Right.SNIFF) if self.sniffable else ()
 
     def is_revoked(self, name: str) -> bool:
         """Whether `name` is to be turned away."""

@@ -15,6 +15,8 @@ from robochoc.communication.network.words import (
     Ask,
     Denied,
     Register,
+    Sniff,
+    Sniffable,
     Told,
     ToMaster,
     ToPeer,
@@ -28,7 +30,7 @@ MASTER = "MASTER"
 LARGEST_LETTER = 8 * 2**20
 """Bytes. zenoh drops what is larger than it was told to take without a word, so it is said here, before."""
 
-_OUTSIDE = Register | Welcome | Denied | Ask | Told
+_OUTSIDE = Register | Welcome | Denied | Ask | Told | Sniff | Sniffable
 
 
 class TooLarge(ValueError):  # noqa: N818 - named for what was found

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from queue import Empty
 from typing import Self
@@ -19,6 +19,8 @@ from typing import Self
 from robochoc.authority.admission import Admission
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Events, Failed, OfEpoch, Pause, Wave
+from robochoc.communication.network.access import ALL, journal_key
+from robochoc.communication.network.chronicle import Chronicle
 from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.facilitator import DirectoryFacilitator, TooOften
 from robochoc.communication.network.gate import Gate
@@ -26,9 +28,9 @@ from robochoc.communication.network.letters import MASTER, Letters, Refused, Too
 from robochoc.communication.network.members import Member, Members, NotTaken
 from robochoc.communication.network.post import Arrived, Missed, Post, Presence, Woken
 from robochoc.communication.network.profile import Profile
-from robochoc.communication.network.refusals import Refusals
+from robochoc.communication.network.publication import Publication, PublicationDesk
 from robochoc.communication.network.router import Refusal
-from robochoc.communication.network.tally import Tally, is_of
+from robochoc.communication.network.tally import Tally
 from robochoc.communication.network.words import (
     Ask,
     Bye,
@@ -42,6 +44,7 @@ from robochoc.communication.network.words import (
     Search,
     Show,
     Shown,
+    Sniff,
     ToRobot,
     Welcome,
     Word,
@@ -49,8 +52,7 @@ from robochoc.communication.network.words import (
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import over
-from robochoc.observers import events
-from robochoc.observers.events import AnyEvent, Observer
+from robochoc.observers.events import Observer
 from robochoc.outcome import Verdict
 from robochoc.protocols.traits import Traits
 from robochoc.solver.encoding import TooMuch, Unsupported
@@ -89,15 +91,16 @@ class Master:
         self.tally = Tally()
         self._identity = identity
         self._conditions = conditions
-        self._observer = observer
         self._watched = watched
         self._progress = progress
         self._began = time.monotonic()
         self._letters = Letters(MASTER, self.run)
         self._facilitator = DirectoryFacilitator(endpoint, conditions.protocol)
-        self._refuse = Refusals(self._tell_of_refusal).note
+        self.chronicle = Chronicle(observer)
+        self._refuse = self.chronicle.refuse
         told = self._note_refusal if observer else None
         self._gate = Gate(admission, identity, conditions.listen or endpoint, told, conditions.lease_ms, members.ways)
+        self._desk = PublicationDesk(self.run, self._gate.may_sniff, self.chronicle)
         self._dead: dict[str, str] = {}
         self._shown = self._looked = self._read_registry = 0.0
 
@@ -106,6 +109,8 @@ class Master:
         try:
             self._gate.open()
             self._post = Post(self.endpoint, self._identity, lease_ms=self._conditions.lease_ms)
+            if self._desk.publication:
+                self._post.answer(journal_key(ALL), self._desk.answer)
         except BaseException:
             self._gate.close()
             raise
@@ -116,6 +121,12 @@ class Master:
             self._post.close()
         finally:
             self._gate.close()
+
+    def publish(self, publication: Publication) -> None:
+        """Give what is written to `publication`, the journal of this run, to those who may sniff. Before it listens."""
+        publication.run = self.run
+        self._desk.publication = publication
+        self._gate.sniffable = True
 
     # What a run goes through
 
@@ -147,6 +158,7 @@ class Master:
         Raises `RobotsLost`, and `Unsupported` when a robot's problem is more than its machine or the protocol can take.
         """
         began = time.monotonic()
+        self.chronicle.begin()
         deadline = None if timeout is None else began + timeout
         self._gate.open_ways(self.members.reach(beyond=traits.beyond))
         tally = self.tally = Tally(self.tally.epoch + 1, self.members.order, messages)
@@ -155,6 +167,7 @@ class Master:
         self._wait_until(lambda: tally.broken_off or tally.ready, deadline)
         if tally.verdict is None and not tally.broken_off and not over(deadline):
             self._tell_all(Search(tally.epoch))
+            self.chronicle.begin()
             tally.searching = True
             self._wait_until(lambda: tally.verdict is not None or tally.broken_off, deadline)
             tally.searching = False
@@ -182,6 +195,7 @@ class Master:
             self._tell_all(Leave(why, failed))
             until = time.monotonic() + FAREWELL_S
             self._wait_until(lambda: all(m.left or m.gone for m in self.members.robots.values()), until)
+            self._wait_until(lambda: not self._desk.lagging, time.monotonic() + FAREWELL_S)
 
     def lose(self, name: str, why: str) -> None:
         """Somebody who can see it says that the robot's process has ended. May be called from any thread."""
@@ -283,7 +297,7 @@ class Master:
         match opened.word:
             case Register(profile, visit):
                 self._register(sender, profile, visit)
-            case Ask():
+            case Ask() | Sniff():
                 self._answer(sender, opened.word)
             case _:
                 member = self.members.robots.get(sender)
@@ -302,7 +316,7 @@ class Master:
             case Shown(variables):
                 self._note_failure(name, self.members.show(name, variables))
             case Events(told):
-                self._note_events(name, told)
+                self.chronicle.told(name, told)
             case Failed(why, unsupported, elsewhere):
                 self._note_failure(name, why, (TooMuch if elsewhere else Unsupported) if unsupported else None)
             case Objection(who, what, why):
@@ -312,14 +326,6 @@ class Master:
             case _:
                 raise AssertionError(word)  # `Letters` decodes nothing else
 
-    def _note_events(self, name: str, told: Sequence[AnyEvent]) -> None:
-        """What a robot tells of itself, as it is watched or wants to be; of others it may not tell."""
-        for event in told:
-            if is_of(event, name):
-                self._observe(event)
-            else:
-                self._refuse(name, f"tell of {type(event).__name__}", "it is not about itself")
-
     def _note_failure(self, name: str, why: str, refusal: type[Unsupported] | None = None) -> None:
         """The robot cannot go on (if there is a `why`); a `refusal` ends the run."""
         if refusal:
@@ -327,11 +333,14 @@ class Master:
         if why:
             self._lose(name, why, for_good=True)
 
-    def _answer(self, sender: str, ask: Ask) -> None:
+    def _answer(self, sender: str, word: Ask | Sniff) -> None:
         try:
-            self._tell(sender, self._facilitator.answer(sender, ask))
+            self._facilitator.count(sender)
         except TooOften as often:
             self._refuse(sender, "ask the Directory Facilitator", str(often))
+            return
+        told = self._desk.welcome(sender, word) if isinstance(word, Sniff) else self._facilitator.answer(sender, word)
+        self._tell(sender, told)
 
     # Who is there
 
@@ -347,7 +356,7 @@ class Master:
             self._letters.forget(name)
             if unfit := self._facilitator.enter(profile):
                 self._refuse(name, "be in the directory", unfit)
-            self._observe(events.Registered(t=time.monotonic() - self._began, robot=name))
+            self.chronicle.registered(name)
             if self._progress:
                 self._progress(
                     Progress(0, time.monotonic() - self._began, f"{len(self.members.robots)} robots registered")
@@ -380,21 +389,12 @@ class Master:
         if not self.members.closed and not for_good:
             self.members.remove([name])
             return
-        self._observe(events.Lost(t=time.monotonic() - self._began, robot=name, why=why))
+        self.chronicle.lost(name, why)
         self.tally.lose(name, why)
         if not self._conditions.survive or not self.members.closed:
             raise RobotsLost({name: why})
-
-    # Small things
 
     def _note_refusal(self, refusal: Refusal) -> None:
         """What the router tells; not of those who were enrolled a moment ago, and are let in when they try again."""
         if refusal.what != "connect" or not self._gate.admits(refusal.who):
             self._refuse(*refusal)
-
-    def _tell_of_refusal(self, who: str, what: str, why: str) -> None:
-        self._observe(events.Refused(t=time.monotonic() - self._began, who=who, what=what, why=why))
-
-    def _observe(self, event: AnyEvent) -> None:
-        if self._observer:
-            self._observer(event)

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import base64
 import time
-from collections.abc import Iterable
-from queue import SimpleQueue
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import NamedTuple, Self
 
@@ -30,6 +31,7 @@ Each pair that has ever spoken has its own, at about 0.2 ms of CPU: 121 robots a
 outage does not wait for it: a receiver asks for that as soon as it sees the sender again.
 """
 KEPT_LETTERS = 100_000
+_LATE_S = 1.0
 _FIRST_ATTEMPT_S, _LONGEST_ATTEMPT_S = 2.0, 10.0
 """So long are attempts to connect; a busy router may take its time for a handshake."""
 
@@ -63,6 +65,8 @@ class Woken(NamedTuple):
 
 
 Item = Arrived | Missed | Presence | Woken
+Answering = Callable[[str, bytes], bytes | None]
+"""The answer to somebody's question; None: it gets none."""
 
 
 class Post:
@@ -118,6 +122,37 @@ class Post:
     def router(self) -> str:
         """The router that there is a link to now; empty: there is none. One that was opened anew is another one."""
         return next(map(str, self._session.info.routers_zid()), "")
+
+    def answer(self, key: str, answered: Answering) -> None:
+        """From now on answer questions on `key`, in a thread of zenoh's."""
+
+        def reply(query: zenoh.Query) -> None:
+            content = answered(name_in(str(query.key_expr)), query.payload.to_bytes() if query.payload else b"")
+            if content is not None:
+                query.reply(query.key_expr, content)
+
+        self._answering = self._session.declare_queryable(key, reply)
+
+    def ask(self, key: str, content: bytes, patience_s: float) -> bytes | None:
+        """What is answered to `content` on `key`; None: nothing is, within `patience_s`.
+
+        The answer yields to all that robots say, and is dropped if it does not get through at once.
+        """
+        replies: SimpleQueue[zenoh.Reply | None] = SimpleQueue()
+        handler = zenoh.handlers.Callback(replies.put, lambda: replies.put(None))
+        self._session.get(
+            key,
+            handler,
+            payload=content,
+            timeout=patience_s,
+            congestion_control=zenoh.CongestionControl.DROP,
+            priority=zenoh.Priority.BACKGROUND,
+        )
+        with suppress(Empty):
+            while reply := replies.get(timeout=patience_s + _LATE_S):
+                if reply.ok is not None:
+                    return reply.ok.payload.to_bytes()
+        return None
 
     def wake(self) -> None:
         """Have whoever waits at the inbox look up."""

@@ -42,6 +42,7 @@ from robochoc.communication.network.words import (
     Search,
     Show,
     Shown,
+    Sniffable,
     Task,
     Told,
     ToMaster,
@@ -292,7 +293,7 @@ class NetworkRobot:
             case Leave(why, failed):
                 self._say(Bye())
                 raise _Over(why, failed=failed)
-            case Denied() | Told():
+            case Denied() | Told() | Sniffable():
                 pass
             case _:
                 self._obey_in_search(word)

@@ -19,7 +19,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import IO, NamedTuple, cast
 
 from robochoc.authority.identity import Identity
-from robochoc.communication.network.access import access_control
+from robochoc.communication.network.access import access_control, yielding
 from robochoc.communication.network.letters import MASTER
 from robochoc.communication.network.post import encoded
 
@@ -85,7 +85,7 @@ class Router:
         self._process: subprocess.Popen[bytes] | None = None
         self._reader: threading.Thread | None = None
 
-    def open(self, reach: Mapping[str, Sequence[str]]) -> None:
+    def open(self, reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None = None) -> None:
         """Listen, with these rules (see `access_control`) instead of those before. Raises `RouterFailed`."""
         self.close()
         process = subprocess.Popen(  # noqa: S603 - our own module, with this interpreter
@@ -99,7 +99,7 @@ class Router:
         self._process = process
         if process.stdin is None or process.stdout is None:
             raise RouterFailed("it has no standard streams")
-        process.stdin.write(json.dumps(self._settings(reach)).encode() + b"\n")
+        process.stdin.write(json.dumps(self._settings(reach, sniffers)).encode() + b"\n")
         process.stdin.flush()
         said = self._wait_until_ready(process.stdout)
         self._reader = threading.Thread(target=self._read, args=[process.stdout, Log(reach), said], daemon=True)
@@ -123,7 +123,7 @@ class Router:
             if stream:
                 stream.close()
 
-    def _settings(self, reach: Mapping[str, Sequence[str]]) -> dict[str, object]:
+    def _settings(self, reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None) -> dict[str, object]:
         texts = self._identity.texts
         return {
             "mode": "router",
@@ -137,7 +137,8 @@ class Router:
                 "close_link_on_expiration": True,
             },
             "transport/link/tx/lease": self._lease_ms,
-            "access_control": access_control(reach),
+            "access_control": access_control(reach, sniffers),
+            "qos/network": [] if sniffers is None else [yielding()],
         }
 
     def _wait_until_ready(self, output: IO[bytes]) -> bytes:

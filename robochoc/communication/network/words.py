@@ -82,6 +82,12 @@ class Ask(_Word, frozen=True):
     subscribe: bool = False
 
 
+class Sniff(_Word, frozen=True):
+    """May I have the journal of your run? The answer has the same `number`; it is asked for by `publication.py`."""
+
+    number: int
+
+
 class Bye(_Word, frozen=True):
     """I have heard that the run is over."""
 
@@ -151,6 +157,14 @@ class Told(_Word, frozen=True):
     content: str
 
 
+class Sniffable(_Word, frozen=True):
+    """You may have the journal of the run `run`; or not, because of `why`."""
+
+    number: int
+    run: str
+    why: str
+
+
 class Leave(_Word, frozen=True):
     """The run is over. `failed`: it could not be completed, because of `why`; otherwise that is the verdict."""
 
@@ -190,8 +204,9 @@ ToMaster = (
     | Failed
     | Objection
     | Ask
+    | Sniff
     | Bye
 )
-ToRobot = Welcome | Denied | Show | Task | Search | Wave | Pause | Judge | Revoked | Told | Leave
+ToRobot = Welcome | Denied | Show | Task | Search | Wave | Pause | Judge | Revoked | Told | Sniffable | Leave
 ToPeer = Said | Copies
 Word = ToMaster | ToRobot | ToPeer

@@ -1,0 +1,41 @@
+"""What the master's observer is told, and in which time."""
+
+from __future__ import annotations
+
+import time
+
+from robochoc.communication.network.chronicle import Chronicle
+from robochoc.observers.events import AnyEvent, Decided, Granted, Lost, Refused, Registered
+
+
+def test_times_are_since_the_search_began() -> None:
+    told: list[AnyEvent] = []
+    chronicle = Chronicle(told.append)
+    time.sleep(0.05)
+    chronicle.registered("A")
+    chronicle.begin()
+    chronicle.lost("A", "gone")
+    chronicle.granted("Eye", "sniff")
+    chronicle.relay(Granted(t=1e9, who="B", what="renew a certificate", origin="here:1"))
+    before, *after = told
+    assert isinstance(before, Registered)
+    assert before.t >= 0.05
+    assert all(0 <= event.t < before.t for event in after)
+    assert [type(event) for event in after] == [Lost, Granted, Granted]
+    assert isinstance(after[-1], Granted)
+    assert (after[-1].who, after[-1].origin) == ("B", "here:1")
+
+
+def test_robots_tell_of_themselves_only() -> None:
+    told: list[AnyEvent] = []
+    chronicle = Chronicle(told.append)
+    own, others = (Decided(t=3.0, robot=name, assignment={"V": 1}, clock=1) for name in "AB")
+    chronicle.told("A", [own, others, own])
+    assert [event for event in told if isinstance(event, Decided)] == [own, own]
+    assert [(event.who, event.what) for event in told if isinstance(event, Refused)] == [("A", "tell of Decided")]
+
+
+def test_where_nobody_observes_nothing_is_told() -> None:
+    chronicle = Chronicle(None)
+    chronicle.refuse("A", "anything", "it may not")
+    chronicle.registered("A")
