@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from robochoc.view.sniffer.feed import Feed
-from robochoc.view.sniffer.trace import Trace
 from sniffed import journal_of
 
 from robochoc.generators.queens3d import queens3d
@@ -21,6 +19,8 @@ from robochoc.observers.events import AnyEvent
 from robochoc.observers.journal import read_journal
 from robochoc.options import Options, Runtime
 from robochoc.run import solve
+from robochoc.view.sniffer.feed import Feed
+from robochoc.view.sniffer.trace import Trace
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 REFUSED = "ERR_CONNECTION_REFUSED"

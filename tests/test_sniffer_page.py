@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from robochoc.replay.insight import states_of
-from robochoc.view.sniffer.session import Session
 from sniffed import Served, served
 from sniffer_pages import (
     ALL,
@@ -30,6 +28,9 @@ from sniffer_pages import (
     text_is,
     until,
 )
+
+from robochoc.replay.insight import states_of
+from robochoc.view.sniffer.session import Session
 
 
 @pytest.fixture(scope="module", autouse=True)

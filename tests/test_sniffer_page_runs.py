@@ -12,9 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from robochoc.view.sniffer.packed import packed_feed
-from robochoc.view.sniffer.page import page as page_of
-from robochoc.view.sniffer.session import Session
 from sniffed import Served, journal_of, served
 from sniffer_pages import (
     ALL,
@@ -34,6 +31,9 @@ from sniffer_pages import (
 )
 
 from robochoc.observers.journal import lines_of
+from robochoc.view.sniffer.packed import packed_feed
+from robochoc.view.sniffer.page import page as page_of
+from robochoc.view.sniffer.session import Session
 
 HOSTILE = "</script><img src=x onerror=document.title='broken'>"
 
