@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 from typing import cast
 
-from robochoc.defaults import FIRST_FIT
+from robochoc.defaults import FIRST_FIT, MINIMISES
 from robochoc.installed import all_in, loaded, missing, named, names_in
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import DynamicProtocol, Protocol, Settings
@@ -62,6 +63,22 @@ def protocol_named(name: str) -> type[Protocol]:
 def spoken(name: str) -> type[Protocol]:
     """Like `protocol_named`, of all that robots can be told to speak: also what only says who steps aside."""
     return FirstFit if name == FIRST_FIT else protocol_named(name)
+
+
+def speaker(class_name: str, likely: Iterable[str] = ()) -> tuple[str, type[Protocol]] | None:
+    """Name and class of the protocol whose class is called `class_name`, as journals have it; `likely` names first.
+
+    None: nothing that is installed is called that.
+    """
+    for name in (*likely, FIRST_FIT, MINIMISES):
+        with suppress(UnknownProtocol):
+            protocol = spoken(name)
+            if protocol.__name__ == class_name:
+                return name, protocol
+    for offer in offers():
+        if offer.protocol is not None and offer.protocol.__name__ == class_name:
+            return offer.name, offer.protocol
+    return None
 
 
 def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> Offer:

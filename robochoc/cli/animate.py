@@ -9,12 +9,11 @@ import click
 
 from robochoc.cli.failure import INVALID, Failure, invalid_input_fails
 from robochoc.cli.paths import InputPath, OutputFile
+from robochoc.cli.saved import saved_content
 
 if TYPE_CHECKING:
     from robochoc.outcome import Outcome
 
-LARGEST_FILE = 1 << 30
-"""1 GiB: more than `read_journal` keeps of any journal of a run."""
 NEXT_STEP = "give what 'robochoc solve --json' or '--journal' wrote"
 
 
@@ -71,13 +70,7 @@ def _outcome(saved: Path) -> Outcome:
     from robochoc.formats.result import BadResult, read_result
     from robochoc.observers.journal import BadJournal, is_journal, read_journal
 
-    try:
-        with saved.open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)
-    except OSError as error:
-        raise Failure(INVALID, f"{saved}: {error.strerror} ({NEXT_STEP})") from error
-    if len(content) > LARGEST_FILE:
-        raise Failure(INVALID, f"{saved}: it has more than {LARGEST_FILE:,} bytes ({NEXT_STEP})")
+    content = saved_content(saved, NEXT_STEP)
     try:
         if not is_journal(content):
             return read_result(content)

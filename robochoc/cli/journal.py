@@ -9,19 +9,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robochoc.cli.failure import INVALID, USAGE, Failure
+from robochoc.cli.failure import USAGE, Failure
 from robochoc.cli.paths import InputPath, OutputFile
+from robochoc.cli.saved import saved_journal
 
 if TYPE_CHECKING:
     from robochoc.observers.journal import Journal
     from robochoc.view.sniffer.trace import Trace
 
 FORMATS = ("jsonl", "acl", "csv", "mermaid", "html")
-LARGEST_FILE = 1 << 30
-"""1 GiB: a journal of millions of messages."""
 MOST_IN_PAGE = 100_000
 """Messages: with more, the page would be too large for browsers to open at once."""
-NEXT_STEP = "give what 'robochoc solve --journal' wrote"
 
 
 @click.group(short_help="What is in a journal, and exports of it.")
@@ -35,7 +33,7 @@ def show(file: Path) -> None:
     """Say what was run, who took part, what was said how often, how it ended, and whether the journal is whole."""
     from robochoc.cli.journal_report import report
 
-    for line in report(_trace(_journal(file), file)):
+    for line in report(_trace(saved_journal(file), file)):
         click.echo(line)
 
 
@@ -74,7 +72,7 @@ def export(
     from robochoc.view.sniffer.selection import NothingMeant, Selection
 
     meant = Selection(patterns_in(robots), patterns_in(types), first, last, conversation)
-    read = _journal(file)
+    read = saved_journal(file)
     trace = _trace(read, file)
     try:
         messages = meant.of(trace)
@@ -134,22 +132,6 @@ def _page(read: Journal, trace: Trace, messages: range | list[int]) -> bytes:
     feed = Feed(trace if whole else excerpt(trace, messages))
     answers = {**packed_feed(feed, read), "scene": zlib.compress(whole_scene(feed.trace))}
     return page("embedded", answers, title=f"{read.header.protocol} on {read.header.team}")
-
-
-def _journal(file: Path) -> Journal:
-    from robochoc.observers.journal import BadJournal, read_journal
-
-    try:
-        with file.open("rb") as stream:
-            content = stream.read(LARGEST_FILE + 1)
-    except OSError as error:
-        raise Failure(INVALID, f"{file}: {error.strerror} ({NEXT_STEP})") from error
-    if len(content) > LARGEST_FILE:
-        raise Failure(USAGE, f"{file}: it has more than {LARGEST_FILE:,} bytes")
-    try:
-        return read_journal(content)
-    except BadJournal as bad:
-        raise Failure(INVALID, _one_line(f"{file}: {bad} ({NEXT_STEP})")) from bad
 
 
 def _trace(read: Journal, file: Path) -> Trace:

@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robochoc.cli.animate import LARGEST_FILE
 from robochoc.cli.failure import INVALID, LOST, USAGE, Failure, failures_told, invalid_input_fails
 from robochoc.cli.local import limits, local_options
 from robochoc.cli.paths import InputPath
+from robochoc.cli.saved import saved_journal
 from robochoc.cli.solve_settings import protocol_settings
 
 if TYPE_CHECKING:
     from robochoc.observers.journal import Journal
     from robochoc.replay import Means, Replayed
-
-NEXT_STEP = "give what 'robochoc solve --journal' wrote"
 
 
 @click.command(short_help="Play a journal again, and say where the protocol does something else.")
@@ -58,7 +56,7 @@ def replay(
     from robochoc.replay import Means
     from robochoc.solver.cache import SolutionCache
 
-    recorded = _journal(journal)
+    recorded = saved_journal(journal)
     means = Means(
         team=read_team(folder) if folder else None,
         settings=protocol_settings(settings),
@@ -90,19 +88,3 @@ def _replayed(path: Path, journal: Journal, means: Means) -> Replayed:
     except CannotReplay as why:
         status = INVALID if why.broken else USAGE
         raise Failure(status, on_one_line(f"{path}: it cannot be played again: {why}")) from why
-
-
-def _journal(path: Path) -> Journal:
-    from robochoc.observers.journal import BadJournal, is_journal, read_journal
-
-    try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_FILE)
-    except OSError as error:
-        raise Failure(INVALID, f"{path}: {error.strerror} ({NEXT_STEP})") from error
-    try:
-        if not is_journal(content):
-            raise Failure(INVALID, f"{path}: this is no journal ({NEXT_STEP})")
-        return read_journal(content)
-    except BadJournal as wrong:
-        raise Failure(INVALID, f"{path}: {wrong} ({NEXT_STEP})") from wrong

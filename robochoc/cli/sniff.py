@@ -9,12 +9,11 @@ import click
 
 from robochoc.cli.failure import INVALID, USAGE, Failure, invalid_input_fails
 from robochoc.cli.paths import InputPath
+from robochoc.cli.saved import JOURNAL_STEP
 from robochoc.cli.sniff_master import Page, asks_master, master_options, sniff_master
 
 if TYPE_CHECKING:
     from robochoc.view.sniffer.session import Session
-
-NEXT_STEP = "give what 'robochoc solve --journal' wrote"
 
 
 @click.command(short_help="Look into what robots said: a page on this machine.")
@@ -86,7 +85,7 @@ def _session(journal: Path, chosen: str, folder: Path | None) -> Session:
         session = Session(journal, chosen=patterns_in(chosen), robots=robots)
         session.begin()
     except (BadJournal, TraceTooLarge) as wrong:
-        raise Failure(INVALID, on_one_line(f"{journal}: {wrong} ({NEXT_STEP})")) from wrong
+        raise Failure(INVALID, on_one_line(f"{journal}: {wrong} ({JOURNAL_STEP})")) from wrong
     except OSError as error:
-        raise Failure(INVALID, on_one_line(f"{journal}: {error.strerror or error} ({NEXT_STEP})")) from error
+        raise Failure(INVALID, on_one_line(f"{journal}: {error.strerror or error} ({JOURNAL_STEP})")) from error
     return session

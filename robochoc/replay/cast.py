@@ -9,7 +9,6 @@ from typing import NamedTuple
 from robochoc.change import BadChange, changed_by, without
 from robochoc.communication.host import BadSettings, Host
 from robochoc.communication.session import Epoch
-from robochoc.defaults import FIRST_FIT, MINIMISES
 from robochoc.observers.events import Given, Lost
 from robochoc.observers.given import BadGiven, TeamReader, brief_of, void_of
 from robochoc.observers.journal import Header
@@ -17,7 +16,7 @@ from robochoc.observers.objective import aside_cost
 from robochoc.orders import CannotTurn, Order, order_of, reordered
 from robochoc.problem import Robot, Team
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
-from robochoc.registry import UnknownProtocol, offers, spoken
+from robochoc.registry import UnknownProtocol, speaker, spoken
 from robochoc.replay.steps import Run
 from robochoc.solver.ace import AceProcess, SolverLost, SolverMissing, SolverTimeout
 from robochoc.solver.cache import SolutionCache
@@ -120,16 +119,9 @@ class Cast:
         name = run.began.protocol
         if name in self._means.protocols:
             return self._means.protocols[name]
-        for known in (asked, FIRST_FIT, MINIMISES):
-            try:
-                found = spoken(known) if known else None
-            except UnknownProtocol:
-                continue
-            if found is not None and found.__name__ == name:
-                return found
-        for offer in offers():
-            if offer.protocol is not None and offer.protocol.__name__ == name:
-                return offer.protocol
+        found = speaker(name, filter(None, [asked]))
+        if found is not None:
+            return found[1]
         hint = "install the package that it came from (robochoc protocols shows what there is)"
         raise CannotReplay(f"no protocol whose class is called {name!r} is installed; {hint}")
 

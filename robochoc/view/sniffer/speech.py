@@ -19,7 +19,7 @@ from robochoc.communication.conversation import CLOCK, JSON, ONTOLOGY, Conversat
 from robochoc.communication.performatives import act_of
 from robochoc.message import Envelope, Message, encode
 from robochoc.protocols.protocol import Protocol
-from robochoc.registry import UnknownProtocol, offers, spoken
+from robochoc.registry import UnknownProtocol, speaker, spoken
 from robochoc.services.identifier import AgentIdentifier, identifier_on
 from robochoc.view.sniffer.trace import Trace
 
@@ -128,17 +128,10 @@ class Speech:
 def spoken_in(trace: Trace, number: int) -> tuple[str, type[Protocol]] | None:
     """The protocol of a run, and its name, if it is installed: journals name runs' protocols by their classes."""
     called = trace.runs[number].protocol
-    for name in (trace.header.protocol, called):
-        try:
-            protocol = spoken(name)
-        except UnknownProtocol:
-            continue
-        if called in {name, protocol.__name__}:
-            return name, protocol
-    for offer in offers():
-        if offer.protocol is not None and offer.protocol.__name__ == called:
-            return offer.name, offer.protocol
-    return None
+    if called == trace.header.protocol:  # a journal of one run without a beginning
+        with suppress(UnknownProtocol):
+            return called, spoken(called)
+    return speaker(called, [trace.header.protocol])
 
 
 def plain(value: object, depth: int = 32) -> Any:  # noqa: ANN401 - any JSON
