@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import zlib
+from dataclasses import replace
 from typing import Any
 
 import msgspec
@@ -14,9 +15,10 @@ from robochoc.communication.acl import parse
 from robochoc.communication.conversation import Conversation
 from robochoc.observers.events import AnyEvent, Began, Given, Improved, Lost, Sent, Settled
 from robochoc.observers.journal import Header, Journal
+from robochoc.outcome import Outcome, Verdict
 from robochoc.registry import protocol_named, protocol_names
 from robochoc.view.sniffer.columns import NOT_YET
-from robochoc.view.sniffer.feed import DETAILS, MOST_NOTES, MOST_ROWS, BadRequest, Feed
+from robochoc.view.sniffer.feed import DETAILS, MOST_NOTES, MOST_ROWS, BadRequest, Feed, verdict_of
 from robochoc.view.sniffer.packed import packed_feed
 from robochoc.view.sniffer.speech import PLATFORM
 from robochoc.view.sniffer.trace import Trace
@@ -194,3 +196,19 @@ def test_a_page_without_a_server_gets_all_answers_at_once() -> None:
     assert len(states) == sum(-(-robots.count(robot) // 64) for robot in set(robots))
     assert not [name for name in packed_feed(feed) if name.startswith("states:")]
     assert msgspec.json.decode(answers["states:0:0"])
+
+
+def test_the_end_is_told_as_the_report_tells_it() -> None:
+    header = Header(team="T", protocol="abt", runtime="simulator", seed=0)
+    given = Given(t=0, order=("R1", "R2", "R3"), robots={})
+
+    def ended(**ending: Any) -> str:  # noqa: ANN401 - fields of an outcome
+        outcome = replace(Outcome("T", "abt", "simulator", 0, Verdict.SOLUTION), **ending)
+        return verdict_of(Trace.of(Journal(header, (Began(t=0, protocol="ABT"), given), outcome, None)))
+
+    assert ended(cost=0) == "A solution."
+    assert ended(verdict=Verdict.OPTIMAL, cost=7) == "The best solution, of cost 7."
+    assert ended(lost=("R2",), withdrawn=("R2",)) == "A solution; lost: R2."
+    assert ended(witness="R1", withdrawn=("R2",)) == "No solution for all, as R1 has found out. 2 fly; aside: R2."
+    best = ended(verdict=Verdict.OPTIMAL, withdrawn=("R1", "R2"), lost=("R1",))
+    assert best == "No solution for all. 1 fly, no better team could; aside: R2; lost: R1."

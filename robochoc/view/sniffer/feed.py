@@ -19,6 +19,7 @@ import msgspec
 from robochoc.communication.acl import text
 from robochoc.communication.performatives import act_of
 from robochoc.formats.result import result_json
+from robochoc.outcome import Verdict
 from robochoc.problem import natural
 from robochoc.view.sniffer.columns import packed
 from robochoc.view.sniffer.names import Names
@@ -216,14 +217,18 @@ def verdict_of(trace: Trace) -> str:
     outcome = trace.outcome
     if outcome is None:
         return "The run broke off before an outcome." if trace.over else "The run goes on."
+    witness = f", as {outcome.witness} has found out" if outcome.witness else ""
+    reason = f": {outcome.reason}" if outcome.reason else ""
+    out = f"; lost: {_cut(outcome.lost)}" if outcome.lost else ""
+    if outcome.aside:
+        flying = len({*trace.robots}.difference(outcome.withdrawn))
+        better = ", no better team could" if outcome.verdict is Verdict.OPTIMAL else ""
+        return f"No solution for all{witness}. {flying} fly{better}; aside: {_cut(outcome.aside)}{out}."
     said = {"solution": "A solution", "optimal": "The best solution", "no-solution": "No solution"}.get(
         str(outcome.verdict), "No verdict"
     )
-    cost = "" if outcome.cost is None else f", of cost {outcome.cost:g}"
-    witness = f", as {outcome.witness} has found out" if outcome.witness else ""
-    reason = f": {outcome.reason}" if outcome.reason else ""
-    aside = f"; aside: {_cut(outcome.withdrawn)}" if outcome.withdrawn else ""
-    return f"{said}{cost}{witness}{reason}{aside}."
+    cost = f", of cost {outcome.cost:g}" if outcome.cost else ""
+    return f"{said}{cost}{witness}{reason}{out}."
 
 
 def _cut(names: Sequence[str], most: int = 8) -> str:
