@@ -91,6 +91,14 @@ def test_closed_streams_do_no_harm(four: Path, closed: str, runtime: str) -> Non
     assert entries_of(journal)[-1]["outcome"]["verdict"] == "no-solution"
 
 
+def test_a_run_that_is_refused_leaves_an_older_journal_alone(four: Path, tmp_path: Path) -> None:
+    older = tmp_path / "older.journal"
+    older.write_bytes(b"older")
+    done = robochoc("solve", four, "--protocol", "dsa", "--withdraw", "--journal", older)
+    assert done.returncode == 2, done.stderr
+    assert older.read_bytes() == b"older"
+
+
 def test_a_full_disk_is_said_after_the_verdict(four: Path) -> None:
     done = robochoc("solve", four, "--runtime", "simulator", "--journal", "/dev/full")
     assert done.returncode == 1

@@ -11,6 +11,7 @@ import threading
 from pathlib import Path
 from typing import BinaryIO, cast
 
+import msgspec
 import pytest
 from events import any_event, headers, outcomes
 from hypothesis import given, settings
@@ -18,7 +19,7 @@ from hypothesis import strategies as st
 from problems import team_of
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import AnyEvent, Began, Decided, Given, Heard, Improved, Received, Sent, Settled
+from robochoc.observers.events import AnyEvent, Began, Decided, Given, Heard, Improved, Received, Refused, Sent, Settled
 from robochoc.observers.journal import (
     BadJournal,
     Follower,
@@ -142,11 +143,45 @@ def test_what_is_too_large_for_a_block_is_left_out_and_said() -> None:
 # While it is written
 
 
+@pytest.mark.parametrize(
+    "poison",
+    [
+        Sent(t=1, sender="R", receiver="S", type="X", content={"x": {(1, 2): 3}}, bytes=1, clock=0),
+        Sent(t=1, sender="R", receiver="S", type="X", content={"x": msgspec.msgpack.Ext(5, b"")}, bytes=1, clock=0),
+        Settled(t=1, robot="R", clock=2**63, checks=0),
+        Settled(t=1, robot="R", clock=1, checks=2**64 - 1),
+        Received(t=1, sender="S", receiver="R", type="X", clock=-(2**63) - 1),
+    ],
+    ids=["keys that are no text", "extension", "clock", "checks", "negative"],
+)
+def test_what_could_not_be_read_again_spoils_nothing(poison: AnyEvent) -> None:
+    """A robot of another machine may tell of it: all that msgpack holds comes over the wire."""
+    first, instead, last = read_journal(told([settled(0), poison, settled(2)])).events
+    assert (first, last) == (settled(0), settled(2))
+    if isinstance(poison, Sent):
+        assert isinstance(instead, Sent)
+        assert list(instead.content) == ["left out"]
+    else:
+        assert isinstance(instead, Refused)
+        assert instead.who == "R"
+
+
+def test_without_any_event_nothing_is_written(tmp_path: Path) -> None:
+    (tmp_path / "run.journal").write_bytes(b"old")
+    file = JournalFile(tmp_path / "run.journal")
+    recorder = Recorder(HEADER, sinks=[file.write])
+    empty = [recorder.is_empty]
+    recorder(settled(0))
+    assert [*empty, recorder.is_empty] == [True, False]
+    assert is_journal((tmp_path / "run.journal").read_bytes())
+
+
 def test_it_is_followed_while_it_is_written_through_the_same_descriptor(tmp_path: Path) -> None:
     path = tmp_path / "run.journal"
     path.write_bytes(b"old")
     file = JournalFile(path)
     recorder = Recorder(HEADER, sinks=[file.write])
+    recorder.flush()
     with path.open("rb") as following:
         follower = Follower(following)
         assert follower.read() == [HEADER]
@@ -289,6 +324,7 @@ def test_a_full_disk_leaves_whole_blocks(tmp_path: Path) -> None:
 
 def test_what_cannot_be_replaced_stays(tmp_path: Path) -> None:
     recorder = Recorder(HEADER, sinks=[JournalFile(tmp_path / "no" / "run.journal").write])
+    recorder(settled(0))
     assert [failure.errno for failure in recorder.failures] == [errno.ENOENT]
     assert list(tmp_path.iterdir()) == []
 

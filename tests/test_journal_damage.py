@@ -205,6 +205,10 @@ def made(*contents: bytes, preamble: bytes = PREAMBLE) -> bytes:
     return journal
 
 
+VALUES = 9
+"""The place of the messages' values among a block's columns."""
+
+
 def columns(*lines: Line) -> bytes:
     return columns_of(lines, exact=True)
 
@@ -259,16 +263,16 @@ def test_what_no_message_can_hold_is_no_entry() -> None:
         {"x": {None: 1}},
         {"x": {(1, 2): 1}},
     ):
-        sent = Sent(t=0, sender="A", receiver="B", type="Ok", content=content, bytes=1, clock=0)
-        journal = read_journal(made(columns(HEADER), columns(sent)))
+        parts = msgspec.msgpack.decode(columns(*run(0, 1)))
+        parts[VALUES] = [content, *parts[VALUES][1:]]
+        journal = read_journal(made(columns(HEADER), msgspec.msgpack.encode(parts)))
         assert journal.events == ()
         assert "holds no entries" in str(journal.damage)
 
 
 def test_deeply_nested_messages_are_no_entries() -> None:
     (parts,) = [msgspec.msgpack.decode(columns(*run(0, 1)))]
-    place = 9  # of the messages' values
-    parts[place] = [msgspec.Raw(b"\x91" * 10**6 + b"\xc0")]
+    parts[VALUES] = [msgspec.Raw(b"\x91" * 10**6 + b"\xc0")]
     assert "holds no entries" in str(read_journal(made(columns(HEADER), msgspec.msgpack.encode(parts))).damage)
 
 

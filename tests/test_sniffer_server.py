@@ -106,6 +106,7 @@ def test_the_scene_moves_by_decisions(page: Served) -> None:
         "decisions?from=0&to=1e3",
         "details?chunk=1000000",
         "states?robot=999&chunk=0",
+        "scene?from=9999999999",
         "states?robot=0&chunk=x",
     ],
 )
@@ -236,10 +237,13 @@ def test_a_file_that_is_replaced_is_another_generation(file: Path, tmp_path: Pat
         assert page.json("about")["generation"] > 0
 
 
-def test_a_file_that_is_written_anew_is_another_generation(file: Path) -> None:
+@pytest.mark.parametrize("times", [0.2, 1.5])
+def test_a_file_that_is_written_anew_is_another_generation(file: Path, times: float) -> None:
+    """Also where there is more of it than there was."""
     with served(Session(file)) as page:
         assert page.json("about")["generation"] == 0
-        file.write_bytes(journal_of(EVENTS[:100], None, header(team="another")))
+        some = EVENTS[: int(len(EVENTS) * times)] + EVENTS[: int(len(EVENTS) * max(0, times - 1))]
+        file.write_bytes(journal_of(some, None, header(team="another")))
         wait_until(lambda: page.json("about")["team"] == "another", "it was not noticed")
         assert page.json("about")["generation"] > 0
 
@@ -268,6 +272,20 @@ def test_a_file_that_turns_out_to_be_none_is_told(tmp_path: Path) -> None:
     with served(Session(path)) as page:
         path.write_bytes(b"what is this?\n")
         assert page.refusal("about")[0] == 400
+
+
+def test_numbers_that_no_machine_holds_are_told(tmp_path: Path) -> None:
+    """In text they stand like any other; what cannot be put in order is no reason to keep a page waiting."""
+    beginning, *_ = lines_of(read_journal(WHOLE))
+    said = [
+        b'{"event":"Sent","t":%d,"sender":"a","receiver":"b","type":"X","content":{"x":%d},"bytes":1,"clock":0}\n' % one
+        for one in ((2, 1), (1, 10**30))
+    ]
+    path = tmp_path / "run.jsonl"
+    path.write_bytes(b"".join([beginning, *said]))
+    os.utime(path, (0, 0))
+    with served(Session(path)) as page:
+        wait_until(lambda: page.refusal("about")[0] == 400, "nothing is said")
 
 
 def test_a_page_that_does_not_listen_makes_nothing_wait_or_grow(page: Served, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,7 +19,6 @@ from robochoc.observers.events import AnyEvent, Began, Decided, Received, Refuse
 from robochoc.observers.journal import Header, Journal
 from robochoc.run import Options, Runtime, ScheduleName
 from robochoc.view.sniffer.columns import NOT_YET
-from robochoc.view.sniffer.excerpt import excerpt
 from robochoc.view.sniffer.feed import columns_of, steps_of
 from robochoc.view.sniffer.trace import MOST_COUNTED, MOST_NAMES, Trace, TraceTooLarge
 
@@ -318,14 +317,3 @@ def test_steps_travel_with_what_they_took_in() -> None:
         assert packets.tolist() == [one for step in range(first, end) for one in trace.packet(step)]
         assert len(content) == 32 * rows + 4 * len(packets)
         assert np.frombuffer(content, "<u2", rows, len(content) - 2 * rows).tolist() == list(trace.steps.run[first:end])
-
-
-def test_an_excerpt_keeps_what_its_messages_were() -> None:
-    trace = Trace.of(recorded("abt"))
-    kept = [one for one in range(len(trace.messages.t)) if one % 3 == 0]
-    part = excerpt(trace, kept)
-    is_sound(part)
-    assert [key_of(part, one) for one in range(len(kept))] == [key_of(trace, one) for one in kept]
-    assert [part.content(one) for one in range(len(kept))] == [trace.content(one) for one in kept]
-    for new, old in enumerate(kept):
-        assert [kept[cause] for cause in part.causes(new)] == [one for one in trace.causes(old) if one in kept]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ from robochoc.cli.saved import saved_journal
 
 if TYPE_CHECKING:
     from robochoc.observers.journal import Journal
+    from robochoc.view.sniffer.selection import Selection
     from robochoc.view.sniffer.trace import Trace
 
 FORMATS = ("jsonl", "acl", "csv", "mermaid", "html")
@@ -80,7 +82,7 @@ def export(
         raise click.UsageError(_one_line(str(nothing))) from nothing
     if trace.damage:
         click.echo(_one_line(f"{file}: it is not whole, this is what can be read: {trace.damage}"), err=True)
-    pieces = _pieces(form, read, trace, messages)
+    pieces = _pieces(form, read, trace, meant, messages)
     if output is None:
         for piece in pieces:
             click.echo(piece, nl=False)
@@ -91,7 +93,7 @@ def export(
     click.echo(f"{output}: {count}, {len(content):,} bytes")
 
 
-def _pieces(form: str, read: Journal, trace: Trace, messages: range | list[int]) -> Iterable[bytes]:
+def _pieces(form: str, read: Journal, trace: Trace, meant: Selection, messages: range | list[int]) -> Iterable[bytes]:
     """The export, piece by piece."""
     from robochoc.observers.journal import lines_of
     from robochoc.view.sniffer.export import TooMuchToDraw, acl_texts, mermaid, table
@@ -112,25 +114,29 @@ def _pieces(form: str, read: Journal, trace: Trace, messages: range | list[int])
             except TooMuchToDraw as much:
                 raise Failure(USAGE, f"{much} (choose some, by --robots, --types, --from and --to)") from much
         case _:
-            return [_page(read, trace, messages)]
+            return [_page(read, trace, meant)]
 
 
-def _page(read: Journal, trace: Trace, messages: range | list[int]) -> bytes:
-    if len(messages) > MOST_IN_PAGE:
+def _page(read: Journal, trace: Trace, meant: Selection) -> bytes:
+    """The whole run: what some messages were said for, and what came of them, stands in others."""
+    from robochoc.view.sniffer.selection import Selection
+
+    if meant != replace(Selection(), robots=meant.robots):
+        raise click.UsageError("a page holds the whole run; choose in it (--robots says whom it shows at first)")
+    count = len(trace.messages.t)
+    if count > MOST_IN_PAGE:
         raise Failure(
             USAGE,
-            f"{len(messages):,} messages are too many for one page: at most {MOST_IN_PAGE:,}"
-            " (choose some, by --robots, --types, --from and --to, or look at all of them with 'robochoc sniff')",
+            f"{count:,} messages are too many for one page: at most {MOST_IN_PAGE:,}"
+            " (look at them with 'robochoc sniff', or export another format)",
         )
-    from robochoc.view.sniffer.excerpt import excerpt
     from robochoc.view.sniffer.feed import Feed
     from robochoc.view.sniffer.moves import whole_scene
     from robochoc.view.sniffer.packed import packed_feed
     from robochoc.view.sniffer.page import page
 
-    whole = len(messages) == len(trace.messages.t)
-    feed = Feed(trace if whole else excerpt(trace, messages))
-    answers = {**packed_feed(feed, read), "scene": zlib.compress(whole_scene(feed.trace))}
+    feed = Feed(trace, chosen=meant.robots)
+    answers = {**packed_feed(feed, read), "scene": zlib.compress(whole_scene(trace))}
     return page("embedded", answers, title=f"{read.header.protocol} on {read.header.team}")
 
 

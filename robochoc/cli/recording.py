@@ -37,7 +37,8 @@ def recording(
     try:
         yield recorder
     except BaseException:
-        recorder.close()
+        if not recorder.is_empty:  # a run that was refused leaves the journal of another one alone
+            recorder.close()
         for failure in _failures(recorder):
             failure.show()
         raise

@@ -71,10 +71,12 @@ _json = msgspec.json.Encoder().encode
 def columns_of(entries: Iterable[Line], *, exact: bool) -> bytes:
     """What a block of `entries` holds. Unless `exact`, times are rounded to the nanosecond: clocks know no more.
 
-    Raises what msgspec does for what msgpack cannot hold: `TypeError`, `ValueError`, `OverflowError`.
+    Raises `TypeError`, `ValueError`, `OverflowError` or `RecursionError` for what `entries_of` would not read again:
+    robots on other machines may tell of anything, and what follows must not be lost with it.
     """
     columns = _Columns()
     columns.take(entries)
+    columns.check()
     return columns.packed(exact=exact)
 
 
@@ -92,6 +94,7 @@ class _Columns:
         self.values: list[Any] = []
         self.sizes: list[int] = []
         self.checks: list[int] = []
+        self.checked: list[int] = []
         self.assignments: list[dict[str, int]] = []
         self.others: list[Line] = []
 
@@ -120,6 +123,7 @@ class _Columns:
                 actors(words[entry.robot])
                 self.checks.append(entry.checks - checked.get(entry.robot, 0))
                 checked[entry.robot] = entry.checks
+                self.checked.append(entry.checks)
             elif type(entry) is Decided:
                 kinds(DECIDED)
                 actors(words[entry.robot])
@@ -130,6 +134,13 @@ class _Columns:
                 continue
             times(entry.t)
             clocks(entry.clock)
+
+    def check(self) -> None:
+        """Raise where there is something that cannot be read again."""
+        _json(self.values)
+        _whole(self.clocks)
+        _whole(self.checked)
+        _finite(entry.t for entry in self.others)
 
     def packed(self, *, exact: bool) -> bytes:
         """All of it, as msgpack."""
@@ -207,8 +218,7 @@ class _Entries:
         self._shapes = [_named(shape, block.words) for shape in block.shapes]
         self._times, self._clocks = _times(block), _whole(accumulate(block.clocks))
         _fit(self._times, timed)
-        if not all(map(isfinite, (*self._times, *(entry.t for entry in block.others)))):
-            raise ValueError("a time is no number")
+        _finite((*self._times, *(entry.t for entry in block.others)))
 
     def __iter__(self) -> Iterator[Line]:
         block, shapes, words = self._block, self._shapes, self._block.words
@@ -270,6 +280,11 @@ def _times(block: _Block) -> Sequence[float]:
     if not block.scale:
         raise ValueError("times are whole numbers, but have no scale")
     return [number / block.scale for number in accumulate(block.times)]
+
+
+def _finite(times: Iterable[float]) -> None:
+    if not all(map(isfinite, times)):
+        raise ValueError("a time is no number")
 
 
 def _whole(numbers: Iterable[int]) -> list[int]:

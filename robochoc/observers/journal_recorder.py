@@ -7,6 +7,7 @@ import io
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from operator import attrgetter
 from pathlib import Path
 from threading import Lock
@@ -14,7 +15,19 @@ from threading import Lock
 import msgspec
 
 from robochoc.files import Growing
-from robochoc.observers.events import AnyEvent, Began, Decided, Given, Heard, Improved, Sent
+from robochoc.observers.events import (
+    AnyEvent,
+    Began,
+    Concluded,
+    Decided,
+    Given,
+    Heard,
+    Improved,
+    Received,
+    Refused,
+    Sent,
+    Settled,
+)
 from robochoc.observers.journal_blocks import BEGINNING, LARGEST_BLOCK, PREAMBLE, framed
 from robochoc.observers.journal_columns import columns_of
 from robochoc.observers.journal_entries import Ended, Header, Line
@@ -57,9 +70,7 @@ class Recorder:
         self._beginning = PREAMBLE
         self._staged: list[bytes] = []
         self._number = 0
-        self._due = 0.0
-        with self._lock:
-            self._close_block()
+        self._due = 0.0  # so the first event is written at once, and the header with it
 
     def __call__(self, event: AnyEvent) -> None:
         """Take in one event. `Began` opens a run; times are compared within a run only."""
@@ -90,6 +101,11 @@ class Recorder:
                 self._pending.append(Ended(outcome=self.outcome))
             self._close_block()
             self._closed = True
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing has been told, and so nothing written: what stood in the file's place is still there."""
+        return self._number == 0 and len(self._pending) <= 1
 
     def content(self) -> bytes:
         """Close, and return the journal, where it was kept in memory."""
@@ -251,20 +267,25 @@ def _contents(lines: Sequence[Line], *, exact: bool) -> Iterator[bytes]:
             return
         why = f"it has {len(content):,} bytes, more than {LARGEST_BLOCK:,}"
     if len(lines) == 1:
-        if shorter := _shortened(lines[0], why):
-            yield columns_of([shorter], exact=exact)
+        with suppress(TypeError, ValueError, OverflowError, RecursionError):
+            yield columns_of([_instead(lines[0], why)], exact=exact)
         return
     middle = len(lines) // 2
     yield from _contents(lines[:middle], exact=exact)
     yield from _contents(lines[middle:], exact=exact)
 
 
-def _shortened(line: Line, why: str) -> Line | None:
-    """What can be written of an entry that cannot be written as it is; None: nothing."""
+def _instead(line: Line, why: str) -> Line:
+    """What is written for an entry that cannot be written as it is. Raises `ValueError` where there is nothing."""
     match line:
         case Sent():
             return msgspec.structs.replace(line, content={"left out": why})
         case Given():
             return msgspec.structs.replace(line, robots={}, why=why)
+        case Received():
+            who = line.receiver
+        case Decided() | Heard() | Settled() | Concluded():
+            who = line.robot
         case _:
-            return None
+            raise ValueError(why)
+    return Refused(t=line.t, who=who, what=f"have {type(line).__name__} written down", why=why)

@@ -56,6 +56,7 @@ class Following:
         """Begin anew, with the journal in `window`: the next generation."""
         self._window = window
         self._follower = Follower(BufferedReader(window))
+        self._head = window.head
         self._generation += 1
         self.trace = None
         self._last = float("-inf")
@@ -92,7 +93,7 @@ class Following:
         return done
 
     def _advance(self) -> bool:
-        if self._window.size < self._window.end:
+        if self._window.size < self._window.end or not self._window.head.startswith(self._head):
             self.restart(self._window.again())  # another journal has been written into the same file
         if self._ordering is not None:
             if next(self._ordering, self) is self:
@@ -185,16 +186,19 @@ def by_time(window: Window) -> Iterator[list[AnyEvent]]:
     here = window.again()
     follower = Follower(BufferedReader(here))
     aside = _Aside()
-    while lines := entries_of(follower, here, window.end):
-        for line in lines:
-            if isinstance(line, Header | Ended):
-                continue
-            if isinstance(line, Began):
-                yield from aside.sorted()
-                aside = _Aside()
-            aside.put(line)
-        yield []
-    yield from aside.sorted()
+    try:
+        while lines := entries_of(follower, here, window.end):
+            for line in lines:
+                if isinstance(line, Header | Ended):
+                    continue
+                if isinstance(line, Began):
+                    yield from aside.sorted()
+                    aside = _Aside()
+                aside.put(line)
+            yield []
+        yield from aside.sorted()
+    finally:
+        aside.close()
 
 
 class _Aside:
@@ -203,9 +207,12 @@ class _Aside:
     def __init__(self) -> None:
         self._times = array("d")
         self._ends = array("Q", [0])
-        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed when it is dropped
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `close`
         self._encode = msgspec.msgpack.Encoder().encode
         self._decode = msgspec.msgpack.Decoder(AnyEvent).decode
+
+    def close(self) -> None:
+        self._file.close()
 
     def put(self, event: AnyEvent) -> None:
         self._times.append(event.t)

@@ -20,6 +20,7 @@ from robochoc.problem import Assignment, Robot, natural
 from robochoc.view.crew import Craft, crafts_of, lone_craft
 from robochoc.view.layout import Layout, Point, lay_out
 from robochoc.view.scene import Scene
+from robochoc.view.sniffer.feed import BadRequest
 from robochoc.view.sniffer.trace import Trace
 from robochoc.view.stage import path_of, still
 
@@ -75,6 +76,8 @@ class Stage:
         """What the page draws, with the moves of the decisions from the `first` on; JSON."""
         drones = self._layout.drones
         upto = len(self._trace.decisions)
+        if first > upto:
+            raise BadRequest(f"there are {upto} decisions")
         commands = self._commands() if self and not first else []
         return {
             "commands": [base64.b64encode(command).decode() for command in commands],

@@ -36,6 +36,9 @@ class Selection:
         """The numbers of the messages that are meant, in order. Raises `NothingMeant`."""
         count = len(trace.messages.t)
         numbers = range(min(self.first, count), count if self.last is None else min(self.last + 1, count))
+        if count and not numbers:
+            upto = "on" if self.last is None else f"to {self.last}"
+            raise NothingMeant(f"there is no message from {self.first} {upto}, only 0 to {count - 1}")
         if not (self.robots or self.kinds or self.run is not None):
             return numbers
         robots = _places(trace.robots, self.robots, "robot")

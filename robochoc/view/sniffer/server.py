@@ -133,8 +133,8 @@ class Server:
         while True:
             try:
                 more = await loop.run_in_executor(self._reader, self.session.advance)
-            except (ValueError, OSError) as error:
-                self.trouble = str(error)
+            except Exception as error:  # noqa: BLE001 - of a stranger's file; whoever waits for it is to know
+                self.trouble = str(error) or type(error).__name__
                 self._tell()
                 return
             if more or self.session.begun != begun:

@@ -190,7 +190,8 @@ class Session:
     @property
     def file_name(self) -> str:
         """What a copy of it may be called."""
-        name = self._path.name if self._path else f"{self._trace.header.team}.journal"
+        trace = self._following.trace
+        name = self._path.name if self._path else f"{trace.header.team if trace else 'run'}.journal"
         return "".join(sign if sign.isascii() and (sign.isalnum() or sign in "._-") else "_" for sign in name)[:100]
 
     def bytes_at(self, place: int, most: int) -> bytes:

@@ -7,7 +7,7 @@ import os
 import stat
 from typing import Any
 
-_HEAD_BYTES = 32
+_HEAD_BYTES = 256
 
 
 class NoFile(OSError):  # noqa: N818 - named for what was found
