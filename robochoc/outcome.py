@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+RULED_OUT = "has ruled everything out"
+"""What a robot has done that alone can tell that there is no solution, in words that are true in every protocol: by
+deriving the empty nogood, by trying all there is, or by bounds."""
+
 
 class Verdict(StrEnum):
     """The answer to a problem; `UNKNOWN` when a limit was reached first."""
@@ -101,7 +105,7 @@ class Outcome:
     metrics: Metrics = field(default_factory=Metrics)
     verified: bool = False
     witness: str | None = None
-    """Who ended the search: for `no-solution`, the robot that derived the empty nogood."""
+    """Who ended the search: for `no-solution`, the robot that has `RULED_OUT`."""
     reason: str | None = None
     """Why, where that is not plain: a robot whose local problem has no solution, or the limit that was reached."""
     count: int | None = None

@@ -167,7 +167,7 @@ def test_withdraw_may_stand_alone_even_before_the_path(
 def test_solve_tells_people_what_happened(four: Path) -> None:
     words = robochoc("solve", four, "--withdraw", "--runtime", "simulator").stdout
     assert "no solution for the whole team (Robot" in words
-    assert "has derived the empty nogood" in words
+    assert "has ruled everything out" in words
     assert "as few as possible (proven) step aside" in words
     assert "10 fly, 6 step aside" in words
     assert "abt, then sfb, simulator, seed 0: " in words

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from dataclasses import replace
 from random import Random
@@ -14,15 +15,16 @@ from problems import random_team, team_of
 from replays import in_text, random_run, recorded, with_events
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import Sent, Settled
+from robochoc.observers.events import Concluded, Sent, Settled
 from robochoc.problem import Constraint, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.findings import Best
-from robochoc.registry import protocol_names
+from robochoc.registry import protocol_named, protocol_names
 from robochoc.replay import CannotReplay, Means, State, states_of
 from robochoc.replay.glance import LONGEST, glance
 from robochoc.replay.look import MOST_VALUES
 from robochoc.replay.phrases import Phrases
+from robochoc.replay.reasons import MOST_BACKTRACKS, MOST_REASONS
 from robochoc.replay.steps import actor
 from robochoc.run import Options, Runtime
 
@@ -47,7 +49,7 @@ def states(team: Team, robot: str, protocol: str = "abt", means: Means | None = 
 def test_why_a_robot_changes_its_mind() -> None:
     began, then = states(pair(), "RB")
     assert (began.step, began.value, began.view, began.nogoods) == (0, {"B": 1}, [], [])
-    assert began.why == ["B = 1 is its first value"]
+    assert began.why == ["it takes B = 1, the first value that nothing rules out"]
     assert (then.step, then.value, then.view) == (1, {"B": 2}, [("RA", "A = 1")])
     assert then.nogoods == ["while A = 1: B != 1"]
     assert [(one.value, one.ruled_out_by) for one in then.domain] == [
@@ -56,8 +58,8 @@ def test_why_a_robot_changes_its_mind() -> None:
         ("B = 3", None),
     ]
     assert then.why == [
-        "B = 1 was ruled out by: A = 1 (Ok from RA)",
-        "B = 2 is the first value that nothing rules out",
+        "B = 1 was ruled out by: A = 1 (RA said Ok: A = 1)",
+        "it takes B = 2, the first value that nothing rules out",
     ]
     assert then.more["higher"] == "RA"
 
@@ -66,10 +68,64 @@ def test_a_nogood_from_below_and_a_domain_without_a_value() -> None:
     team = team_of({"A": [1, 2], "B": [1], "C": [1]}, [differ("A", "B"), differ("A", "C")])
     last = states(team, "RA")[-1]
     assert last.nogoods == ["A != 1, whatever the others take"]
-    assert last.why[0].startswith("A = 1 was ruled out by: what holds whatever the others take (Nogood from R")
+    assert last.why[0].startswith("A = 1 was ruled out whatever the others take (R")
+    assert "RB said Nogood: A != 1, whatever the others take" in last.why[0]
     lower = states(team, "RB")[1]
     assert lower.why == []
     assert lower.view == []  # forgotten, as another value is sure to come
+
+
+def test_a_robot_without_a_value_left_says_what_had_ruled_out_each() -> None:
+    team = queens3d(3)
+    told = [state for state in states(team, "Robot1.2") if any("no value was left" in line for line in state.why)]
+    first = told[0]
+    place = next(place for place, line in enumerate(first.why) if line.startswith("no value was left"))
+    assert place <= MOST_REASONS
+    values = {name for line in first.why[:place] for name in re.findall(r"V1\.2 = \d", line.split(" ruled out")[0])}
+    assert values == {"V1.2 = 1", "V1.2 = 2", "V1.2 = 3"}
+    assert all(re.search("ruled out(?: by: V| whatever)", line) for line in first.why[:place])
+    assert re.match(r"no value was left, and it said Nogood to Robot1\.1: .*V1\.1 != \d", first.why[place])
+
+
+@pytest.mark.parametrize("protocol", ["awc", "sbt", "afc", "afc-ng", "disfc"])
+def test_so_it_does_in_other_protocols_once_for_each_time(protocol: str) -> None:
+    journal = recorded(queens3d(3), replace(SIMULATED, protocol=protocol))
+    told = [state.why for robot in queens3d(3).order for state in states_of(journal, robot) if state.why]
+    ends = [why for why in told if any(line.startswith("no value was left, and it said ") for line in why)]
+    assert ends
+    assert all(len(why) <= (MOST_REASONS + 2) * (MOST_BACKTRACKS + 1) for why in told)
+    assert any("ruled out by: " in why[0] for why in ends)
+    assert all(len({*why}) == len(why) for why in ends if protocol == "awc")
+
+
+def test_a_robot_that_ends_the_search_says_so() -> None:
+    team = team_of({"A": [1], "B": [1], "C": [1]}, [differ("A", "B"), differ("A", "C")])
+    (ended,) = [state for state in states(team, "RA") if "concluded" in str(state.why)]
+    assert ended.why == [
+        "A = 1 was ruled out whatever the others take",
+        "it has no value now",
+        "it concluded that there is no solution: no value is left, whatever the others take",
+    ]
+
+
+@pytest.mark.parametrize("protocol", [name for name in protocol_names() if protocol_named(name).traits.complete])
+def test_whoever_ends_the_search_says_so_in_every_protocol(protocol: str) -> None:
+    team = team_of({"A": [1], "B": [1]}, [differ("A", "B")])
+    journal = recorded(team, replace(SIMULATED, protocol=protocol))
+    concluded = {event.robot for event in journal.events if isinstance(event, Concluded)}
+    assert concluded
+    for robot in concluded:
+        told = [line for state in states_of(journal, robot) for line in state.why]
+        assert sum(line.startswith("it concluded that ") for line in told) == 1
+
+
+def test_views_stand_in_the_order_of_priority_and_what_is_empty_is_left_out() -> None:
+    journal = recorded(queens3d(3), SIMULATED)
+    order = queens3d(3).order
+    for state in states_of(journal, "Robot3.3"):
+        names = [name for name, _ in state.view]
+        assert names == sorted(names, key=order.index)
+        assert not {"nothing", "none"} & {*state.more.values()}
 
 
 @pytest.mark.parametrize(

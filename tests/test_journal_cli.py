@@ -7,6 +7,7 @@ import csv
 import io
 import json
 import re
+import shlex
 import zlib
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from robochoc.communication.acl import parse
 from robochoc.observers.events import AnyEvent, Began, Decided, Received, Sent, Settled
 from robochoc.observers.journal import Header, Journal, Recorder, read_journal
 from robochoc.view.sniffer.columns import NOT_YET
-from robochoc.view.sniffer.export import MOST_ARROWS, mermaid
+from robochoc.view.sniffer.export import MOST_ARROWS, drawable, mermaid
 from robochoc.view.sniffer.feed import Feed
 from robochoc.view.sniffer.patterns import matching, patterns_in
 from robochoc.view.sniffer.trace import Trace
@@ -212,6 +213,30 @@ def test_a_diagram_that_nobody_could_read_is_refused(tmp_path: Path) -> None:
     result = journal("export", path, "--format", "mermaid")
     assert result.exit_code == USAGE
     assert f"at most {MOST_ARROWS} (choose some, by --robots" in result.output
+
+
+@pytest.mark.parametrize("chosen", [(), ("--types", "*", "--from", "7", "--conversation", "1")])
+def test_with_the_refusal_comes_a_command_that_works(chosen: tuple[str, ...], tmp_path: Path) -> None:
+    path, output = tmp_path / "a long one.journal", tmp_path / "of it.mmd"
+    path.write_bytes(content_of(recorded("mgm")))
+    result = journal("export", path, "--format", "mermaid", "-o", output, *chosen)
+    assert result.exit_code == USAGE
+    command = shlex.split(result.output.strip().rsplit("; the first of them: ", 1)[1])
+    assert command[0] == "robochoc"
+    again = CliRunner().invoke(cli, command[1:])
+    assert again.exit_code == 0, again.output
+    arrows = [match for line in output.read_text().splitlines() if (match := ARROW.fullmatch(line))]
+    assert len(arrows) == MOST_ARROWS
+    assert arrows[0][4] == ("7" if chosen else "0")
+
+
+def test_a_diagram_of_long_names_is_cut_until_it_can_be_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    feed = Feed(Trace.of(recorded("mgm")))
+    monkeypatch.setattr("robochoc.view.sniffer.export.MOST_CHARACTERS", 3_000)
+    part = drawable(feed, range(len(feed.trace.messages.t)))
+    assert 20 < len(part) <= MOST_ARROWS / 4
+    assert part[0] == 0
+    assert mermaid(feed, part)
 
 
 def test_a_page_holds_everything(file: Path, tmp_path: Path) -> None:

@@ -13,12 +13,12 @@ from recorded import fed, recorded
 
 from robochoc.communication.acl import parse
 from robochoc.communication.conversation import Conversation
-from robochoc.observers.events import AnyEvent, Began, Given, Improved, Lost, Sent, Settled
+from robochoc.observers.events import AnyEvent, Began, Concluded, Given, Improved, Lost, Refused, Sent, Settled
 from robochoc.observers.journal import Header, Journal
-from robochoc.outcome import Outcome, Verdict
+from robochoc.outcome import Epoch, Outcome, Verdict
 from robochoc.registry import protocol_named, protocol_names
 from robochoc.view.sniffer.columns import NOT_YET
-from robochoc.view.sniffer.feed import DETAILS, MOST_NOTES, MOST_ROWS, BadRequest, Feed, verdict_of
+from robochoc.view.sniffer.feed import DETAILS, MOST_EPOCHS, MOST_NOTES, MOST_ROWS, BadRequest, Feed, verdict_of
 from robochoc.view.sniffer.packed import packed_feed
 from robochoc.view.sniffer.speech import PLATFORM
 from robochoc.view.sniffer.trace import Trace
@@ -209,6 +209,36 @@ def test_the_end_is_told_as_the_report_tells_it() -> None:
     assert ended(cost=0) == "A solution."
     assert ended(verdict=Verdict.OPTIMAL, cost=7) == "The best solution, of cost 7."
     assert ended(lost=("R2",), withdrawn=("R2",)) == "A solution; lost: R2."
-    assert ended(witness="R1", withdrawn=("R2",)) == "No solution for all, as R1 has found out. 2 fly; aside: R2."
+    aside = ended(witness="R1", withdrawn=("R2",))
+    assert aside == "No solution for all, as R1 has ruled everything out. 2 fly; aside: R2."
+    assert ended(verdict=Verdict.NO_SOLUTION, witness="R1") == "No solution, as R1 has ruled everything out."
+    assert ended(verdict=Verdict.OPTIMAL, witness="R1", cost=7) == "The best solution, of cost 7, as R1 has concluded."
+    gave_up = ended(verdict=Verdict.UNKNOWN, witness="R1", reason="R1 gave up, as its protocol has it")
+    assert gave_up == "No verdict: R1 gave up, as its protocol has it."
     best = ended(verdict=Verdict.OPTIMAL, withdrawn=("R1", "R2"), lost=("R1",))
     assert best == "No solution for all. 1 fly, no better team could; aside: R2; lost: R1."
+    epochs = [Epoch(verdict, ("R1",)) for verdict in (Verdict.SOLUTION, Verdict.NO_SOLUTION)]
+    epochs += [Epoch(Verdict.UNKNOWN, ("R1",), lost=("R2",))]
+    assert ended(epochs=(epochs[0],)) == "A solution."
+    assert ended(epochs=tuple(epochs)) == "3 epochs: a solution, no solution, R2 lost. The last: A solution."
+    many = ended(epochs=(epochs[0],) * 1000)
+    assert many == f"1,000 epochs: {', '.join(['a solution'] * MOST_EPOCHS)} and 992 more. The last: A solution."
+
+
+def test_notes_stand_at_the_steps_that_they_belong_to() -> None:
+    journal = recorded("abt")
+    concluded = [event.robot for event in journal.events if isinstance(event, Concluded)]
+    assert concluded
+    trace = Trace.of(journal)
+    notes = [note for note in json.loads(Feed(trace).about())["notes"] if note["kind"] == "concluded"]
+    assert [(note["robot"], note["text"]) for note in notes] == [(who, "concluded: no solution") for who in concluded]
+    for note in notes:
+        assert trace.robots[trace.steps.robot[note["step"]]] == note["robot"]
+        assert note["step"] == max(n for n, r in enumerate(trace.steps.robot) if trace.robots[r] == note["robot"])
+    half = len(journal.events) // 2
+    lost = Lost(t=journal.events[half].t, robot="Robot1.1", why="hit")
+    refused = Refused(t=lost.t, who="X", what="joining", why="unknown")
+    trace = Trace.of(replace(journal, events=(*journal.events[:half], lost, refused, *journal.events[half:])))
+    notes = [note for note in json.loads(Feed(trace).about())["notes"] if note["kind"] in {"lost", "refused"}]
+    assert [note["kind"] for note in notes] == ["lost", "refused"]
+    assert all(0 < note["step"] < len(trace.steps.t) for note in notes)

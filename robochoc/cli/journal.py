@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -82,7 +83,12 @@ def export(
         raise click.UsageError(_one_line(str(nothing))) from nothing
     if trace.damage:
         click.echo(_one_line(f"{file}: it is not whole, this is what can be read: {trace.damage}"), err=True)
-    pieces = _pieces(form, read, trace, meant, messages)
+    options = {"--robots": robots, "--types": types, "--from": first, "--conversation": conversation, "-o": output}
+    try:
+        pieces = _pieces(form, read, trace, meant, messages)
+    except _TooMany as many:
+        again = f"; the first of them: {_command(file, form, {**options, '--to': many.last})}" if many.last else ""
+        raise Failure(USAGE, f"{many}{again}") from many
     if output is None:
         for piece in pieces:
             click.echo(piece, nl=False)
@@ -96,7 +102,7 @@ def export(
 def _pieces(form: str, read: Journal, trace: Trace, meant: Selection, messages: range | list[int]) -> Iterable[bytes]:
     """The export, piece by piece."""
     from robochoc.observers.journal import lines_of
-    from robochoc.view.sniffer.export import TooMuchToDraw, acl_texts, mermaid, table
+    from robochoc.view.sniffer.export import TooMuchToDraw, acl_texts, drawable, mermaid, table
     from robochoc.view.sniffer.feed import Feed
     from robochoc.view.sniffer.part import part_of
 
@@ -109,12 +115,28 @@ def _pieces(form: str, read: Journal, trace: Trace, meant: Selection, messages: 
         case "csv":
             return table(Feed(trace), messages)
         case "mermaid":
+            feed = Feed(trace)
             try:
-                return [mermaid(Feed(trace), messages)]
+                return [mermaid(feed, messages)]
             except TooMuchToDraw as much:
-                raise Failure(USAGE, f"{much} (choose some, by --robots, --types, --from and --to)") from much
+                why = f"{much} (choose some, by --robots, --types, --from and --to)"
+                raise _TooMany(why, drawable(feed, messages)) from much
         case _:
             return [_page(read, trace, meant)]
+
+
+class _TooMany(Exception):  # noqa: N818 - named for what was found
+    """Too many messages for the form; `last` is the last one of those that are not (None: there are none)."""
+
+    def __init__(self, why: str, fitting: Sequence[int]) -> None:
+        super().__init__(why)
+        self.last = fitting[-1] if fitting else None
+
+
+def _command(file: Path, form: str, options: Mapping[str, object]) -> str:
+    """The command to be entered for the same, with `options` as far as they say something."""
+    given = [str(part) for name, value in options.items() if value not in (None, "", 0) for part in (name, value)]
+    return shlex.join(["robochoc", "journal", "export", str(file), "--format", form, *given])
 
 
 def _page(read: Journal, trace: Trace, meant: Selection) -> bytes:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from robochoc.change import changed_by
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
-from robochoc.outcome import Metrics, Outcome, Verdict
+from robochoc.outcome import RULED_OUT, Metrics, Outcome, Verdict
 from robochoc.problem import Kind, Team, natural
 
 WIDTH = 100
@@ -68,7 +68,7 @@ def _place(team: Team, outcome: Outcome) -> str:
 
 
 def _verdict(team: Team, outcome: Outcome) -> str:
-    why = outcome.witness and f"{outcome.witness} {_proof(outcome)}"
+    why = outcome.witness and f"{outcome.witness} {RULED_OUT}"
     if outcome.reason and not outcome.epochs:
         why = outcome.reason
     confirmed = ", confirmed centrally" * outcome.confirmed
@@ -104,17 +104,6 @@ def _proven(team: Team, outcome: Outcome) -> str:
         return outcome.verdict
     least = "" if outcome.verdict is Verdict.OPTIMAL else ", which may not be the least"
     return f"{outcome.verdict}, cost {_number(outcome.cost)}{least}"
-
-
-def _proof(outcome: Outcome) -> str:
-    """What the robot has done that ended the search alone."""
-    from robochoc.registry import UnknownProtocol, protocol_named
-
-    try:
-        minimises = protocol_named(outcome.protocol).traits.costs
-    except UnknownProtocol:
-        return "has found that out"
-    return "has found everything to be impossible" if minimises else "has derived the empty nogood"
 
 
 def _weight(team: Team, outcome: Outcome) -> str:

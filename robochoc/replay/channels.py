@@ -2,7 +2,9 @@
 
 The n-th message that was received on a channel is the n-th that was sent on it. A journal does not keep messages as
 they travelled, but their fields. In its binary form these are as they were, and a message is made again from them; in
-its text form numbers that are not finite, and tuples, have become something else, and it is made again by its type.
+its text form numbers that are not finite, bytes, and keys that are no text, have become something else, and it is made
+again by its type. What a type would make of fields that are as they were is not used: where it says `float` a protocol
+may have said 0, which travels as the integer that it is.
 Whether that has worked shows in its size, which the journal knows. Where it has not, the one is used that the sender
 has said again.
 """
@@ -47,9 +49,9 @@ class Words:
         if sent.type not in self._tags:
             return None
         fields = [self._tags[sent.type], *sent.content.values()]
-        for read in (self._as_it_was, self._through_json):
+        for read in (self._as_it_was, self._through_type, self._through_json):
             try:
-                content = _encode(read(fields))
+                content = read(fields)
             except _UNFIT:
                 continue
             if len(content) == sent.bytes:
@@ -69,13 +71,17 @@ class Words:
         except _UNFIT:
             return False
 
-    def _as_it_was(self, fields: list[Any]) -> Message:
-        return self._decoder.decode(_encode(fields))
+    def _as_it_was(self, fields: list[Any]) -> bytes:
+        content = _encode(fields)
+        self._decoder.decode(content)  # so that it is a message of the protocol's
+        return content
 
-    def _through_json(self, fields: list[Any]) -> Message:
+    def _through_type(self, fields: list[Any]) -> bytes:
+        return _encode(self._decoder.decode(_encode(fields)))
+
+    def _through_json(self, fields: list[Any]) -> bytes:
         """JSON makes text of bytes, and of keys that are none."""
-        message: Message = msgspec.convert(fields, self._union, str_keys=True)
-        return message
+        return _encode(msgspec.convert(fields, self._union, str_keys=True))
 
 
 class Channels:

@@ -6,20 +6,17 @@ text form has lost what a message said.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import msgspec
 
-from robochoc.message import Message
-from robochoc.observers.events import AnyEvent, Sent
+from robochoc.observers.events import AnyEvent
 from robochoc.observers.journal import Header, Journal
-from robochoc.protocols.protocol import Protocol
 from robochoc.replay.cast import CannotReplay, Cast, Means
 from robochoc.replay.look import Look, carefully
+from robochoc.replay.reasons import Reasons
 from robochoc.replay.replay import SIMULATED, Difference, Scene, Stops
 from robochoc.replay.steps import Step, runs_of, steps_of
-
-MOST_REASONS = 8
 
 
 class Choice(msgspec.Struct, frozen=True):
@@ -34,7 +31,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
 
     `value` are its variables' values (empty: none), `view` says of others what it knows, as pairs (robot, words),
     `domain` tells each own value with what rules it out, `nogoods` are those that are kept, `more` whatever else the
-    protocol keeps, by name, and `why` says why the value is another one than before (empty: it is not).
+    protocol keeps, by name, and `why` says why the value is another one than before, or why the robot has concluded the
+    search (empty: neither).
     """
 
     step: int
@@ -53,10 +51,12 @@ def states_of(
     *,
     header: Header | None = None,
     since: int = 0,
+    everything: Callable[[], Iterable[AnyEvent]] | None = None,
 ) -> Iterator[State]:
     """The states of `robot` after its own steps, from step number `since` on; a step that is there in part has none.
 
-    `journal` may be events alone, sorted as in one; then `header` is its header, if there is any. Raises
+    `journal` may be events alone, sorted as in one; then `header` is its header, if there is any. They may be those
+    of `robot` and to it, where `everything` gives those of all robots when they turn out to be needed. Raises
     `CannotReplay` where there is nothing to play by, and where it turns out that the protocol is not the one that was
     recorded. Where the journal does not tell what the robot was told next, the last state says so in `more`.
     """
@@ -65,6 +65,8 @@ def states_of(
     else:
         events = tuple(journal)
     for alone in (True, False):
+        if not alone and everything is not None:
+            events = tuple(everything())
         player = _Player(header, robot, means or Means(), alone=alone)
         try:
             for state in player.states(events, since):
@@ -122,14 +124,14 @@ class _Player:
         number, protocol = self._step, scene.ensemble.hosts[self._robot].protocol
         self._step += 1
         wanted = step.whole and number >= since
-        before = _Before(look, protocol) if wanted else None
-        difference = scene.play(step, number)
+        reasons = Reasons(look, protocol) if wanted else None
+        difference = scene.play(step, number, reasons.listen) if reasons else scene.play(step, number)
         if difference is not None:
             raise CannotReplay(f"{self._robot} does not do again what was recorded: {in_short(difference)}")
         heard = scene.heard
         for sent, message in heard:
             look.hear(sent.sender, message)
-        if before is None:
+        if reasons is None:
             return None
         return State(
             step=number,
@@ -138,7 +140,7 @@ class _Player:
             domain=[Choice(*pair) for pair in carefully(lambda: look.domain(protocol), [])],
             nogoods=carefully(lambda: look.nogoods(protocol), []),
             more=look.more(protocol),
-            why=carefully(lambda: before.reasons(protocol, heard, step), []),
+            why=carefully(lambda: reasons.told(heard, step), []),
         )
 
     def _last(self, step: Step, why: str, since: int) -> State | None:
@@ -147,57 +149,6 @@ class _Player:
             return None
         self._step += 1
         return State(step=self._step - 1, more={"replay": f"ends here: {why}"}) if self._step > since else None
-
-
-class _Before:
-    """What a robot had in mind before a step: to tell afterwards why it has changed it."""
-
-    def __init__(self, look: Look, protocol: Protocol) -> None:
-        self._look = look
-        self._value = protocol.value
-        self._text = carefully(lambda: self._told(protocol), None)
-
-    def _told(self, protocol: Protocol) -> str | None:
-        return None if protocol.value is None else self._look.own_value(protocol, protocol.value)
-
-    def reasons(self, protocol: Protocol, heard: Sequence[tuple[Sent, Message]], step: Step) -> list[str]:
-        """Why the value is another one now, in words; empty where it is not."""
-        if protocol.value == self._value:
-            return []
-        reasons = self._against_the_old(protocol, heard)
-        if not reasons:
-            reasons = [
-                f"{sent.sender} said {sent.type} ({self._look.said(sent.sender, message)})" for sent, message in heard
-            ]
-            more = len(reasons) - MOST_REASONS
-            reasons = [*reasons[:MOST_REASONS], *([f"and {more:,} more messages"] if more > 0 else [])]
-        back = [event for event in step.done if isinstance(event, Sent) and event.type in ("Nogood", "Backtrack")]
-        reasons += [f"no value was left, and it said {sent.type} to {sent.receiver}" for sent in back[:1]]
-        return [*reasons, self._now(protocol)]
-
-    def _against_the_old(self, protocol: Protocol, heard: Sequence[tuple[Sent, Message]]) -> list[str]:
-        """What rules out the value that it had, and who has said so; nothing where that is not known."""
-        if self._value is None or self._text is None or self._value >= len(protocol.problem.values):
-            return []
-        ruling = self._look.ruling(protocol, self._value)
-        if ruling is None:
-            return []
-        text, robots = ruling
-        told = [sent for sent, message in heard if sent.sender in robots or hasattr(message, "lhs")]
-        sources = ", ".join(dict.fromkeys(f"{sent.type} from {sent.sender}" for sent in told[:MOST_REASONS]))
-        return [f"{self._text} was ruled out by: {text}{f' ({sources})' if sources else ''}"]
-
-    def _now(self, protocol: Protocol) -> str:
-        """What can be said of the new value."""
-        index = protocol.value
-        if index is None:
-            return "it has no value now"
-        text = self._look.own_value(protocol, index)
-        store = vars(protocol).get("store")
-        higher = range(index)
-        if store is not None and index and all(self._look.against(protocol, place) is not None for place in higher):
-            return f"{text} is the first value that nothing rules out"
-        return f"{text} is its first value" if self._value is None and not index else f"it takes {text}"
 
 
 def in_short(difference: Difference) -> str:

@@ -11,7 +11,7 @@ from itertools import islice
 from typing import Any
 
 from robochoc.message import Message, Value
-from robochoc.problem import INFINITE
+from robochoc.problem import INFINITE, natural
 from robochoc.protocols.afc import AFC
 from robochoc.protocols.awc import AWC, NogoodList
 from robochoc.protocols.bounding import BoundingProtocol
@@ -31,10 +31,13 @@ MOST_NOGOODS = 60
 MOST_SEEN = 200
 """Robots whose values are shown."""
 MOST_ELSE = 40
+ALWAYS = "what holds whatever the others take"
 VIEWS = ("view", "cpa", "path", "assignments", "context")
 """Attributes in which protocols keep what they know of others' values."""
-_KNOWN = {"problem", "order", "outbox", "value", "verdict", "chance", "settings", "store", "nogoods"}
+_KNOWN = {"problem", "order", "outbox", "value", "verdict", "chance", "settings", "store", "nogoods", "allowed"}
 """Attributes that are shown elsewhere, or say nothing."""
+
+_EMPTY = {"nothing", "none"}
 
 
 class Look:
@@ -44,7 +47,8 @@ class Look:
         self._part = part
         self._problem = LocalProblem(part)  # one of its own: what is checked here counts for nobody
         self._own = Phrases(part.interfaces)
-        self._agent = part.robot.name
+        self.agent = part.robot.name
+        self._ranks = {name: rank for rank, name in enumerate(part.order)}
         self._heard: dict[str, Message] = {}
         self._told: dict[str, Value] = {}
 
@@ -65,18 +69,25 @@ class Look:
         elif known is not None:
             pairs = {name: others.told(name, value) for name, value in known.items()}
         else:
-            pairs = {name: self.said(name, message) for name, message in self._heard.items()}
+            pairs = {name: self.said(name, message) or type(message).__name__ for name, message in self._heard.items()}
             pairs |= {name: self._own.told(name, value) for name, value in self._told.items()}
-        shown = list(islice(pairs.items(), MOST_SEEN))
+        shown = [(name, pairs[name]) for name in sorted(pairs, key=self._rank)[:MOST_SEEN]]
         more = len(pairs) - len(shown)
         return [*shown, ("", f"and {more:,} more")] if more else shown
 
-    def said(self, sender: str, message: Message) -> str:
-        """What `sender` has said to this robot."""
+    def _rank(self, robot: str) -> tuple[int, object]:
+        """In the priority order; those who are not in it come last."""
+        rank = self._ranks.get(robot)
+        return (0, rank) if rank is not None else (1, natural(robot))
+
+    def said(self, sender: str, message: Message, receiver: str = "") -> str:
+        """What `sender` has said, to this robot if to no other `receiver`."""
         fields = {name: getattr(message, name) for name in message.__struct_fields__}
         value, lhs = as_value(fields.get("value")), fields.get("lhs")
         if value is not None and isinstance(lhs, Mapping):
-            return f"while {self._own.all(self._pairs(lhs, ())) or 'anything'}: {self._own.against(self._agent, value)}"
+            held = self._own.all(self._pairs(lhs, ()))
+            against = self._own.against(receiver or self.agent, value)
+            return f"while {held}: {against}" if held else f"{against}, whatever the others take"
         if value is not None:
             fields["value"] = self._own.told(sender, value)
         elif "value" in fields and fields["value"] is None:
@@ -99,7 +110,7 @@ class Look:
 
     def own_value(self, protocol: Protocol, index: int) -> str:
         """The value at `index`, with what it costs where anything does."""
-        text = self._own.told(self._agent, protocol.problem.values[index])
+        text = self._own.told(self.agent, protocol.problem.values[index])
         if isinstance(protocol, BoundingProtocol):
             return f"{text} (LB {glance(protocol.lower[index])}, UB {glance(protocol.upper[index])})"
         if protocol.traits.costs:
@@ -117,9 +128,7 @@ class Look:
         store = vars(protocol).get("store")
         if isinstance(store, NogoodStore):
             lhs = store[index]
-            return (
-                None if lhs is None else (self._others(protocol).all(lhs) or "what holds whatever the others take", lhs)
-            )
+            return None if lhs is None else (self._others(protocol).all(lhs) or ALWAYS, lhs)
         broken = self._problem.explained(index, self._seen(protocol))
         if broken is not None:
             lhs, key = broken
@@ -136,7 +145,7 @@ class Look:
         return [*found[:MOST_NOGOODS], "and more"] if len(found) > MOST_NOGOODS else found
 
     def more(self, protocol: Protocol) -> dict[str, str]:
-        """Everything else that the protocol keeps; of ours what is not only for itself."""
+        """Everything else that the protocol keeps; of ours what is not only for itself, and not empty."""
         ours = type(protocol).__module__.startswith("robochoc.")
         skipped = {*_KNOWN, carefully(lambda: self._view_in(protocol), "")}
         told: dict[str, str] = {}
@@ -147,7 +156,9 @@ class Look:
         for name, thing in vars(protocol).items():
             if name in skipped or (ours and name.startswith("_")) or len(told) == MOST_ELSE:
                 continue
-            told.setdefault(name.lstrip("_"), glance(thing))
+            shown = glance(thing)
+            if not (ours and shown in _EMPTY):
+                told.setdefault(name.lstrip("_"), shown)
         return told
 
     # What is known of others
@@ -191,7 +202,7 @@ class Look:
         if isinstance(store, NogoodStore):
             others = self._others(protocol)
             return [
-                (others.all(lhs), self._own.against(self._agent, values[index]))
+                (others.all(lhs), self._own.against(self.agent, values[index]))
                 for index in range(len(values))
                 if (lhs := store[index]) is not None
             ]
@@ -200,9 +211,9 @@ class Look:
         return []
 
     def _awc(self, nogood: dict[str, Value]) -> tuple[str, str]:
-        own = nogood.pop(self._agent, ())
+        own = nogood.pop(self.agent, ())
         lhs = sorted(nogood.items(), key=lambda pair: self._part.order.index(pair[0]))
-        return self._own.all(lhs), self._own.against(self._agent, own)
+        return self._own.all(lhs), self._own.against(self.agent, own)
 
 
 def carefully(look: Callable[[], Any], otherwise: Any) -> Any:  # noqa: ANN401 - whatever is looked at

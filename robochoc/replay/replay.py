@@ -90,15 +90,17 @@ class SaysNoEnd(Exception):  # noqa: N818 - named for what happens
 class _Outbox(list[tuple[str, Message]]):
     """An outbox that takes so many messages: a protocol that goes round in a circle mostly speaks on the way."""
 
-    def __init__(self, most: int) -> None:
+    def __init__(self, most: int, listen: Callable[[str, Message], None]) -> None:
         super().__init__()
         self._most = most
+        self._listen = listen
 
     def append(self, said: tuple[str, Message]) -> None:
         """Take one more. Raises `SaysNoEnd`."""
         if len(self) >= self._most:
             raise SaysNoEnd(f"{len(self):,} messages in one step, and no end of it")
         super().append(said)
+        self._listen(*said)
 
 
 class Stops(Exception):  # noqa: N818 - named for what happens
@@ -155,15 +157,20 @@ class Scene:
                 if not steps:
                     del waiting[name]
 
-    def play(self, step: Step, number: int) -> Difference | None:
-        """Play the step, its robot's number `number`; returns what was otherwise, if anything. Raises `Stops`."""
+    def play(
+        self, step: Step, number: int, listen: Callable[[str, Message], None] = lambda *_: None
+    ) -> Difference | None:
+        """Play the step, its robot's number `number`; returns what was otherwise, if anything. Raises `Stops`.
+
+        `listen` is called with each receiver and message at the moment the protocol says it, in mid-step.
+        """
         host = self.ensemble.hosts.get(step.robot)
         if host is None:
             raise Stops("it is not in the team")
         told: list[AnyEvent] = []
         host.observe(told.append, lambda: 0.0)
         recorded = sum(isinstance(event, Sent) for event in step.done)
-        host.protocol.outbox = _Outbox(recorded + MORE_THAN_RECORDED)
+        host.protocol.outbox = _Outbox(recorded + MORE_THAN_RECORDED, listen)
         packet: list[Sent] = []
         self.heard = []
         said: Sequence[Envelope] = ()

@@ -102,6 +102,19 @@ def mermaid(feed: Feed, messages: Sequence[int]) -> bytes:
     return diagram.encode()
 
 
+def drawable(feed: Feed, messages: Sequence[int]) -> Sequence[int]:
+    """So many of the first of `messages` that a diagram can hold them."""
+    part = messages[:MOST_ARROWS]
+    while part:
+        try:
+            mermaid(feed, part)
+        except TooMuchToDraw:
+            part = part[: len(part) // 2]
+        else:
+            break
+    return part
+
+
 def _notes(trace: Trace, messages: Sequence[int]) -> list[tuple[int, dict[str, int]]]:
     """The decisions between the first message and the last one."""
     if not messages:

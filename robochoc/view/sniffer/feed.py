@@ -12,14 +12,14 @@ Steps and messages have numbers (`trace.py`). No answer holds more than a fixed 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, assert_never
 
 import msgspec
 
 from robochoc.communication.acl import text
 from robochoc.communication.performatives import act_of
 from robochoc.formats.result import result_json
-from robochoc.outcome import Verdict
+from robochoc.outcome import RULED_OUT, Epoch, Outcome, Verdict
 from robochoc.problem import natural
 from robochoc.view.sniffer.columns import packed
 from robochoc.view.sniffer.names import Names
@@ -37,6 +37,8 @@ STATES = 64
 """Steps of a robot in one chunk of its states."""
 MOST_NOTES = 1000
 """Of each sort: on what becomes cheaper, and all others."""
+MOST_EPOCHS = 8
+"""Of which the verdict says how they ended."""
 
 _OFTEN = {"heard", "improved"}
 
@@ -213,22 +215,53 @@ def _note_of(note: Note) -> dict[str, Any]:
 
 
 def verdict_of(trace: Trace) -> str:
-    """How the run ended, in words."""
+    """How the run ended, in words; of several epochs, how each did."""
     outcome = trace.outcome
     if outcome is None:
         return "The run broke off before an outcome." if trace.over else "The run goes on."
-    witness = f", as {outcome.witness} has found out" if outcome.witness else ""
+    last = _ending(trace, outcome)
+    return f"{_epochs(outcome.epochs)} The last: {last}" if len(outcome.epochs) > 1 else last
+
+
+def _ending(trace: Trace, outcome: Outcome) -> str:
     reason = f": {outcome.reason}" if outcome.reason else ""
     out = f"; lost: {_cut(outcome.lost)}" if outcome.lost else ""
     if outcome.aside:
+        witness = f", as {outcome.witness} {RULED_OUT}" if outcome.witness else ""
         flying = len({*trace.robots}.difference(outcome.withdrawn))
         better = ", no better team could" if outcome.verdict is Verdict.OPTIMAL else ""
         return f"No solution for all{witness}. {flying} fly{better}; aside: {_cut(outcome.aside)}{out}."
-    said = {"solution": "A solution", "optimal": "The best solution", "no-solution": "No solution"}.get(
-        str(outcome.verdict), "No verdict"
-    )
+    said = _said(outcome.verdict)
     cost = f", of cost {outcome.cost:g}" if outcome.cost else ""
-    return f"{said}{cost}{witness}{reason}{out}."
+    return f"{said[0].upper()}{said[1:]}{cost}{_by(outcome)}{reason}{out}."
+
+
+def _said(verdict: Verdict) -> str:
+    match verdict:
+        case Verdict.SOLUTION:
+            return "a solution"
+        case Verdict.OPTIMAL:
+            return "the best solution"
+        case Verdict.NO_SOLUTION:
+            return "no solution"
+        case Verdict.UNKNOWN:
+            return "no verdict"
+        case never:
+            assert_never(never)
+
+
+def _by(outcome: Outcome) -> str:
+    """Who could tell alone; who gave up is named in the reason."""
+    if outcome.witness is None or outcome.verdict is Verdict.UNKNOWN:
+        return ""
+    return f", as {outcome.witness} {RULED_OUT if outcome.verdict is Verdict.NO_SOLUTION else 'has concluded'}"
+
+
+def _epochs(epochs: Sequence[Epoch]) -> str:
+    """How many there were, and how each of the first ones ended."""
+    ends = [f"{_cut(epoch.lost, 3)} lost" if epoch.lost else _said(epoch.verdict) for epoch in epochs[:MOST_EPOCHS]]
+    more = len(epochs) - len(ends)
+    return f"{len(epochs):,} epochs: {', '.join(ends)}{f' and {more:,} more' if more else ''}."
 
 
 def _cut(names: Sequence[str], most: int = 8) -> str:

@@ -1,7 +1,7 @@
 """What robots knew after each of their steps, in chunks, from the journal's file.
 
 A robot is played again with what it was told. Its events are read from the file when somebody asks, those of the
-other robots are not kept.
+other robots only where the robot cannot be played without them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import msgspec
 from robochoc.observers.events import AnyEvent, Began, Concluded, Decided, Given, Heard, Received, Sent, Settled
 from robochoc.observers.journal import Ended, Follower, Header
 from robochoc.replay import CannotReplay
-from robochoc.replay.insight import states_of
+from robochoc.replay.insight import State, states_of
 from robochoc.view.sniffer.cache import Cache
 from robochoc.view.sniffer.feed import STATES, BadRequest
 from robochoc.view.sniffer.following import entries_of
@@ -31,7 +31,7 @@ class _Playing(NamedTuple):
     robot: str
     size: int
     """How long the file was."""
-    states: Iterator[object]
+    states: Iterator[State]
 
 
 class Insight:
@@ -54,17 +54,18 @@ class Insight:
             return kept
         playing = self._playing
         if playing is None or playing.robot != robot or number < self._next or playing.size != window.end:
-            try:
-                playing = _Playing(robot, window.end, iter(states_of(self._events(window, robot), robot)))
-            except CannotReplay as reason:
-                raise BadRequest(str(reason)) from reason
+            playing = _Playing(robot, window.end, self._states(window, robot))
             self._playing, self._next = playing, 0
         answer = b"[]"
         while self._next <= number and not self.stopped:
             try:
                 states = list(islice(playing.states, STATES))
             except CannotReplay as reason:
+                self._playing = None
                 raise BadRequest(str(reason)) from reason
+            except BadRequest:
+                self._playing = None
+                raise
             answer = msgspec.json.encode(states)
             if len(states) < STATES:
                 self._playing = None
@@ -74,8 +75,17 @@ class Insight:
             self._next += 1
         return answer
 
-    def _events(self, window: Window, robot: str) -> Iterator[AnyEvent]:
-        """What concerns `robot`, each run's in the order of their times."""
+    def _states(self, window: Window, robot: str) -> Iterator[State]:
+        return states_of(
+            self._events(window, robot),
+            robot,
+            header=_header(window),
+            everything=lambda: self._events(window),
+        )
+
+    def _events(self, window: Window, robot: str | None = None) -> Iterator[AnyEvent]:
+        """What concerns `robot`, or all that robots do, each run's in the order of their times."""
+        whose = robot or "all robots together"
         here = window.again()
         follower = Follower(BufferedReader(here))
         run: list[AnyEvent] = []
@@ -86,7 +96,7 @@ class Insight:
                     continue
                 count += 1
                 if count > MOST_EVENTS:
-                    raise BadRequest(f"{robot} has done too much to be played again here (see robochoc replay)")
+                    raise BadRequest(f"{whose} did too much to be played again here (see robochoc replay)")
                 if isinstance(line, Began):
                     yield from sorted(run, key=_time)
                     run.clear()
@@ -98,13 +108,19 @@ def _time(event: AnyEvent) -> float:
     return event.t
 
 
-def _concerns(event: AnyEvent, robot: str) -> bool:
+def _header(window: Window) -> Header | None:
+    here = window.again()
+    lines = entries_of(Follower(BufferedReader(here)), here, window.end)
+    return lines[0] if lines and isinstance(lines[0], Header) else None
+
+
+def _concerns(event: AnyEvent, robot: str | None) -> bool:
     match event:
         case Sent():
-            return robot in {event.sender, event.receiver}
+            return robot in {None, event.sender, event.receiver}
         case Received():
-            return event.receiver == robot
+            return robot in {None, event.receiver}
         case Decided() | Heard() | Settled() | Concluded():
-            return event.robot == robot
+            return robot in {None, event.robot}
         case _:
             return isinstance(event, Began | Given)

@@ -27,7 +27,10 @@ class Run(msgspec.Struct, frozen=True):
 
 
 class Note(msgspec.Struct, frozen=True):
-    """Something beside messages and decisions; `step` is the number of the step that comes next."""
+    """Something beside messages and decisions: `step` is the number of the step in which `robot` did it.
+
+    Of what no robot did in a step, as losses and refusals, it is the number of the step that comes next.
+    """
 
     t: float
     step: int

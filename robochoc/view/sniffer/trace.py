@@ -218,7 +218,7 @@ class Trace:
             case Decided():
                 self._open_step(event.robot, event).decided = event.assignment
             case Concluded():
-                note = (event.t, "concluded", f"{event.robot} alone can tell: {event.verdict}")
+                note = (event.t, "concluded", f"concluded: {event.verdict.replace('-', ' ')}")
                 self._open_step(event.robot, event).notes.append(note)
             case Heard():
                 note = (event.t, "heard", f"{event.robot} knows of an assignment that costs {event.cost}")

@@ -1,0 +1,199 @@
+"""Why a robot has changed its mind in a step, or has ended the search: in words, each a line to be shown."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
+
+from robochoc.message import Message
+from robochoc.observers.events import Concluded, Sent
+from robochoc.outcome import Verdict
+from robochoc.protocols.nogood import NogoodStore
+from robochoc.protocols.protocol import Protocol
+from robochoc.replay.look import ALWAYS, MOST_VALUES, Look, carefully
+from robochoc.replay.phrases import as_value
+from robochoc.replay.steps import Step
+
+MOST_REASONS = 8
+MOST_BACKTRACKS = 3
+"""In one step: after each, a robot may find that no value is left again."""
+MOST_TOGETHER = 3
+"""Values that are named where one reason rules out several."""
+BACKTRACKS = {"Nogood", "Backtrack", "BacktrackCPA"}
+"""Types of messages by which robots say that they have no value left."""
+
+_CONCLUDED = {
+    Verdict.NO_SOLUTION: "that there is no solution",
+    Verdict.OPTIMAL: "that no solution is better than the best one known",
+    Verdict.SOLUTION: "that a solution is found",
+}
+
+
+class _DeadEnd(NamedTuple):
+    """A moment without a value left: what had ruled out each, and what was said then, to whom."""
+
+    ruled_out: list[str]
+    kind: str
+    said: str
+    receivers: list[str]
+
+    def lines(self) -> list[str]:
+        more = len(self.receivers) - MOST_REASONS
+        whom = ", ".join([*self.receivers[:MOST_REASONS], *([f"{more:,} more"] if more > 0 else [])])
+        words = f"no value was left, and it said {self.kind} to {whom}{f': {self.said}' if self.said else ''}"
+        return [*self.ruled_out, words]
+
+
+class Reasons:
+    """Looks at a robot before a step, in it, whenever the robot speaks, and after it."""
+
+    def __init__(self, look: Look, protocol: Protocol) -> None:
+        self._look = look
+        self._protocol = protocol
+        self._value = protocol.value
+        self._text = carefully(lambda: self._named(protocol.value), None)
+        self._dead_ends: list[_DeadEnd] = []
+
+    def listen(self, receiver: str, message: Message) -> None:
+        """The robot says `message`: where that is because no value is left, what rules each out is known now only."""
+        kind = type(message).__name__
+        if kind not in BACKTRACKS:
+            return
+        if self._store() is not None and self._protocol.value is not None:
+            return  # it has a value, and rules out another robot's
+        ruled_out = carefully(self._ruled_out, [])
+        if self._dead_ends and self._dead_ends[-1].ruled_out == ruled_out:
+            self._dead_ends[-1].receivers.append(receiver)  # of AWC all in the nogood are told
+        elif len(self._dead_ends) <= MOST_BACKTRACKS:
+            said = carefully(lambda: self._look.said(self._look.agent, message, receiver), "")
+            self._dead_ends.append(_DeadEnd(ruled_out, kind, said, [receiver]))
+
+    def told(self, heard: Sequence[tuple[Sent, Message]], step: Step) -> list[str]:
+        """Why the value is another one now, after `heard` was taken in, or the search over; empty: neither is so."""
+        concluded = [event.verdict for event in step.done if isinstance(event, Concluded)]
+        if self._protocol.value == self._value and not concluded:
+            return []
+        lines = [line for dead_end in self._dead_ends[:MOST_BACKTRACKS] for line in dead_end.lines()]
+        if len(self._dead_ends) > MOST_BACKTRACKS:
+            lines.append("and so on, until a value was left")
+        hopeless = bool(concluded) and concluded[0] == str(Verdict.NO_SOLUTION) and self._hopeless()
+        if hopeless:
+            lines += self._ruled_out()
+        lines = lines or self._against_the_old(heard) or self._heard(heard)
+        if self._protocol.value != self._value:
+            lines.append(self._now())
+        return [*lines, *(self._ended(verdict, hopeless=hopeless) for verdict in concluded)]
+
+    # What rules values out
+
+    def _store(self) -> NogoodStore | None:
+        store = vars(self._protocol).get("store")
+        return store if isinstance(store, NogoodStore) else None
+
+    def _ruled_out(self) -> list[str]:
+        """What rules out each value, those together that are ruled out by the same."""
+        count = len(self._protocol.problem.values)
+        by_reason: dict[str, list[str]] = {}
+        for index in range(min(count, MOST_VALUES)):
+            reason = self._look.against(self._protocol, index)
+            if reason is not None:
+                by_reason.setdefault(reason, []).append(self._look.own_value(self._protocol, index))
+        lines = [f"{_together(values)} ruled out{_by(reason)}" for reason, values in by_reason.items()]
+        shown = lines[:MOST_REASONS]
+        rest = count - sum(map(len, list(by_reason.values())[:MOST_REASONS]))
+        cut = count > MOST_VALUES or len(lines) > len(shown)
+        return [*shown, f"and {rest:,} more values"] if cut and rest else shown
+
+    def _against_the_old(self, heard: Sequence[tuple[Sent, Message]]) -> list[str]:
+        """What rules out the value that it had, and who has said so; nothing where that is not known."""
+        protocol, old = self._protocol, self._value
+        if old is None or self._text is None or old >= len(protocol.problem.values):
+            return []
+        ruling = self._look.ruling(protocol, old)
+        if ruling is None:
+            return []
+        text, robots = ruling
+        own = protocol.problem.values[old]
+        told = _last([(sent, message) for sent, message in heard if _is_about(message, sent.sender, robots, own)])
+        sources = "; ".join(self._words_of(sent, message) for sent, message in told[:MOST_REASONS])
+        return [f"{self._text} was ruled out{_by(text)}{f' ({sources})' if sources else ''}"]
+
+    def _heard(self, heard: Sequence[tuple[Sent, Message]]) -> list[str]:
+        more = len(heard) - MOST_REASONS
+        shown = [self._words_of(sent, message) for sent, message in heard[:MOST_REASONS]]
+        return [*shown, *([f"and {more:,} more messages"] if more > 0 else [])]
+
+    def _words_of(self, sent: Sent, message: Message) -> str:
+        said = self._look.said(sent.sender, message)
+        return f"{sent.sender} said {sent.type}{f': {said}' if said else ''}"
+
+    # What has come of it
+
+    def _now(self) -> str:
+        """What can be said of the new value."""
+        index = self._protocol.value
+        if index is None:
+            return "it has no value now"
+        first = carefully(lambda: self._is_first(index), False)
+        text = self._named(index) or ""
+        if text.startswith("steps aside"):
+            return f"it {text}"
+        return f"it takes {text}{', the first value that nothing rules out' if first else ''}"
+
+    def _is_first(self, index: int) -> bool:
+        """Whether all values before are ruled out; where values have costs, that says nothing."""
+        protocol, store = self._protocol, self._store()
+        if protocol.traits.costs:
+            return False
+        if store is not None:
+            return store[index] is None and all(store[place] is not None for place in range(index))
+        if index >= MOST_VALUES:
+            return False
+        against = [self._look.against(protocol, place) is not None for place in range(index + 1)]
+        return all(against[:-1]) and not against[-1]
+
+    def _hopeless(self) -> bool:
+        """Whether all own values are ruled out, whatever others take."""
+        store = self._store()
+        if store is None:
+            return False
+        return all(store[index] is not None for index in range(len(self._protocol.problem.values))) and not any(store)
+
+    def _ended(self, verdict: str, *, hopeless: bool) -> str:
+        words = next((words for known, words in _CONCLUDED.items() if str(known) == verdict), f"the search: {verdict}")
+        return f"it concluded {words}{': no value is left, whatever the others take' if hopeless else ''}"
+
+    def _named(self, index: int | None) -> str | None:
+        return None if index is None else self._look.own_value(self._protocol, index)
+
+
+def _by(reason: str) -> str:
+    return f"{reason.removeprefix('what holds')}" if reason == ALWAYS else f" by: {reason}"
+
+
+def _last(heard: Sequence[tuple[Sent, Message]]) -> list[tuple[Sent, Message]]:
+    """Of what each robot has told of itself in one packet the last, and all nogoods."""
+    latest = {sent.sender: place for place, (sent, message) in enumerate(heard) if not hasattr(message, "lhs")}
+    return [pair for place, pair in enumerate(heard) if hasattr(pair[1], "lhs") or latest[pair[0].sender] == place]
+
+
+def _together(values: Sequence[str]) -> str:
+    """Values, each by its name, and that they were."""
+    if len(values) == 1:
+        return f"{values[0]} was"
+    more = len(values) - MOST_TOGETHER
+    shown = [*values[:MOST_TOGETHER], *([f"{more:,} more"] if more > 0 else [])]
+    return f"{', '.join(shown[:-1])} and {shown[-1]} were"
+
+
+def _is_about(message: Message, sender: str, robots: Collection[str], own: Sequence[int | None]) -> bool:
+    """Whether `message` is of what rules the value `own` out, that of `robots`."""
+    lhs = getattr(message, "lhs", None)
+    if lhs is None:
+        return sender in robots
+    value = as_value(getattr(message, "value", None))
+    return {*lhs} <= {*robots} and (value is None or len(value) != len(own) or _agree(value, own))
+
+
+def _agree(value: Sequence[int | None], own: Sequence[int | None]) -> bool:
+    return all(part is None or part == one for part, one in zip(value, own, strict=True))
