@@ -18,6 +18,7 @@ from sniffer_pages import (
     TRACE,
     WHOLE,
     Page,
+    begin_again,
     choose,
     chromium,
     heads,
@@ -55,10 +56,26 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         yield running
 
 
-@pytest.fixture
-def page(browser: Any, server: Served) -> Iterator[Page]:  # noqa: ANN401
+@pytest.fixture(scope="module")
+def tab(browser: Any, server: Served) -> Iterator[Page]:  # noqa: ANN401
     with shown(browser, server.url) as page:
         yield page
+
+
+@pytest.fixture
+def page(tab: Page) -> Page:
+    """The page as it begins. One tab of the browser is enough for all."""
+    begin_again(tab)
+    return tab
+
+
+@pytest.fixture
+def loaded(tab: Page, server: Served) -> Page:
+    """The same, loaded anew: nothing has the focus."""
+    tab.goto("about:blank")
+    tab.goto(server.url)
+    text_is(tab, "#counts", ALL)
+    return tab
 
 
 # Lifelines, robots, filters
@@ -90,6 +107,14 @@ def test_robots_are_chosen_grouped_and_reordered(page: Page) -> None:
     until(lambda: len(heads(page)) == 5, "the group does not open")
     page.get_by_role("button", name="As at first").click()
     until(lambda: heads(page) == TRACE.robots, "not as at first")
+
+
+def test_all_and_none_are_of_all_robots_whoever_is_found(page: Page) -> None:
+    page.fill("#robots input[type=search]", "Robot2.*")
+    page.get_by_role("button", name="None", exact=True).click()
+    until(lambda: heads(page) == ["others"], "some are chosen")
+    page.get_by_role("button", name="All", exact=True).click()
+    until(lambda: heads(page) == TRACE.robots, "some are not chosen")
 
 
 def test_only_neighbours(page: Page) -> None:
@@ -172,7 +197,9 @@ def test_a_message_in_full(page: Page, tmp_path: Path) -> None:
     with page.expect_download() as coming:
         page.get_by_role("button", name="JSON").click()
     coming.value.save_as(tmp_path / "all")
-    entries = [json.loads(line) for line in (tmp_path / "all").read_text().splitlines()]
+    assert coming.value.suggested_filename.endswith(".json")
+    entries = json.loads((tmp_path / "all").read_text())
+    assert {entry["run"] for entry in entries} == {1}
     assert [entry["number"] for entry in entries] == list(range(COUNT))
     assert [entry["content"] for entry in entries] == [TRACE.content(m) for m in range(COUNT)]
 
@@ -195,7 +222,7 @@ def test_a_robot_at_a_moment_is_what_replay_says(page: Page) -> None:
         assert page.inner_text("#robot .value") == ", ".join(f"{key} = {value}" for key, value in state.value.items())
     page.locator("#robot button", has_text="Step").last.click()
     until(lambda: f"its step 4 of {len(own)}" in page.inner_text("#robot"), "no next step")
-    assert page.get_attribute("#moment", "aria-valuetext").startswith(f"step {own[3]} of")
+    assert page.get_attribute("#moment", "aria-valuetext").startswith(f"step {own[3] + 1} of")
 
 
 def test_values_over_lifelines_are_those_of_the_moment(page: Page) -> None:
@@ -223,7 +250,8 @@ def test_it_plays(page: Page) -> None:
 # The view stays, keys do everything
 
 
-def test_a_reload_shows_the_same(page: Page) -> None:
+def test_a_reload_shows_the_same(loaded: Page) -> None:
+    page = loaded
     page.fill("#robots input[type=search]", "Robot1.*")
     page.get_by_role("button", name="Only these").click()
     page.click("#tab-filters")
@@ -241,7 +269,8 @@ def test_a_reload_shows_the_same(page: Page) -> None:
     assert page.input_value("#colour") == "sender"
 
 
-def test_keys_alone(page: Page) -> None:
+def test_keys_alone(loaded: Page) -> None:
+    page = loaded
     press = page.keyboard.press
     press("Tab")
     press("Enter")

@@ -123,9 +123,15 @@
       this.shape.clamp();
     }
 
+    /* All lifelines in the window, rows as at first, and what was looked at still there. */
     fit() {
-      this.view.set({ rowHeight: Sniffer.View.ROW, laneWidth: 0, left: 0 });
-      this.shape.clamp();
+      const { view, filter, shape } = this;
+      const row = view.selected >= 0 ? filter.rowOf(view.selected) : -1;
+      const top = view.top;
+      view.set({ rowHeight: Sniffer.View.ROW, laneWidth: 0, left: 0 });
+      if (row >= 0) this.reveal(row);
+      else view.set({ top });
+      shape.clamp();
     }
 
     _wheel(event) {
@@ -238,7 +244,7 @@
       const said = model.saidIn(step).length;
       return [
         Sniffer.make("strong", {}, model.nameOf(robot)),
-        Sniffer.make("span", {}, `its step ${Sniffer.count(model.ordinal[step] + 1)}, step ${Sniffer.count(step)} of all`),
+        Sniffer.make("span", {}, `its step ${Sniffer.count(model.ordinal[step] + 1)}, step ${Sniffer.count(step + 1)} of all`),
         Sniffer.make("span", {}, model.valueAt(robot, step) || "no value"),
         Sniffer.make("small", {}, `took in ${Sniffer.count(took)}, said ${Sniffer.count(said)}`),
       ];

@@ -15,18 +15,23 @@
     Sniffer.tabs(byId("left").querySelector("[role=tablist]"));
     page.showUpper(view.upper);
     lower(view.lower);
-    page.slowSearch = Sniffer.seldom(500, () => page.search.find(view.query, view.selected));
+    page.slowSearch = Sniffer.seldom(500, () => page.search.find(view.query));
     for (const input of document.querySelectorAll("[name=layout]")) input.addEventListener("change", () => view.set({ layout: input.value }));
     byId("colour").addEventListener("change", (event) => view.set({ colourBy: event.target.value }));
     byId("arrows").addEventListener("change", (event) => view.set({ arrows: event.target.value }));
     const query = byId("query");
-    query.addEventListener("input", Sniffer.seldom(200, () => view.set({ query: query.value })));
+    const find = Sniffer.seldom(200, () => view.set({ query: query.value }));
+    query.addEventListener("input", () => {
+      page.awaited = 0;
+      find();
+    });
     byId("find").addEventListener("submit", (event) => event.preventDefault());
     query.addEventListener("keydown", (event) => {
       if (event.key === "Enter") page.hit(event.shiftKey ? -1 : 1);
     });
     const focus = () => byId("grid").focus({ preventScroll: true });
     const press = { "hit-back": () => page.hit(-1), "hit-on": () => page.hit(1), live: () => view.set({ follow: !view.follow }), skip: focus,
+      verdict: () => page.decided(),
       "zoom-in": () => chart.zoom(1.25), "zoom-out": () => chart.zoom(0.8), wider: () => chart.widen(1.25), narrower: () => chart.widen(0.8),
       fit: () => chart.fit() };
     for (const [id, does] of Object.entries(press)) byId(id).addEventListener("click", does);
@@ -43,6 +48,7 @@
       Home: () => page.move(-Infinity), End: () => page.move(Infinity),
       ArrowRight: () => time.step(1, -1), ArrowLeft: () => time.step(-1, -1),
       "]": () => time.step(1, view.robot), "[": () => time.step(-1, view.robot),
+      ".": () => time.change(1), ",": () => time.change(-1),
       p: () => time.play(), f: () => view.set({ follow: !model.about.over && !view.follow }),
       "/": () => byId("query").select(), n: () => page.hit(1), N: () => page.hit(-1),
       c: () => page.cause((m) => model.causesOf(m)), v: () => page.cause((m) => model.consequencesOf(m)),

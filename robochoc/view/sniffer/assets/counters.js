@@ -78,8 +78,9 @@
   };
 
   class Chart {
-    constructor(title, lines, choose) {
+    constructor(title, lines, choose, again = "┊ new run") {
       this.title = title;
+      this.again = again;
       this.lines = lines; // () -> [{name, colour, dash, of(row)}]
       this.canvas = Sniffer.make("canvas", { role: "img" });
       this.canvas.style.cssText = `display:block;width:100%;height:${HEIGHT}px;cursor:crosshair;touch-action:pan-y`;
@@ -96,7 +97,7 @@
       this.canvas.addEventListener("pointermove", pick);
     }
 
-    draw(sums, stepCount, moment) {
+    draw(sums, stepCount, moment, runs) {
       const width = this.canvas.clientWidth;
       if (!width || !sums.now) return;
       const paint = Sniffer.palette.paint;
@@ -119,6 +120,7 @@
         pen.lineTo(width, Math.round(y(part * most)) + 0.5);
       }
       pen.stroke();
+      this.begun(pen, runs, stepCount, width);
       for (const line of lines) {
         pen.strokeStyle = line.colour;
         pen.lineWidth = 1.6;
@@ -142,11 +144,28 @@
       const last = lines.map((line) => `${line.name} ${Sniffer.count(line.of(sums.now))}`).join(", ");
       this.canvas.setAttribute("aria-label", `${this.title} over ${Sniffer.many(stepCount, "step")}; in the end: ${last}`);
       this.key.style.cssText = "margin:.1rem 0 0";
+      const again = runs.length > 1 ? [Sniffer.make("span", { class: "soft" }, this.again)] : [];
       Sniffer.fill(this.key, ...lines.map((line) => {
         const mark = Sniffer.make("span", {}, `${line.dash.length ? "╌" : "—"} ${line.name}`);
         mark.style.cssText = `color:${line.colour};margin-right:.8em;white-space:nowrap`;
         return mark;
-      }));
+      }), ...again);
+    }
+
+    /* A line where another run, or epoch, begins: what is under way is lost there, and the clocks begin again. */
+    begun(pen, runs, stepCount, width) {
+      pen.strokeStyle = Sniffer.palette.paint.soft;
+      pen.lineWidth = 1;
+      pen.setLineDash([2, 3]);
+      pen.beginPath();
+      for (const { step } of runs) {
+        if (!step || step >= stepCount) continue;
+        const at = Math.round((step / stepCount) * width) + 0.5;
+        pen.moveTo(at, 0);
+        pen.lineTo(at, HEIGHT);
+      }
+      pen.stroke();
+      pen.setLineDash([]);
     }
   }
 
@@ -171,7 +190,7 @@
         ], choose),
         new Chart("Non-concurrent constraint checks", () => [
           { name: "NCCC", colour: colour(3), dash: dash(0), of: (row) => row.clock },
-        ], choose),
+        ], choose, "┊ new run, NCCCs from 0 on"),
         new Chart("By type", () => this.kinds().map((kind) => (
           { name: this.model.about.kinds[kind].name, colour: colour(kind), dash: dash(kind), of: (row) => row.kinds[kind] || 0 }
         )), choose),
@@ -217,7 +236,7 @@
       const { model, sums } = this;
       if (!sums.steps) return;
       const moment = Math.min(this.moment, sums.steps - 1);
-      for (const chart of this.charts) chart.draw(sums, model.stepCount, moment);
+      for (const chart of this.charts) chart.draw(sums, model.stepCount, moment, model.about.runs);
       const now = countedAt(model, sums, moment);
       const all = sums.now;
       const cell = (name, properties, text, align) => {

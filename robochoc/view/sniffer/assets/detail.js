@@ -73,7 +73,7 @@
           : `Message ${Sniffer.count(m)} has not been loaded yet.`));
         return;
       }
-      const key = `${m}|${model.receivedStep[m]}|${model.whole}|${Sniffer.palette.dark}|${model.consequencesOf(m).length}`;
+      const key = `${m}|${model.receivedStep[m]}|${model.concluded.size}|${model.whole}|${Sniffer.palette.dark}|${model.consequencesOf(m).length}`;
       if (key === this._key) return;
       this._key = key;
       this._show(m);
@@ -99,20 +99,27 @@
         make("h2", {}, mark, `${count(m)} ${kind.name}`),
         make("p", { class: "who" }, robot(sender[m]), " → ", robot(receiver[m])),
         this.words,
-        kind.why ? make("p", { class: "soft" }, kind.why) : null,
+        kind.why ? make("p", { class: "soft" }, ...Sniffer.coded(kind.why)) : null,
         make("h3", {}, "Why it was said"),
         Sniffer.links(model, causes, told, `${from} said it at its start: nothing had to be heard before.`),
         make("h3", {}, "What came of it"),
-        Sniffer.links(model, model.consequencesOf(m), told, taken !== Sniffer.NONE ? `${to} took it in and said nothing.`
+        Sniffer.links(model, model.consequencesOf(m), told, taken !== Sniffer.NONE ? this._quietly(receiver[m], taken)
           : model.whole ? `${to} never took it in.` : `${to} has not taken it in yet.`),
         make("h3", {}, "When"),
         Sniffer.facts([["Said", `t = ${moment(t[m])}`], ["Taken in", fate], ["Run", Sniffer.runName(model.runOf(m) || { protocol: "?" })],
-          ["Step", `${count(step[m])}, ${from}'s ${count(model.ordinal[step[m]] + 1)}`],
+          ["Step", `${count(step[m] + 1)}, ${from}'s ${count(model.ordinal[step[m]] + 1)}`],
           ["NCCC clock", count(clock[m])], ["Size", Sniffer.many(bytes[m], "byte")]]),
         this.more,
         this.saving.panel(m));
       this.element.scrollTop = 0;
       this._details(m);
+    }
+
+    /* What came of a message after which nothing was said. */
+    _quietly(robot, step) {
+      const found = this.model.concludedIn.get(step);
+      const name = this.model.nameOf(robot);
+      return found && found.robot === robot ? `${name} took it in, and ${found.text}.` : `${name} took it in and said nothing.`;
     }
 
     async _details(m) {

@@ -23,6 +23,10 @@
     return element;
   };
 
+  /* A sentence in which names stand between backticks, as what can be put into an element: these become code. */
+  Sniffer.coded = (text) => String(text).split("`").map((part, at) => (at % 2 ? Sniffer.make("code", {}, part) : part));
+  Sniffer.uncoded = (text) => String(text).replaceAll("`", "");
+
   const whole = new Intl.NumberFormat("en");
   Sniffer.count = (number) => whole.format(number);
   Sniffer.many = (number, one, several = one + "s") => `${whole.format(number)} ${number === 1 ? one : several}`;

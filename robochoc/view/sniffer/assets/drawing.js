@@ -44,6 +44,7 @@
       this._passing();
       for (let row = this.first; row <= this.last; row++) this._arrow(shape.filter.at(row), row);
       this._steps();
+      this._runNames();
       if (view.rowHeight >= 13) for (let row = this.first; row <= this.last; row++) this._label(shape.filter.at(row), row);
       this._numbers();
       this._moment();
@@ -59,19 +60,24 @@
       this.related.set(view.selected, "this");
     }
 
+    /* Who says the chosen message, and who hears it, stand on a lighter ground; the chosen robot's own line is bold. */
     _lifelines() {
-      const { pen, shape, paints, view } = this;
+      const { pen, shape, paints, view, model } = this;
       const { list } = shape.lanes;
+      const m = view.selected < model.messageCount ? view.selected : -1;
+      const parties = new Set(m < 0 ? [] : [shape.lanes.of[model.messages.sender[m]], shape.lanes.of[model.messages.receiver[m]]]);
+      if (shape.lanes.others >= 0) parties.delete(shape.lanes.others);
       const from = Math.max(Math.floor((view.left - shape.laneWidth) / shape.laneWidth), 0);
       for (let lane = from; lane < list.length; lane++) {
         const x = shape.x(lane);
         if (x - shape.laneWidth > shape.width) break;
-        if (view.robot >= 0 && list[lane].robots.includes(view.robot) && !list[lane].others) {
+        if (parties.has(lane)) {
           pen.fillStyle = paints.glow;
           pen.fillRect(x - shape.laneWidth / 2, 0, shape.laneWidth, shape.height);
         }
-        pen.strokeStyle = list[lane].others ? paints.others : paints.line;
-        pen.lineWidth = list[lane].group ? 3 : 1;
+        const chosen = view.robot >= 0 && list[lane].robots.includes(view.robot) && !list[lane].others;
+        pen.strokeStyle = chosen ? paints.chosen : list[lane].others ? paints.others : paints.line;
+        pen.lineWidth = list[lane].group || chosen ? 3 : 1;
         pen.setLineDash(list[lane].others ? [2, 5] : []);
         pen.beginPath();
         pen.moveTo(Math.round(x) + 0.5, 0);
@@ -98,6 +104,7 @@
     /* A line where another run, or epoch, begins. */
     _runs() {
       const { pen, shape, paints, model } = this;
+      this.begun = [];
       for (const run of model.about.runs) {
         if (!run.message || run.message > model.messageCount) continue;
         const y = shape.top(shape.filter.rowOf(run.message));
@@ -108,9 +115,22 @@
         pen.moveTo(shape.gutter, y);
         pen.lineTo(shape.width, y);
         pen.stroke();
+        this.begun.push([run, y]);
+      }
+    }
+
+    /* Above all that stands there. */
+    _runNames() {
+      const { pen, shape, paints } = this;
+      for (const [run, y] of this.begun) {
         pen.font = SMALL;
         pen.textAlign = "right";
-        this._text(Sniffer.runName(run), shape.width - 8, y + 9, paints.soft);
+        const name = Sniffer.runName(run);
+        const width = widthOf(pen, name) + 10;
+        pen.fillStyle = paints.paper;
+        pen.fillRect(shape.width - 4 - width, y + 1, width, 16);
+        pen.fillStyle = paints.soft;
+        pen.fillText(name, shape.width - 9, y + 9);
       }
     }
 
@@ -273,12 +293,12 @@
     _pill(step, decision, x, y) {
       const { pen, shape, model, paints } = this;
       pen.font = SMALL;
-      const short = shape.laneWidth < 110 ? decision.replace(/^.* = /, "= ") : decision;
+      const short = shape.laneWidth >= 110 ? decision : decision === "no value" ? "–" : decision.replace(/^.* = /, "= ");
       const text = short.length > 22 ? `${short.slice(0, 21)}…` : short;
       const width = widthOf(pen, text) + 10;
       const first = model.firstSaid[step];
       const right = first !== undefined && first !== Sniffer.NONE && shape.xOf(model.messages.receiver[first]) < x;
-      const left = right ? x + 9 : x - 9 - width;
+      const left = right && x + 9 + width < shape.width ? x + 9 : x - 9 - width;
       pen.fillStyle = paints.pill;
       pen.strokeStyle = paints.pillRim;
       pen.lineWidth = 1;
@@ -308,7 +328,8 @@
       const from = Math.min(Math.max(x1, shape.gutter - 10), shape.width);
       pen.textAlign = right ? "left" : "right";
       pen.globalAlpha = this.related.size && !this.related.has(m) ? 0.75 : 1;
-      this._text(text, from + (right ? 12 : -12), shape.y(row) - 6, Sniffer.palette.colour(this.colourOf(m)));
+      const at = right ? from + 12 : Math.max(from - 12, shape.gutter + widthOf(pen, text)); // not behind the numbers
+      this._text(text, at, shape.y(row) - 6, Sniffer.palette.colour(this.colourOf(m)));
       pen.globalAlpha = 1;
     }
 

@@ -16,11 +16,12 @@
         const input = make("input", { type: "search", placeholder, spellcheck: false });
         input.addEventListener("input", Sniffer.seldom(150, () => view.set({ [name]: input.value })));
         this[name] = input;
-        return make("label", {}, make("span", {}, label), input);
+        this[`${name}Nobody`] = make("p", { class: "nobody", role: "status", hidden: true });
+        return [make("label", {}, make("span", {}, label), input), this[`${name}Nobody`]];
       };
       const time = (name, label) => {
         const input = make("input", { type: "number", step: "any", inputMode: "decimal" });
-        input.addEventListener("change", () => view.set({ [name]: input.value === "" ? null : Number(input.value) }));
+        input.addEventListener("input", Sniffer.seldom(150, () => view.set({ [name]: input.value === "" ? null : Number(input.value) })));
         this[name] = input;
         return make("label", {}, make("span", {}, label), input,
           make("button", { type: "button", title: "The moment chosen below", "aria-label": `${label} the moment chosen`,
@@ -34,7 +35,7 @@
       this.concerned = make("span", { class: "soft" });
       this.element.append(
         make("fieldset", {}, make("legend", {}, "Types"), this.kinds),
-        make("fieldset", {}, make("legend", {}, "Robots"), text("senders", "From", "Robot1.*, Robot2.3"), text("receivers", "To", "any")),
+        make("fieldset", {}, make("legend", {}, "Robots"), ...text("senders", "From", "Robot1.*, Robot2.3"), ...text("receivers", "To", "any")),
         make("fieldset", {}, make("legend", {}, "Time"), time("from", "From"), time("to", "Until"),
           make("label", {}, make("span", {}, "Run"), this.run)),
         make("fieldset", {}, make("legend", {}, "Cause and consequence"),
@@ -60,7 +61,10 @@
     paint() {
       const { view, model } = this;
       this._types();
-      for (const name of ["senders", "receivers"]) if (document.activeElement !== this[name]) this[name].value = view[name];
+      for (const name of ["senders", "receivers"]) {
+        if (document.activeElement !== this[name]) this[name].value = view[name];
+        this._unknown(view[name], this[`${name}Nobody`]);
+      }
       for (const name of ["from", "to"]) if (document.activeElement !== this[name]) this[name].value = view[name] ?? "";
       if (this.run.options.length !== model.about.runs.length + 1)
         Sniffer.fill(this.run, Sniffer.make("option", { value: "-1" }, "all"),
@@ -69,6 +73,20 @@
       this.concern.value = String(view.concern);
       this.concerned.textContent = view.concern ? `of message ${Sniffer.count(view.about)}` : "";
       this.hits.checked = view.hitsOnly;
+    }
+
+    /* That nobody has a name that was written, and whose names there are. */
+    _unknown(patterns, element) {
+      const { robots } = this.model;
+      const parts = patterns.split(",").map((part) => part.trim()).filter(Boolean);
+      const key = `${patterns}|${robots.length}`;
+      if (element.dataset.of === key) return;
+      element.dataset.of = key;
+      const nobody = robots.length ? parts.find((part) => !robots.some(Sniffer.matcher(part))) : undefined;
+      element.hidden = nobody === undefined;
+      const begun = robots.filter((name) => nobody && name.toLowerCase().includes(nobody.toLowerCase()));
+      const some = (begun.length ? begun : robots).slice(0, 2).join(" and ");
+      element.textContent = element.hidden ? "" : `No robot is named ${nobody}; there ${robots.length > 1 ? "are" : "is"} ${some}.`;
     }
 
     /* One box a type, with its colour, dash and count; and one a performative, where that says more than the types. */
@@ -82,7 +100,7 @@
       const acts = [...new Set(kinds.map((kind) => kind.performative).filter(Boolean))];
       const many = acts.length > 1 ? acts.filter((act) => kinds.filter((kind) => kind.performative === act).length > 1) : [];
       Sniffer.fill(this.kinds,
-        ...kinds.map((kind, number) => this._type(`kind ${number}`, kind.name, (kind.performative || "").toLowerCase(), [number], kind.why)),
+        ...kinds.map((kind, number) => this._type(`kind ${number}`, kind.name, (kind.performative || "").toLowerCase(), [number], Sniffer.uncoded(kind.why || ""))),
         ...many.map((act) => this._type(`act ${act}`, `all ${act.toLowerCase()}`, "",
           kinds.flatMap((kind, number) => (kind.performative === act ? [number] : [])), "")));
       const again = focused && [...this.kinds.querySelectorAll("input")].find((input) => input.dataset.key === focused);

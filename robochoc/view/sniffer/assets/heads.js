@@ -33,23 +33,40 @@
       const { model, view } = this;
       const single = lane.robots.length === 1 && !lane.others;
       const value = single ? model.valueAt(lane.robots[0], view.moment) : Sniffer.many(lane.robots.length, "robot");
-      const short = !single && width < 84 ? Sniffer.count(lane.robots.length) : width < 96 ? value.replace(/^[^,]* = ([^,]*)$/, "= $1") : value;
+      const short = this._short(value, single ? 0 : lane.robots.length, width);
       const style = `translateX(${Math.round(this.shape.x(at) - width / 2)}px)`;
       if (head.style.transform !== style) head.style.transform = style;
       const wide = `${Math.max(width - 4, 12)}px`;
       if (head.style.width !== wide) head.style.width = wide;
       const chosen = String(single && lane.robots[0] === view.robot);
-      const key = `${at}|${lane.name}|${short}|${chosen}`;
+      const { sender, receiver } = model.messages;
+      const m = view.selected < model.messageCount ? view.selected : -1;
+      const party = m >= 0 && !lane.others && (lane.robots.includes(sender[m]) || lane.robots.includes(receiver[m]));
+      const slim = width < 34;
+      const witness = single && model.concluded.has(lane.robots[0]);
+      const key = `${at}|${lane.name}|${short}|${chosen}|${party}|${slim}|${width < 84}|${witness}`;
       if (head.dataset.shown === key) return;
       head.dataset.shown = key;
       head.dataset.lane = at;
       head.className = lane.others ? "head others" : lane.group ? "head many" : "head";
+      head.classList.toggle("party", party);
+      head.classList.toggle("slim", slim);
+      head.classList.toggle("found", witness);
       head.firstChild.textContent = width < 84 ? lane.name.slice(lane.others ? 0 : this._common()) : lane.name;
       head.lastChild.textContent = short || "–";
       head.setAttribute("aria-pressed", chosen);
       const does = lane.group ? "opens the group" : lane.others ? "not chosen" : "shows the robot";
-      head.setAttribute("aria-label", `${lane.name}: ${value || "no value"}; ${does}`);
-      head.title = `${lane.name}\n${value || "no value"}\nDrag it, or press Alt and an arrow, to move it`;
+      const found = witness ? `; ${model.concluded.get(lane.robots[0]).text}` : "";
+      head.setAttribute("aria-label", `${lane.name}: ${value || "no value"}${found}; ${does}`);
+      head.title = `${lane.name}\n${value || "no value"}${found.replace("; ", "\n")}\nDrag it, or press Alt and an arrow, to move it`;
+    }
+
+    /* What a head of that width has room for of a value, or of how many share it. */
+    _short(value, shared, width) {
+      if (shared) return width < 84 ? Sniffer.count(shared) : value;
+      if (width >= 96) return value;
+      if (value === "no value") return "–";
+      return value.replace(/^[^,]* = ([^,]*)$/, width < 34 ? "$1" : "= $1");
     }
 
     /* How many letters all names begin with, where a number follows: what narrow heads can do without. */

@@ -2,7 +2,7 @@
 /* The messages as a table: the same rows as the chart's, for who reads rather than looks, and for screen readers. Only
    the rows in the window exist; `aria-rowindex` tells which they are of all. */
 (() => {
-  const NARROW = matchMedia("(max-width: 40rem)"); // there the words stand below the names
+  const NARROW = 560; // pixels: in less, the words stand below the names
   const MOST = 8_000_000; // pixels: browsers do not draw elements much taller than that
   const COLUMNS = [["#", "number"], ["Time", "time"], ["From", "from"], ["To", "to"], ["Type", "type"], ["What it says", "says"]];
 
@@ -30,11 +30,25 @@
         const row = event.target.closest(".row[data-message]");
         if (row) this.told.message(Number(row.dataset.message));
       });
-      new ResizeObserver(() => this.draw()).observe(grid);
+      new ResizeObserver(() => this._measure()).observe(grid);
+    }
+
+    /* Another width: the row on top stays there, however tall rows are now. */
+    _measure() {
+      const { grid } = this;
+      if (grid.clientWidth < 10) return; // it is not to be seen
+      const row = this.top;
+      const narrow = grid.clientWidth < NARROW;
+      if (narrow !== Boolean(this.narrow)) {
+        this.narrow = narrow;
+        grid.classList.toggle("narrow", narrow);
+        this.top = row;
+      }
+      this.draw();
     }
 
     get tall() {
-      return NARROW.matches ? 48 : 28;
+      return this.narrow ? 48 : 28;
     }
 
     get inWindow() {
@@ -77,9 +91,23 @@
       if (this.spacer.style.height !== tall) this.spacer.style.height = tall;
     }
 
+    /* Columns as wide as what stands in them, so that the words have the rest. */
+    _widths() {
+      const { model, grid } = this;
+      const longest = (texts, most) => Math.min(texts.reduce((long, text) => Math.max(long, text.length), 4), most);
+      const last = model.stepCount ? Sniffer.moment(model.steps.t[model.stepCount - 1]) : "";
+      const widths = [longest([Sniffer.count(model.messageCount)], 11), longest([last, "Time"], 9), longest(model.robots, 16),
+        longest(model.about.kinds.map((kind) => kind.name), 16)];
+      const key = widths.join();
+      if (this._wide === key) return;
+      this._wide = key;
+      ["number", "time", "name", "type"].forEach((name, at) => grid.style.setProperty(`--${name}`, `${widths[at] + 1}ch`));
+    }
+
     paint() {
       const { filter, grid, rows } = this;
       this._stretch();
+      this._widths();
       grid.setAttribute("aria-rowcount", String(filter.length + 1));
       const first = Math.max(Math.floor(this.top), 0);
       const shown = Math.min(this.inWindow + 2, Math.max(filter.length - first, 0));
@@ -119,12 +147,16 @@
       row.classList.toggle("odd", at % 2 === 1);
       const { sender, receiver, t } = model.messages;
       const kind = model.kindOf(m);
-      const texts = [Sniffer.count(m), Sniffer.moment(t[m]), model.nameOf(sender[m]), model.nameOf(receiver[m]),
-        kind.performative ? `${kind.name} · ${kind.performative.toLowerCase()}` : kind.name, words];
+      const from = model.nameOf(sender[m]);
+      const prefix = `${from} says: `; // that stands under From
+      const texts = [Sniffer.count(m), Sniffer.moment(t[m]), from, model.nameOf(receiver[m]), kind.name,
+        words.startsWith(prefix) ? words.slice(prefix.length) : words];
       texts.forEach((text, cell) => {
         row.children[cell].textContent = text;
-        row.children[cell].title = cell === 5 ? text : "";
+        row.children[cell].title = cell ? text : "";
       });
+      if (kind.performative) row.children[4].append(Sniffer.make("span", { class: "act" }, ` · ${kind.performative.toLowerCase()}`));
+      row.children[5].title = words;
       row.children[4].style.color = Sniffer.palette.colour(Sniffer.colouring(model, view.colourBy)(m));
     }
 
@@ -138,10 +170,12 @@
       this._asking = setTimeout(() => this.told.ask(missing.slice(0, 4)), 120); // not for each that is scrolled past
     }
 
+    /* Brings a row into the window: by as little as that takes where it is near, else with some of what is around it. */
     reveal(row) {
       const first = this.top;
       const rows = this.inWindow;
-      if (row < first) this.top = row;
+      if (row < first - 2 || row > first + rows + 1) this.top = Math.max(row - rows / 2.5, 0);
+      else if (row < first) this.top = row;
       else if (row > first + rows - 1.5) this.top = row - rows + 1.5;
     }
   };

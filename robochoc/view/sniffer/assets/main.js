@@ -38,6 +38,8 @@
         grown: () => this.grown(), changed: () => this.status(), about: () => this.met(), anew: () => this.anew() });
       this.notices = new Sniffer.Notices(model, this.following, told);
       this.address = new Sniffer.Address(model, view, () => this.time.touched);
+      this.sight = new Sniffer.Sight(this);
+      this.legend = new Sniffer.Legend(model, view);
       this.address.begin();
       this.wanted = this.address.read();
       Sniffer.controls(this);
@@ -66,6 +68,17 @@
       this.view.set({ robot, upper: "robot" });
     }
 
+    /* Where the run was decided: by who found out how it ends, else by the last change of a value. */
+    decided() {
+      const { model, time, view } = this;
+      const step = model.deciding >= 0 ? model.deciding : Math.max(-1, ...model.decided.map((one) => (one.step.length ? one.step.all[one.step.length - 1] : -1)));
+      if (step < 0 || step >= model.stepCount) return Sniffer.say("It is not known which step that was");
+      const packet = model.packetOf(step);
+      if (packet.length) this.message(packet[packet.length - 1]);
+      view.set({ robot: model.steps.robot[step], upper: packet.length ? "message" : "robot" });
+      return time.go(step);
+    }
+
     move(rows) {
       const { filter, view } = this;
       if (!filter.length) return;
@@ -75,12 +88,22 @@
       byId("grid").focus({ preventScroll: true });
     }
 
+    /* Goes to the next hit (back: `step` -1) of what stands in the field by now; of a new text, to its first. */
     hit(step) {
-      const { view } = this;
-      const from = view.selected >= 0 ? view.selected : step > 0 ? -1 : Infinity;
-      const found = this.search.next(from, step, (m) => this.filter.shows(m));
-      if (found >= 0) this.message(found);
-      else Sniffer.say(this.search.running ? "Still searching" : "No hit among the messages shown");
+      const { view, search } = this;
+      const query = byId("query").value;
+      if (query !== view.query) {
+        view.set({ query });
+        search.find(query);
+      }
+      if (!search.query) return Sniffer.say("Write what is to be searched for");
+      const anew = this.visited !== search.query;
+      const from = view.selected >= 0 && !anew ? view.selected : step > 0 ? -1 : Infinity;
+      const found = search.running && step < 0 ? -1 : search.next(from, step, (m) => this.filter.shows(m));
+      this.awaited = found < 0 && search.running ? step : 0;
+      if (found < 0) return Sniffer.say(search.running ? "Still searching" : "No hit among the messages shown");
+      this.visited = search.query;
+      return this.message(found);
     }
 
     again() {
@@ -107,15 +130,15 @@
         this.address.save();
         return;
       }
-      if (has(changed, LANES)) this.lanes.arrange();
-      if (has(changed, FILTERS)) this._refilter();
-      if (changed.has("query")) this.search.find(view.query, view.selected);
+      if (has(changed, [...LANES, ...FILTERS])) this._refilter(has(changed, LANES));
+      if (changed.has("query")) this.search.find(view.query);
       if (changed.has("layout")) this._arrange();
       if (changed.has("upper")) this.showUpper(view.upper);
       if (changed.has("lower")) this.showLower(view.lower);
       if (has(changed, ["colourBy"])) this.chart.minimap.refresh();
+      if (changed.has("colourBy")) this.legend.paint();
       if (view.follow && changed.has("follow")) this._newest();
-      if (changed.has("moment") || changed.has("selected")) this._reveal(changed);
+      if (changed.has("moment") || changed.has("selected")) this.sight.reveal(changed);
       if (has(changed, ["robot", "moment", ...LANES])) this.slowly();
       if (changed.has("moment") && model.stepCount) this._showMoment();
       if (changed.has("robot") && view.robot < 0) view.set({ whose: "all" });
@@ -135,31 +158,19 @@
       this.chart.draw();
       this.list.draw();
       for (const part of [this.filters, this.robots, this.detail, this.state, this.time]) part.paint();
+      this.legend.paint();
       this.status();
     }
 
-    /* Other rows: the message at the top of the window stays there. */
-    _refilter() {
+    /* Other rows, or other lifelines: the message that is looked at stays where it is. */
+    _refilter(lanes = false) {
       const { filter, view } = this;
-      const top = filter.length ? filter.at(Math.min(Math.floor(view.top), filter.length - 1)) : 0;
+      const held = this.sight.held();
+      if (lanes) this.lanes.arrange();
       filter.rebuild();
-      view.set({ top: top ? filter.rowOf(top) : 0 });
-      this.chart.shape.clamp();
+      this.sight.hold(held);
       this.chart.minimap.refresh();
       Sniffer.say(`${Sniffer.count(filter.length)} of ${Sniffer.many(this.model.messageCount, "message")} shown`, true);
-    }
-
-    _reveal(changed) {
-      const { view, filter, model, chart } = this;
-      if (changed.has("selected") && view.selected >= 0 && view.selected < model.messageCount) {
-        const row = filter.rowOf(view.selected);
-        chart.reveal(row, this.lanes.of[model.messages.sender[view.selected]]);
-        this.list.reveal(row);
-      } else if (this.time.moved && view.moment < model.stepCount) {
-        chart.reveal(filter.rowOf(model.rowOf(view.moment)), this.lanes.of[model.steps.robot[view.moment]]);
-        this.list.reveal(filter.rowOf(model.rowOf(view.moment)));
-      }
-      this.time.moved = false;
     }
 
     _showMoment() {
@@ -180,6 +191,7 @@
       byId("colour").value = this.view.colourBy;
       byId("arrows").value = this.view.arrows;
       this.chart.measure();
+      this.sight.align();
       this.chart.draw();
       this.list.draw();
     }
@@ -199,7 +211,6 @@
       const { view, model, filter } = this;
       filter.extend();
       if (view.follow) this._newest();
-      else if (!this.time.touched) view.set({ moment: Math.max(model.stepCount - 1, 0) });
       this._restore();
       if (this.counters) this.counters.update();
       else if (model.stepCount) this.showLower(view.lower);
@@ -236,10 +247,14 @@
       this._facts();
       this.filter.rebuild();
       this.robots.paint();
+      this.legend.paint();
     }
 
     /* What was numbered is numbered anew: the page begins again, at the same view. */
     anew() {
+      this.ordering = true;
+      this.status();
+      if (this.view.follow) this.time.touched = true; // who has followed it to its end is there again
       this.address._save();
       location.reload();
       return false;
@@ -254,6 +269,7 @@
       byId("hits").textContent = search.trouble || (search.query ? `${at}${Sniffer.count(search.hits.length)}${part}` : "");
       if (view.hitsOnly && (found || !search.query)) this._refilter();
       if (search.query && !search.running) Sniffer.say(Sniffer.many(search.hits.length, "hit"), true);
+      if (this.awaited) this.hit(this.awaited);
       this.chart.draw();
       this.list.draw();
     }
@@ -268,17 +284,22 @@
       const late = following.behind > 0 && !following.gone ? ` · ${Sniffer.many(following.behind, "message")} not drawn yet` : "";
       byId("counts").textContent = shown + late;
       const verdict = byId("verdict");
-      verdict.hidden = !about.verdict;
-      verdict.textContent = verdict.title = about.verdict || "";
-      verdict.dataset.over = String(Boolean(about.over));
+      const said = this.ordering || about.ordering ? "The journal is being put in order."
+        : following.gone && !about.over ? "The run's end was not seen." : about.verdict || "";
+      verdict.hidden = !said;
+      if (verdict.textContent !== said) verdict.textContent = said;
+      verdict.dataset.over = String(Boolean(about.over || following.gone));
+      verdict.disabled = !about.over || model.deciding < 0 && !model.decisionCount;
+      verdict.title = verdict.disabled ? said : `${said}\nPress it to see the step that decided it`;
       const live = byId("live");
       live.hidden = about.over || following.gone;
       live.setAttribute("aria-pressed", String(view.follow));
       live.textContent = view.follow ? "Following" : "Follow";
       live.title = view.follow ? "What is newest is shown as it comes (f)" : "Show what is newest (f)";
       const nothing = byId("nothing");
-      nothing.hidden = filter.length > 0 || !(following.whole || model.messageCount);
-      nothing.textContent = model.messageCount ? "The filters and the choice of robots leave nothing over." : "No message has been said.";
+      nothing.hidden = filter.length > 0 || !(following.whole || model.messageCount || (about.live && !about.messages));
+      nothing.textContent = model.messageCount ? "The filters and the choice of robots leave nothing over."
+        : about.over ? "No message has been said." : following.gone ? "" : "Waiting for the robots";
       if (this.search.query) this.searchedQuietly();
       this.notices.paint();
     }
@@ -326,12 +347,33 @@
     }
   }
 
+  /* What is known of the run. A live page may be there before it: it is asked for until the robots begin. */
+  const met = async (source) => {
+    for (;;) {
+      try {
+        return await source.about();
+      } catch (trouble) {
+        if (!trouble.early) throw trouble;
+        await new Promise((done) => setTimeout(done, 300));
+      }
+    }
+  };
+
   const begin = async () => {
     const source = Sniffer.source();
+    Sniffer.palette.apply();
+    const waiting = setTimeout(() => {
+      byId("nothing").hidden = false;
+      byId("nothing").textContent = "Waiting for the robots";
+    }, 150);
     try {
-      Sniffer.page = new Page(source, await source.about());
+      const about = await met(source);
+      clearTimeout(waiting);
+      byId("nothing").hidden = true;
+      Sniffer.page = new Page(source, about);
     } catch (trouble) {
-      Sniffer.palette.apply();
+      clearTimeout(waiting);
+      byId("nothing").hidden = true;
       Sniffer.fill(byId("notices"), Sniffer.make("p", { class: "notice" }, `The run cannot be shown: ${trouble.message}`));
     }
   };

@@ -86,6 +86,29 @@ window.Sniffer = {};
       this.about = about;
       this.robots = about.robots.map((robot) => robot.name);
       this._meet(this.robots.length - 1);
+      this._conclude();
+    }
+
+    /* Who has found out how the run (or epoch) ends, and in which step, as far as that is known: by robot, the last; by step. */
+    _conclude() {
+      this.concluded = new Map();
+      this.concludedIn = new Map();
+      for (const { kind, robot, step, text } of this.about.notes || []) {
+        const number = this.robots.indexOf(robot);
+        if (kind !== "concluded" || number < 0) continue;
+        const found = { robot: number, step, text: `concluded: ${text.replace(/^.*: /, "").replaceAll("-", " ")}` };
+        this.concluded.set(number, found);
+        this.concludedIn.set(step, found);
+      }
+    }
+
+    /* The step that decided the run: that of its witness, else the last in which somebody concluded something; -1: unknown. */
+    get deciding() {
+      const { outcome } = this.about;
+      const witness = outcome && outcome.witness ? this.robots.indexOf(outcome.witness) : -1;
+      if (this.concluded.has(witness)) return this.concluded.get(witness).step;
+      if (witness >= 0 && this.ownSteps[witness].length) return this.ownSteps[witness].all[this.ownSteps[witness].length - 1];
+      return Math.max(-1, ...[...this.concluded.values()].map(({ step }) => step));
     }
 
     _meet(robot) {

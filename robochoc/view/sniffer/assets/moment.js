@@ -39,6 +39,16 @@
       return this.go(steps.all[to]);
     }
 
+    /* The chosen robot's next change of value, or the one before. */
+    change(by) {
+      const { model, view } = this;
+      if (view.robot < 0) return Sniffer.say("Choose a robot first: press its name");
+      const { step } = model.decided[view.robot];
+      const at = Sniffer.lowerBound(step.all, view.moment + (by > 0 ? 1 : 0), step.length) - (by > 0 ? 0 : 1);
+      if (at < 0 || at >= step.length) return Sniffer.say(`${model.nameOf(view.robot)} has no further change of value`);
+      return this.go(step.all[at]);
+    }
+
     play() {
       if (this.playing) return this.pause();
       if (this.view.moment >= this.model.stepCount - 1) this.go(0);
@@ -84,9 +94,10 @@
       slider.disabled = !model.stepCount;
       const t = model.stepCount ? Sniffer.moment(model.steps.t[Math.min(view.moment, last)]) : "";
       const robot = model.stepCount ? model.nameOf(model.steps.robot[view.moment]) : "";
-      const text = model.stepCount ? `step ${Sniffer.count(view.moment)} of ${Sniffer.count(last)}` : "nothing yet";
+      const text = model.stepCount ? `step ${Sniffer.count(view.moment + 1)} of ${Sniffer.count(model.stepCount)}` : "nothing yet";
+      const hint = model.stepCount > 1 && !view.moment && !this.touched && !view.follow ? " · press p to play" : "";
       slider.setAttribute("aria-valuetext", `${text}, t = ${t}, ${robot}`);
-      Sniffer.fill(Sniffer.byId("when"), Sniffer.make("b", {}, text), Sniffer.make("span", {}, model.stepCount ? ` t = ${t} · ${robot}` : ""));
+      Sniffer.fill(Sniffer.byId("when"), Sniffer.make("b", {}, text), Sniffer.make("span", {}, model.stepCount ? ` t = ${t} · ${robot}${hint}` : ""));
       if (this.whose.value !== view.whose) this.whose.value = view.whose;
     }
   };

@@ -35,7 +35,7 @@
 
     _notice(key, text, step) {
       const { make } = Sniffer;
-      return make("p", { class: `notice ${key.split(" ")[0]}` }, make("span", {}, text),
+      return make("p", { class: `notice ${key.split(" ")[0]}` }, make("span", {}, ...Sniffer.coded(text)),
         step === undefined ? null : make("button", { type: "button", onclick: () => this.told.step(step) }, "Show"),
         make("button", { type: "button", class: "plain", "aria-label": `Close: ${text}`, title: "Close", onclick: () => {
           this.closed.add(key);

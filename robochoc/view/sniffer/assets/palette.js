@@ -8,10 +8,10 @@
 
   const THEMES = {
     light: { paper: "#ffffff", band: "#f4f6f9", ink: "#17202b", soft: "#55606d", line: "#c3cbd5", others: "#8b95a1",
-      box: "#dfe6ef", rim: "#8d9aab", chosen: "#1f5fd0", glow: "#1f5fd022", later: "#ffffffa8", pill: "#fff7d6",
+      box: "#dfe6ef", rim: "#8d9aab", chosen: "#1f5fd0", glow: "#1f5fd022", later: "#ffffff8c", pill: "#fff7d6",
       pillRim: "#b79b2a", pillInk: "#4a3d00", hit: "#e0a100", lost: "#b3261e", now: "#d0247a" },
     dark: { paper: "#11171f", band: "#161d27", ink: "#e9eff6", soft: "#a3b0bf", line: "#364250", others: "#6b7785",
-      box: "#2b3644", rim: "#6d7d90", chosen: "#8ab6ff", glow: "#8ab6ff26", later: "#11171fa8", pill: "#3a3212",
+      box: "#2b3644", rim: "#6d7d90", chosen: "#8ab6ff", glow: "#8ab6ff26", later: "#11171f80", pill: "#3a3212",
       pillRim: "#bfa23a", pillInk: "#ffe9a3", hit: "#ffc53d", lost: "#ff8a80", now: "#ff7ab8" },
   };
   const outside = matchMedia("(prefers-color-scheme: dark)");
@@ -28,6 +28,7 @@
       const colours = this.dark ? DARK : LIGHT;
       return colours[index % colours.length];
     },
+    count: LIGHT.length, // after so many, colours begin again
     dash: (index) => DASHES[index % DASHES.length],
     apply() {
       document.documentElement.dataset.theme = this.dark ? "dark" : "light";

@@ -19,22 +19,28 @@
         this.paint();
       });
       this.tree = make("ul", { class: "tree" });
+      this.these = button("Only these", "A lifeline for those found, and for nobody else", () => this._only(this._found()));
+      this.neighbours = button("Only neighbours", "", () => this._neighbours());
       this.summary = make("p", { class: "soft" });
       this.group = make("button", { type: "button", onclick: () => this._group() }, "One lifeline for these");
       this.element.append(
         this.search,
         make("div", { class: "buttons" },
-          button("All", "A lifeline for each", () => this._choose(this._found(), true)),
-          button("None", "Take these lifelines away", () => this._choose(this._found(), false)),
-          button("Only these", "Of those found, and of nobody else", () => this._only(this._found())),
-          button("Only neighbours", "The chosen robot, and those it has spoken with", () => this._neighbours()),
+          button("All", "A lifeline for each robot", () => this._choose(this.view.order, true)),
+          button("None", "Take all lifelines away", () => this._choose(this.view.order, false)),
+          this.these,
+          this.neighbours,
           this.group),
         this.summary,
         this.tree,
         make("div", { class: "buttons" },
           button("Collapse groups", "One lifeline for each row", () => this._collapse(true)),
           button("Expand groups", "One lifeline for each robot", () => this._collapse(false)),
-          button("As at first", "Robots, groups and order as they were", () => this.told.begin())),
+          button("As at first", "Robots, groups and order as they were", () => {
+            this.search.value = this.wanted = "";
+            this.told.begin();
+            this.paint();
+          })),
       );
     }
 
@@ -82,7 +88,11 @@
     paint() {
       const { view, model } = this;
       const found = new Set(this._found());
-      this.group.disabled = !this.wanted.trim();
+      this.group.disabled = this.these.disabled = !this.wanted.trim();
+      const whose = view.robot < 0 ? "" : model.nameOf(view.robot);
+      this.neighbours.disabled = !whose;
+      this.neighbours.textContent = whose ? `Only neighbours of ${whose}` : "Only neighbours";
+      this.neighbours.title = whose ? `Lifelines for ${whose} and those it has spoken with` : "Choose a robot first: press its name";
       this.summary.textContent = `${Sniffer.count(view.chosen.size)} of ${Sniffer.many(model.robots.length, "robot")} chosen`
         + (this.wanted.trim() ? `, ${Sniffer.count(found.size)} found` : "");
       const held = document.activeElement && this.tree.contains(document.activeElement) ? document.activeElement.dataset.key : null;

@@ -1,5 +1,5 @@
 "use strict";
-/* Saving: one message, what two robots said to each other, or all that is shown; as ACL text or as JSON lines. */
+/* Saving: one message, what two robots said to each other, or all that is shown; as ACL text or as JSON. */
 (() => {
   const nameOfFile = (text) => text.replace(/[^A-Za-z0-9._-]+/g, "-").slice(0, 80) || "run";
 
@@ -12,17 +12,17 @@
   Sniffer.Saving = class {
     constructor(model, filter, texts, source) {
       Object.assign(this, { model, filter, texts, source });
-      source.journal().then((address) => (this.journal = address));
+      this.journal = source.journal;
     }
 
-    /* All that is known of a message, as JSON. */
+    /* All that is known of a message, as JSON; numbered as in the table (CSV) that `robochoc journal` makes. */
     entry(m, detail) {
       const { model } = this;
       const { sender, receiver, t, step, bytes, clock, run } = model.messages;
       const taken = model.receivedStep[m];
       const kind = model.kindOf(m);
       return { number: m, t: t[m], sender: model.nameOf(sender[m]), receiver: model.nameOf(receiver[m]), type: kind.name,
-        performative: kind.performative, run: run[m], step: step[m], taken_in: taken === Sniffer.NONE ? null : taken,
+        performative: kind.performative, run: run[m] + 1, step: step[m], taken_in: taken === Sniffer.NONE ? null : taken,
         clock: clock[m], bytes: bytes[m], words: detail.words, content: detail.content, acl: detail.fields };
     }
 
@@ -51,15 +51,15 @@
         const detail = await this.texts.detail(messages[i]);
         if (format === "acl") text += `${detail.acl}\n`;
         else if (scope === "message") text += `${JSON.stringify(this.entry(messages[i], detail), null, 2)}\n`;
-        else text += `${JSON.stringify(this.entry(messages[i], detail))}\n`;
+        else text += `${i ? ",\n" : "[\n"}${JSON.stringify(this.entry(messages[i], detail))}`;
         if (text.length < 1 << 20) continue;
         parts.push(text);
         text = "";
         told(`${Sniffer.count(i + 1)} of ${Sniffer.many(messages.length, "message")}`);
       }
+      if (format === "json" && scope !== "message") text += messages.length ? "\n]\n" : "[]\n";
       parts.push(text);
-      const ending = format === "acl" ? "acl" : scope === "message" ? "json" : "jsonl";
-      download(parts, "text/plain;charset=utf-8", nameOfFile(`${this.model.about.team}-${name}.${ending}`));
+      download(parts, "text/plain;charset=utf-8", nameOfFile(`${this.model.about.team}-${name}.${format}`));
       told(`Saved ${Sniffer.many(messages.length, "message")}`);
     }
 

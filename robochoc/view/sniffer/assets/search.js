@@ -1,6 +1,6 @@
 "use strict";
 /* Text search through what messages say. Words are made by the feed on demand, a thousand messages at a time, so a
-   search goes through them in the background, from where the user looks, and can be given up. */
+   search goes through them in the background, from the first on, and can be given up. */
 (() => {
   const CHUNK = 1024;
 
@@ -24,7 +24,7 @@
     }
 
     /* Begins anew where the query is another one; goes on where messages have come since. */
-    async find(query, near = 0) {
+    async find(query) {
       const wanted = query.trim().toLowerCase();
       if (wanted !== this.query) {
         this.clear();
@@ -35,7 +35,7 @@
       this.running = true;
       this.told();
       try {
-        await this._through(turn, Math.max(near, 0) >> 10);
+        await this._through(turn);
       } catch (trouble) {
         if (turn === this._turn) this.trouble = trouble.message;
       }
@@ -44,10 +44,9 @@
       return this.told();
     }
 
-    async _through(turn, first) {
+    async _through(turn) {
       const chunks = Math.ceil(this.model.messageCount / CHUNK);
-      for (let i = 0; i < chunks; i++) {
-        const chunk = (first + i) % chunks;
+      for (let chunk = 0; chunk < chunks; chunk++) {
         const there = Math.min(this.model.messageCount - chunk * CHUNK, CHUNK);
         const before = this._searched.get(chunk) || 0;
         if (before >= there) continue;

@@ -1,7 +1,7 @@
 "use strict";
 /* Where things stand on the chart, in pixels of its canvas: lifelines side by side, messages one below the other. */
 (() => {
-  const NARROWEST = 44;
+  const NARROWEST = 14;
   const MARGIN = 22; // for what is written left of the first lifeline
   const WIDEST = 230;
 

@@ -41,8 +41,10 @@
 
     async _get(what) {
       const answer = await fetch(`${this.base}/${what}`, { cache: "no-store" });
-      if (!answer.ok) throw new Error((await answer.text()) || `the server says ${answer.status}`);
-      return answer;
+      if (answer.ok) return answer;
+      const trouble = new Error((await answer.text()) || `the server says ${answer.status}`);
+      trouble.early = answer.status === 503; // there is nothing yet, and may be soon
+      throw trouble;
     }
 
     async _json(what) {
@@ -61,15 +63,8 @@
     _states(robot, chunk) { return this._json(`states?robot=${robot}&chunk=${chunk}`); }
     scene(from = 0) { return this._json(`scene?from=${from}`); }
 
-    /* The address of the journal's file, where the server has one. */
-    async journal() {
-      try {
-        const answer = await fetch(`${this.base}/journal`, { method: "HEAD" });
-        return answer.ok ? `${this.base}/journal` : null;
-      } catch {
-        return null;
-      }
-    }
+    /* The address of the journal's file. */
+    get journal() { return `${this.base}/journal`; }
 
     /* `news(about's small fields)` as the run goes on; `gone()` when the server has ended. */
     onNews(news, gone) {
@@ -116,7 +111,7 @@
     _details(chunk) { return this._json(`details:${chunk}`); }
     _states(robot, chunk) { return this._json(`states:${robot}:${chunk}`); }
     scene() { return this._json("scene"); }
-    async journal() { return null; }
+    get journal() { return null; }
     onNews() {}
   };
 

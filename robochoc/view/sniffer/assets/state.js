@@ -4,6 +4,13 @@
 (() => {
   const CHUNK = 64;
   const MOST = 200; // entries of a list
+  const BACK = 8; // chunks that are looked through for why there are no more
+
+  /* Why there are no states from this one on; empty: there may be. */
+  const ending = (state) => {
+    const told = state && state.more && state.more.replay;
+    return told && told.startsWith("ends here") ? told.replace(/^ends here: */, "") : "";
+  };
 
   Sniffer.StatePane = class {
     constructor(model, view, source, told) {
@@ -22,7 +29,8 @@
         return;
       }
       const own = model.ownStepAt(robot, view.moment);
-      const key = `${robot}|${own}|${model.whole}|${Sniffer.palette.dark}|${own < model.ownSteps[robot].length - 1}`;
+      const here = own >= 0 && model.ownSteps[robot].all[own] === view.moment;
+      const key = `${robot}|${own}|${here}|${model.concluded.size}|${model.whole}|${Sniffer.palette.dark}|${own < model.ownSteps[robot].length - 1}`;
       if (key === this._key) return;
       this._key = key;
       this._show(robot, own);
@@ -45,7 +53,10 @@
         make("h2", {}, model.nameOf(robot)),
         make("p", { class: "value" }, own < 0 ? "has not begun" : model.valueAt(robot, step) || "no value"),
         make("p", { class: "soft" }, own < 0 ? variables.join(", ")
-          : `its step ${count(own + 1)} of ${count(steps.length)}; step ${count(step)} of all, t = ${Sniffer.moment(model.steps.t[step])}`),
+          : `its ${step < this.view.moment ? "last step before this moment:" : "step"} ${count(own + 1)} of ${count(steps.length)}; `
+            + `step ${count(step + 1)} of all, t = ${Sniffer.moment(model.steps.t[step])}`),
+        model.concluded.has(robot) ? make("p", { class: "concluded" },
+          make("button", { type: "button", class: "plain robot", onclick: () => told.step(model.concluded.get(robot).step) }, `⚑ It ${model.concluded.get(robot).text}`)) : null,
         make("div", { class: "buttons" }, go(own - 1, "‹ Step"), go(own + 1, "Step ›"),
           mind(change - 1, "‹ Value"), mind(next, "Value ›")),
         this.state,
@@ -75,12 +86,16 @@
       const target = this.state;
       const { replay } = this.model.about;
       if (own < 0) return void Sniffer.fill(target);
-      if (replay) return void Sniffer.fill(target, make("p", { class: "notice" }, `What it knew cannot be worked out: ${replay}`));
+      if (replay) return void Sniffer.fill(target, make("p", { class: "notice" }, make("span", {}, "What it knew cannot be worked out: ", ...Sniffer.coded(replay))));
       try {
-        const states = await this.source.states(robot, Math.floor(own / CHUNK), (own % CHUNK) + 1);
-        if (turn !== this._turn) return undefined;
+        let chunk = Math.floor(own / CHUNK);
+        let states = await this.source.states(robot, chunk, (own % CHUNK) + 1);
         const state = states[own % CHUNK];
-        if (!state) Sniffer.fill(target, make("p", { class: "soft" }, "What it knew after this step has not been worked out yet."));
+        for (let looked = 0; !states.length && chunk > 0 && looked < BACK && turn === this._turn; looked++) states = await this.source.states(robot, --chunk);
+        if (turn !== this._turn) return undefined;
+        const end = ending(state || states[states.length - 1]);
+        if (end) Sniffer.fill(target, make("p", { class: "notice" }, make("span", {}, "What it knew cannot be worked out further: ", ...Sniffer.coded(end))));
+        else if (!state) Sniffer.fill(target, make("p", { class: "soft" }, "What it knew after this step has not been worked out yet."));
         else this._fill(target, state);
       } catch (trouble) {
         if (turn === this._turn) Sniffer.fill(target, make("p", { class: "notice" }, `What it knew cannot be had: ${trouble.message}`));
@@ -97,13 +112,13 @@
       const why = [state.why || []].flat();
       const left = state.domain.filter((value) => !value.ruled_out_by).length;
       Sniffer.fill(target,
-        why.length ? make("div", { class: "why" }, make("h3", {}, "Why"), make("ul", {}, ...why.slice(0, MOST).map((reason) => make("li", {}, reason)))) : null,
+        why.length ? make("div", { class: "why" }, make("h3", {}, "Why"), make("ul", {}, ...why.slice(0, MOST).map((reason) => make("li", {}, ...Sniffer.coded(reason))))) : null,
         make("h3", {}, "Agent view"),
         state.view.length ? Sniffer.facts(state.view.map(([who, text]) => [who, text || "–"])) : make("p", { class: "soft" }, "It knows of nobody's value."),
         make("h3", {}, `Domain, ${Sniffer.count(left)} of ${Sniffer.count(state.domain.length)} left`),
         list(state.domain, "none", (value) => make("li", { class: value.ruled_out_by ? "out" : "left" },
           make("b", {}, value.ruled_out_by ? make("s", {}, value.value) : value.value),
-          value.ruled_out_by ? make("span", {}, ` ruled out by ${value.ruled_out_by}`) : null)),
+          value.ruled_out_by ? make("span", {}, " ruled out by ", ...Sniffer.coded(value.ruled_out_by)) : null)),
         make("h3", {}, `Stored nogoods, ${Sniffer.count(state.nogoods.length)}`),
         list(state.nogoods, "none", (nogood) => make("li", {}, nogood)),
         Object.keys(state.more).length ? make("h3", {}, "Besides") : null,

@@ -1,0 +1,52 @@
+"use strict";
+/* What is looked at, in both windows: the lifelines' and the table's. It stays in sight whatever is left out or put together. */
+(() => {
+  Sniffer.Sight = class {
+    constructor(page) {
+      this.page = page;
+    }
+
+    /* What is looked at: the chosen message, else the moment, else what stands on top; and how far down it stands. */
+    held() {
+      const { filter, view, model, list, chart, time } = this.page;
+      const { layout } = view;
+      const chosen = view.selected >= 0 && view.selected < model.messageCount;
+      const row = layout === "table" ? Math.floor(list.top) : Math.floor(view.top);
+      const top = filter.length ? filter.at(Math.min(Math.max(row, 0), filter.length - 1)) : 0;
+      const message = chosen ? view.selected : time.touched ? model.rowOf(view.moment) : top;
+      const at = filter.rowOf(message);
+      const within = (from, rows) => (at >= from && at <= from + rows - 1 ? at - from : message === top ? 0 : Math.max(rows, 1) / 2.5);
+      return { message, chosen, chart: within(view.top, chart.shape.rowsInWindow), list: within(list.top, list.inWindow) };
+    }
+
+    /* Puts it there again, after what is shown has changed. */
+    hold({ message, chosen, chart: down, list: below }) {
+      const { filter, view, model, chart, list, lanes } = this.page;
+      const row = filter.rowOf(message);
+      view.set({ top: row - down });
+      chart.shape.clamp();
+      list.top = Math.max(row - below, 0);
+      if (chosen) chart.reveal(row, lanes.of[model.messages.sender[message]]);
+    }
+
+    /* The table and the lifelines have other sizes now, or were not to be seen before: both show the same. */
+    align() {
+      const { filter, view, list } = this.page;
+      if (!filter.length) return;
+      const held = this.held();
+      this.hold({ ...held, list: view.layout === "table" ? held.chart : Math.min(held.chart, list.inWindow - 1) });
+    }
+
+    /* Brings into both windows what has just been chosen: a message, or else a moment. */
+    reveal(changed) {
+      const { view, filter, model, chart, list, time, lanes } = this.page;
+      const chosen = changed.has("selected") && view.selected >= 0 && view.selected < model.messageCount;
+      if (chosen || (time.moved && view.moment < model.stepCount)) {
+        const row = filter.rowOf(chosen ? view.selected : model.rowOf(view.moment));
+        chart.reveal(row, lanes.of[chosen ? model.messages.sender[view.selected] : model.steps.robot[view.moment]]);
+        list.reveal(row);
+      }
+      time.moved = false;
+    }
+  };
+})();
