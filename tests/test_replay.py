@@ -231,6 +231,17 @@ class Fragile(ABT):
         raise KeyError(nogood.value)
 
 
+def test_a_step_that_stands_there_twice_is_a_difference(four: Journal) -> None:
+    """Nobody begins a run twice, and nobody acts without having taken something in."""
+    for place, event in list(enumerate(four.events))[::7]:
+        if isinstance(event, Settled):
+            difference = replay(
+                with_events(four, [*four.events[: place + 1], event, *four.events[place + 1 :]])
+            ).difference
+            assert difference is not None
+            assert (difference.recorded, difference.replayed) == (event, None)
+
+
 def test_a_protocol_that_was_changed_is_caught_where_it_first_does_something_else(four: Journal) -> None:
     replayed = replay(four, Means(protocols={"ABT": Forgetful}))
     difference = replayed.difference

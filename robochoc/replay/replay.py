@@ -127,6 +127,7 @@ class Scene:
         self.words = Words(ensemble.protocol)
         self.channels = Channels(run.events, self.words)
         self._simulated = simulated
+        self._begun: set[str] = set()
         self.heard: list[tuple[Sent, Message]] = []
         """What was taken in by the step that was played last."""
 
@@ -182,8 +183,11 @@ class Scene:
                 host.take_in(envelope)
                 self.heard.append((sent, self.words.message(envelope.content)))
                 self._delay(host, received, told)
-            if step.whole or step.done:
-                said = host.settle() if step.received else host.start(quiet=self.ensemble.quiet)
+            if step.received and (step.whole or step.done):
+                said = host.settle()
+            elif not step.received and step.robot not in self._begun:  # nobody begins a run twice
+                said = host.start(quiet=self.ensemble.quiet)
+            self._begun.add(step.robot)
         except Stops:
             raise
         except Exception as error:  # noqa: BLE001 - a protocol that is being written may raise anything

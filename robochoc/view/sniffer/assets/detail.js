@@ -101,7 +101,7 @@
         this.words,
         kind.why ? make("p", { class: "soft" }, ...Sniffer.coded(kind.why)) : null,
         make("h3", {}, "Why it was said"),
-        Sniffer.links(model, causes, told, `${from} said it at its start: nothing had to be heard before.`),
+        Sniffer.links(model, causes, told, this._uncaused(sender[m], step[m])),
         make("h3", {}, "What came of it"),
         Sniffer.links(model, model.consequencesOf(m), told, taken !== Sniffer.NONE ? this._quietly(receiver[m], taken)
           : model.whole ? `${to} never took it in.` : `${to} has not taken it in yet.`),
@@ -113,6 +113,16 @@
         this.saving.panel(m));
       this.element.scrollTop = 0;
       this._details(m);
+    }
+
+    /* Why a message without a cause was said. */
+    _uncaused(robot, step) {
+      const { model } = this;
+      const before = model.ordinal[step] ? model.ownSteps[robot].all[model.ordinal[step] - 1] : -1;
+      const begins = before < 0 || model.steps.run[before] !== model.steps.run[step];
+      const name = model.nameOf(robot);
+      return begins ? `${name} said it at its start: nothing had to be heard before.`
+        : `What ${name} had heard before is not in this journal.`;
     }
 
     /* What came of a message after which nothing was said. */
