@@ -216,3 +216,14 @@ def test_a_live_page_waits_for_robots_and_knows_when_nobody_saw_the_end(tab: Pag
         until(lambda: not page.locator("#nothing").is_visible(), "it still waits")
     text_is(page, "#verdict", "The run's end was not seen.")
     page.close()
+
+
+@pytest.mark.parametrize("width", [360, 800, 1000, 1400])
+def test_nothing_stands_beside_the_window_however_wide_it_is(page: Page, width: int) -> None:
+    usual = page.viewport_size
+    try:
+        page.set_viewport_size({"width": width, "height": 700})
+        until(lambda: page.evaluate("innerWidth") == width, "the window has another size")
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+    finally:
+        page.set_viewport_size(usual)
