@@ -286,6 +286,12 @@ def test_a_choice_that_fits_nothing_is_told(file: Path, arguments: tuple[str, ..
     assert words in result.output
 
 
+def test_an_export_that_finds_no_room_says_which(file: Path) -> None:
+    result = journal("export", file, "--format", "csv", "-o", "/dev/full")
+    assert result.exit_code == INVALID
+    assert result.output.startswith("/dev/full: the export cannot be written: No space left on device (")
+
+
 def test_a_journal_that_is_not_whole_is_exported_and_that_is_told(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     trace = trace_of(file)
     trace.damage = "block 3 is broken"

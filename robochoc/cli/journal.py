@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robochoc.cli.failure import USAGE, Failure
+from robochoc.cli.failure import INVALID, USAGE, Failure
 from robochoc.cli.paths import InputPath, OutputFile
 from robochoc.cli.saved import saved_journal
 
@@ -94,7 +94,11 @@ def export(
             click.echo(piece, nl=False)
         return
     content = b"".join(pieces)
-    write_atomically(output, content)
+    try:
+        write_atomically(output, content)
+    except OSError as error:
+        why = f"{output}: the export cannot be written: {error.strerror} (free some space, or name another file)"
+        raise Failure(INVALID, _one_line(why)) from error
     count = f"{len(messages):,} message{'s' * (len(messages) != 1)}"
     click.echo(f"{output}: {count}, {len(content):,} bytes")
 
