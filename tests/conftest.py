@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from machines import Site
 
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
+
+if TYPE_CHECKING:
+    from sniffed import Served
 
 
 @pytest.fixture
@@ -31,3 +35,38 @@ def cache_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Non
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         yield
+
+
+# The sniffer's page; what it needs is imported by those tests only that look at it
+
+
+@pytest.fixture(scope="module")
+def without_the_scenes_viewer() -> Iterator[None]:
+    """A megabyte that each page would take its time to read, and nobody there looks at."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("robochoc.view.sniffer.page.viewer_script", lambda: "")
+        yield
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium, by Playwright."""
+    from sniffer_pages import chromium  # noqa: PLC0415 - see above
+
+    with chromium() as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def server(without_the_scenes_viewer: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    """A page of the journal `sniffer_pages.WHOLE`."""
+    from sniffed import served  # noqa: PLC0415 - see above
+    from sniffer_pages import WHOLE  # noqa: PLC0415 - see above
+
+    from robochoc.view.sniffer.session import Session  # noqa: PLC0415 - see above
+
+    del without_the_scenes_viewer  # it only has to be there before the page is made
+    file = tmp_path_factory.mktemp("sniffed") / "run.journal"
+    file.write_bytes(WHOLE)
+    with served(Session(file)) as running:
+        yield running

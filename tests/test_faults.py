@@ -17,7 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from faults import GONE_WITHIN_S, PROGRAM, Run, running, wait_until
+from faults import PROGRAM, Run, gone_within_s, running, wait_until
 from faulty_protocols import (
     TEAM,
 )
@@ -137,7 +137,7 @@ def struck(strike: Strike, repetition: int, team: Path, home: Path, *options: st
         lost = strike(run, chance)
         took = run.end()
         assert run.status() == STRIKES[strike], run.errors()
-        assert took < GONE_WITHIN_S
+        assert took < gone_within_s()
         for name in lost:
             assert f"{name} was lost: its process was killed by SIGKILL" in run.errors()
         nothing_is_left(run)
@@ -189,7 +189,7 @@ def test_a_signal_before_the_program_has_begun(signum: signal.Signals, team: Pat
         with running(solving(team), tmp_path / str(repetition)) as run:
             time.sleep(repetition * 0.01)
             run.strike(signum)
-            assert run.end() < GONE_WITHIN_S
+            assert run.end() < gone_within_s()
             assert run.status() in {-signum, 128 + signum, 1}
             assert run.left_behind() == []
 
@@ -225,7 +225,7 @@ def test_ctrl_c_twice(pause_s: float, team: Path, tmp_path: Path) -> None:
         time.sleep(pause_s)
         if not run.is_over:
             run.strike(signal.SIGINT, group=True)
-        assert run.end() < GONE_WITHIN_S
+        assert run.end() < gone_within_s()
         assert run.status() == 128 + signal.SIGINT
         nothing_is_left(run)
     the_journal_is_whole((tmp_path / "run" / "run.jsonl").read_bytes(), [], killed=False)
@@ -244,7 +244,7 @@ def test_the_journal_of_a_run_that_was_killed_lacks_its_last_block(runtime: str,
                 time.sleep(0.01)
                 followed += follower.read()
             run.strike(signal.SIGKILL)
-            assert run.end() < GONE_WITHIN_S
+            assert run.end() < gone_within_s()
             everything = followed + follower.read()
             _, damage = follower.finish()
     journal = read_journal(path.read_bytes())
@@ -259,7 +259,7 @@ def test_many_robots_killed_at_once(team: Path, tmp_path: Path) -> None:
     with running(observed(team, tmp_path / "run"), tmp_path / "run") as run:
         robots = in_the_middle(run, random.Random(0))
         run.strike(signal.SIGKILL, *robots[10:40:3])
-        assert run.end() < GONE_WITHIN_S
+        assert run.end() < gone_within_s()
         assert run.status() == 4
         nothing_is_left(run)
         named = re.findall(r"(\S+) was lost: its process was killed by SIGKILL", run.errors())
@@ -274,7 +274,7 @@ def test_many_robots_killed_at_once(team: Path, tmp_path: Path) -> None:
 def test_all_robots_killed_at_once(team: Path, tmp_path: Path) -> None:
     with running(solving(team), tmp_path / "run") as run:
         run.strike(signal.SIGKILL, *in_the_middle(run, random.Random(0)))
-        assert run.end() < GONE_WITHIN_S
+        assert run.end() < gone_within_s()
         assert run.status() == 4
         nothing_is_left(run)
 
@@ -284,7 +284,7 @@ def test_a_robot_ended_by_another_signal(signum: int, team: Path, tmp_path: Path
     with running(solving(team), tmp_path / "run") as run:
         robots = in_the_middle(run, random.Random(0))
         run.strike(signum, robots[20])
-        assert run.end() < GONE_WITHIN_S
+        assert run.end() < gone_within_s()
         assert run.status() == 4
         name = signum.name if isinstance(signum, signal.Signals) else f"signal {signum}"
         assert run.errors() == f"{team}: {NAMES[20]} was lost: its process was killed by {name}\n"
@@ -294,7 +294,7 @@ def test_a_robot_ended_by_another_signal(signum: int, team: Path, tmp_path: Path
 def test_a_stopped_robot_does_not_outlive_the_time_limit(team: Path, tmp_path: Path) -> None:
     with running(solving(team, timeout_s=2), tmp_path / "run") as run:
         run.strike(signal.SIGSTOP, run.wait_for_robots(len(NAMES))[30])
-        assert run.end() < 2 + processes.LATE_WORDS_S + crew.FAREWELL_S + GONE_WITHIN_S
+        assert run.end() < 2 + processes.LATE_WORDS_S + crew.FAREWELL_S + gone_within_s()
         assert run.status() in {3, 4}
         nothing_is_left(run)
 
@@ -303,7 +303,7 @@ def test_a_stopped_robot_does_not_outlive_ctrl_c(team: Path, tmp_path: Path) -> 
     with running(solving(team), tmp_path / "run") as run:
         run.strike(signal.SIGSTOP, in_the_middle(run, random.Random(0))[30])
         run.strike(signal.SIGINT, group=True)
-        assert run.end() < GONE_WITHIN_S
+        assert run.end() < gone_within_s()
         assert run.status() == 128 + signal.SIGINT
         nothing_is_left(run)
 
@@ -312,7 +312,7 @@ def test_a_stopped_robot_does_not_outlive_a_killed_parent(team: Path, tmp_path: 
     with running(solving(team), tmp_path / "run") as run:
         run.strike(signal.SIGSTOP, in_the_middle(run, random.Random(0))[30])
         run.strike(signal.SIGKILL)
-        assert run.end() < GONE_WITHIN_S
+        assert run.end() < gone_within_s()
 
 
 def test_robots_that_compute_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
@@ -320,7 +320,7 @@ def test_robots_that_compute_do_not_outlive_a_killed_parent(tmp_path: Path) -> N
         run.wait_for_robots(len(TEAM.robots))
         time.sleep(MIDDLE_S)
         run.strike(signal.SIGKILL)
-        assert run.end() < GONE_WITHIN_S
+        assert run.end() < gone_within_s()
 
 
 # Limits, and outputs that nobody reads
@@ -370,7 +370,7 @@ def test_the_port_of_the_live_scene_is_free_again(signum: signal.Signals, tmp_pa
         wait_until(lambda: "http://" in run.errors(), "it never served")
         (port,) = run.ports()
         run.strike(signum)
-        assert run.end() < GONE_WITHIN_S
+        assert run.end() < gone_within_s()
         assert run.status() == {signal.SIGINT: 0, signal.SIGTERM: 143, signal.SIGKILL: -9}[signum]
         nothing_is_left(run)
     with socket.create_server(("127.0.0.1", port)):

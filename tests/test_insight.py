@@ -15,7 +15,7 @@ from problems import random_team, team_of
 from replays import in_text, random_run, recorded, with_events
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import Concluded, Sent, Settled
+from robochoc.observers.events import Concluded, Sent, Settled, actor
 from robochoc.problem import Constraint, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.findings import Best
@@ -25,7 +25,6 @@ from robochoc.replay.glance import LONGEST, glance
 from robochoc.replay.look import MOST_VALUES
 from robochoc.replay.phrases import Phrases
 from robochoc.replay.reasons import MOST_BACKTRACKS, MOST_REASONS
-from robochoc.replay.steps import actor
 from robochoc.run import Options, Runtime
 
 SIMULATED = Options(protocol="abt", runtime=Runtime.SIMULATOR)

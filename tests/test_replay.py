@@ -29,13 +29,13 @@ from robochoc.observers.events import (
     Received,
     Sent,
     Settled,
+    actor,
 )
 from robochoc.observers.journal import Header, Journal, Recorder, read_journal
 from robochoc.protocols.abt import ABT, Nogood
 from robochoc.protocols.dynabt import DynABT
 from robochoc.registry import protocol_names
 from robochoc.replay import CannotReplay, Means, Replayed, replay
-from robochoc.replay.steps import actor
 from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.part import Brief

@@ -10,7 +10,7 @@ from pathlib import Path
 from urllib.request import urlopen
 
 import pytest
-from faults import GONE_WITHIN_S, PROGRAM, Run, running, wait_until
+from faults import PROGRAM, Run, gone_within_s, running, wait_until
 from sniffed import journal_of, told
 
 from robochoc.cli.solve import solve
@@ -50,7 +50,7 @@ def viewer_of(run: Run) -> int:
 
 
 def all_is_gone(run: Run) -> None:
-    assert run.end() < GONE_WITHIN_S
+    assert run.end() < gone_within_s()
     assert run.left_behind() == []
 
 

@@ -9,18 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sniffed import Served, served
+from sniffed import Served
 from sniffer_pages import (
     ALL,
     COUNT,
     FEED,
     JOURNAL,
     TRACE,
-    WHOLE,
     Page,
     begin_again,
     choose,
-    chromium,
     heads,
     painted,
     robot,
@@ -31,29 +29,8 @@ from sniffer_pages import (
 )
 
 from robochoc.replay.insight import states_of
-from robochoc.view.sniffer.session import Session
 
-
-@pytest.fixture(scope="module", autouse=True)
-def without_the_scenes_viewer() -> Iterator[None]:
-    """A megabyte that each page would take its time to read, and nobody here looks at."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("robochoc.view.sniffer.page.viewer_script", lambda: "")
-        yield
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as browser:
-        yield browser
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    file = tmp_path_factory.mktemp("sniffed") / "run.journal"
-    file.write_bytes(WHOLE)
-    with served(Session(file)) as running:
-        yield running
+pytestmark = pytest.mark.usefixtures("without_the_scenes_viewer")
 
 
 @pytest.fixture(scope="module")

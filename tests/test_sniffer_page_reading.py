@@ -16,11 +16,9 @@ from sniffer_pages import (
     JOURNAL,
     OUTCOME,
     TRACE,
-    WHOLE,
     Page,
     begin_again,
     choose,
-    chromium,
     heads,
     robot,
     rows,
@@ -41,19 +39,12 @@ IN_SIGHT = """(m) => {
 """Whether a message, or the next one that is shown, is in the window of both the lifelines and the table."""
 
 
-@pytest.fixture(scope="module", autouse=True)
-def without_the_scenes_viewer() -> Iterator[None]:
-    """A megabyte that each page would take its time to read, and nobody here looks at."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("robochoc.view.sniffer.page.viewer_script", lambda: "")
-        yield
+pytestmark = pytest.mark.usefixtures("without_the_scenes_viewer")
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    file = tmp_path_factory.mktemp("sniffed") / "run.journal"
-    file.write_bytes(WHOLE)
-    with chromium() as browser, served(Session(file)) as server, shown(browser, server.url) as page:
+def tab(browser: Any, server: Served) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
+    with shown(browser, server.url) as page:
         yield page
 
 

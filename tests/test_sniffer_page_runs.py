@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -20,9 +19,7 @@ from sniffer_pages import (
     JOURNAL,
     NAMELESS,
     OUTCOME,
-    WHOLE,
     choose,
-    chromium,
     heads,
     rows,
     shown,
@@ -38,26 +35,7 @@ from robochoc.view.sniffer.session import Session
 HOSTILE = "</script><img src=x onerror=document.title='broken'>"
 
 
-@pytest.fixture(scope="module", autouse=True)
-def without_the_scenes_viewer() -> Iterator[None]:
-    """A megabyte that each page would take its time to read, and nobody here looks at."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("robochoc.view.sniffer.page.viewer_script", lambda: "")
-        yield
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as browser:
-        yield browser
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    file = tmp_path_factory.mktemp("sniffed") / "run.journal"
-    file.write_bytes(WHOLE)
-    with served(Session(file)) as running:
-        yield running
+pytestmark = pytest.mark.usefixtures("without_the_scenes_viewer")
 
 
 # Live, ended, broken

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, assert_never
 
 import msgspec
 from msgspec import UNSET, UnsetType
@@ -173,3 +173,18 @@ AnyEvent = (
     | Refused
 )
 Observer = Callable[[AnyEvent], None]
+
+
+def actor(event: AnyEvent) -> str | None:
+    """The robot whose step `event` is part of; None where it is nobody's."""
+    match event:
+        case Sent():
+            return event.sender
+        case Received():
+            return event.receiver
+        case Heard() | Decided() | Concluded() | Settled():
+            return event.robot
+        case Began() | Given() | Registered() | Improved() | Lost() | Granted() | Refused():
+            return None
+        case never:
+            assert_never(never)

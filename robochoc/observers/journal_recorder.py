@@ -15,19 +15,7 @@ from threading import Lock
 import msgspec
 
 from robochoc.files import Growing
-from robochoc.observers.events import (
-    AnyEvent,
-    Began,
-    Concluded,
-    Decided,
-    Given,
-    Heard,
-    Improved,
-    Received,
-    Refused,
-    Sent,
-    Settled,
-)
+from robochoc.observers.events import AnyEvent, Began, Decided, Given, Heard, Improved, Refused, Sent, actor
 from robochoc.observers.journal_blocks import BEGINNING, LARGEST_BLOCK, PREAMBLE, framed
 from robochoc.observers.journal_columns import columns_of
 from robochoc.observers.journal_entries import Ended, Header, Line
@@ -282,10 +270,10 @@ def _instead(line: Line, why: str) -> Line:
             return msgspec.structs.replace(line, content={"left out": why})
         case Given():
             return msgspec.structs.replace(line, robots={}, why=why)
-        case Received():
-            who = line.receiver
-        case Decided() | Heard() | Settled() | Concluded():
-            who = line.robot
-        case _:
+        case Header() | Ended():
             raise ValueError(why)
+        case _:
+            who = actor(line)
+    if who is None:
+        raise ValueError(why)
     return Refused(t=line.t, who=who, what=f"have {type(line).__name__} written down", why=why)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import takewhile
-from typing import NamedTuple, assert_never
+from typing import NamedTuple
 
 from robochoc.observers.events import (
     AnyEvent,
@@ -16,15 +16,11 @@ from robochoc.observers.events import (
     Concluded,
     Decided,
     Given,
-    Granted,
     Heard,
-    Improved,
-    Lost,
     Received,
-    Refused,
-    Registered,
     Sent,
     Settled,
+    actor,
 )
 
 RobotEvent = Received | Heard | Decided | Concluded | Sent | Settled
@@ -86,21 +82,6 @@ def steps_of(events: Iterable[AnyEvent]) -> Iterator[Step]:
             yield _step(robot, own, whole=True)
     for robot, own in open_still.items():
         yield _step(robot, own, whole=False)
-
-
-def actor(event: AnyEvent) -> str | None:
-    """The robot whose step `event` is part of; None where it is nobody's."""
-    match event:
-        case Sent():
-            return event.sender
-        case Received():
-            return event.receiver
-        case Heard() | Decided() | Concluded() | Settled():
-            return event.robot
-        case Began() | Given() | Registered() | Improved() | Lost() | Granted() | Refused():
-            return None
-        case never:
-            assert_never(never)
 
 
 def _step(robot: str, events: Sequence[RobotEvent], *, whole: bool) -> Step:

@@ -4,29 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import assert_never
 
 from robochoc.communication.control import Conclusion, Counters, OfEpoch, Ready
 from robochoc.communication.network.words import Account, Checked
 from robochoc.communication.quiescence import Counts, FourCounters
 from robochoc.communication.run_result import RunResult
 from robochoc.formats.constraints import is_name
-from robochoc.observers.events import (
-    AnyEvent,
-    Began,
-    Concluded,
-    Decided,
-    Given,
-    Granted,
-    Heard,
-    Improved,
-    Lost,
-    Received,
-    Refused,
-    Registered,
-    Sent,
-    Settled,
-)
+from robochoc.observers.events import AnyEvent, actor
 from robochoc.outcome import Metrics, Verdict
 from robochoc.problem import INFINITE
 
@@ -165,14 +149,4 @@ class Tally:
 
 def is_of(event: AnyEvent, name: str) -> bool:
     """Whether `event` is one that the robot `name` may tell of in a search: of what itself has done."""
-    match event:
-        case Sent():
-            return event.sender == name
-        case Received():
-            return event.receiver == name
-        case Decided() | Heard() | Settled() | Concluded():
-            return event.robot == name
-        case Began() | Given() | Registered() | Improved() | Lost() | Granted() | Refused():
-            return False
-        case never:
-            assert_never(never)
+    return actor(event) == name
