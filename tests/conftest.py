@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from authorities import Clock, Seen
+from desks import Desk, open_files
 from machines import Site
 
+from robochoc.authority.authority import Authority
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 
@@ -35,6 +39,30 @@ def cache_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Non
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         yield
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def seen() -> Seen:
+    return Seen()
+
+
+@pytest.fixture
+def authority(tmp_path: Path, clock: Clock, seen: Seen) -> Authority:
+    return Authority.create(tmp_path / "authority", clock=clock, observer=seen)
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Iterator[Desk]:
+    before = threading.active_count(), open_files()
+    desk = Desk(tmp_path / "authority")
+    with desk.server:
+        yield desk
+    assert (threading.active_count(), open_files()) == before, "nothing is left behind"
 
 
 # The sniffer's page; what it needs is imported by those tests only that look at it
