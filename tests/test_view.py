@@ -25,11 +25,11 @@ import umsgpack
 from robochoc.expression import Apply, Constant, Expression, Name
 from robochoc.outcome import Metrics, Outcome, Verdict
 from robochoc.problem import Domain, Robot, Team, Topic, Variable
+from robochoc.ros.layout import Point
 from robochoc.view.flight import flights
-from robochoc.view.layout import Drone, Point
 from robochoc.view.live import serve
 from robochoc.view.page import page
-from robochoc.view.scene import Scene, scene_of
+from robochoc.view.scene import Drone, Scene, scene_of
 
 HOSTILE = "</script><img src=x onerror=alert(1)>/../__proto__"
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.view.layout import Drone, Point
+from robochoc.ros.layout import Point
+from robochoc.view.scene import Drone
 
 FPS = 30
 

@@ -5,12 +5,25 @@ Lengths are in cells: one cell is one row, one column or one level. Nothing here
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from robochoc.outcome import Outcome, Verdict
 from robochoc.problem import Team
-from robochoc.view.crew import crew_of
-from robochoc.view.layout import Axis, Drone, lay_out
+from robochoc.ros.crew import Craft, crew_of
+from robochoc.ros.layout import Axis, Field, Point, field_of
+
+
+@dataclass(frozen=True)
+class Drone:
+    """Begins at `home`, on the ground. It flies to its `place`, or steps `aside`, or (neither) stays at home."""
+
+    name: str
+    group: int
+    """Its row: drones of a row look alike."""
+    home: Point
+    place: Point | None = None
+    aside: Point | None = None
 
 
 @dataclass(frozen=True)
@@ -34,11 +47,20 @@ def scene_of(outcome: Outcome, team: Team | None = None) -> Scene:
     Never raises for want of a place: a robot whose coordinates are missing or undefined is placed by the two
     numbers its name ends in (row and column), and failing that in a tidy grid, at the height of its first value.
     """
-    layout = lay_out(crew_of(outcome, team))
-    flying = sum(drone.place is not None for drone in layout.drones)
-    aside = len(layout.drones) - flying  # drones, as a robot may fly several
+    crew = crew_of(outcome, team)
+    field = field_of(crew)
+    drones = tuple(_drones(crew, field))
+    flying = sum(drone.place is not None for drone in drones)
+    aside = len(drones) - flying  # drones, as a robot may fly several
     title = f"{outcome.team}: {_ending(outcome, flying, aside)}"
-    return Scene(title, _facts(outcome, flying, aside), layout.drones, layout.axes)
+    return Scene(title, _facts(outcome, flying, aside), drones, field.axes)
+
+
+def _drones(crew: Sequence[Craft], field: Field) -> Iterator[Drone]:
+    spots = field.edge(sum(craft.withdrew for craft in crew))
+    for craft, home, place in zip(crew, field.homes, field.places(crew), strict=True):
+        aside = next(spots) if craft.withdrew and place is None else None
+        yield Drone(craft.name, craft.cell[0] if craft.cell else round(home[0]), home, place, aside)
 
 
 def _ending(outcome: Outcome, flying: int, aside: int) -> str:

@@ -10,13 +10,13 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
+from robochoc.ros.layout import Axis
 from robochoc.view.flight import FPS, Key, flights
 from robochoc.view.label import label
-from robochoc.view.layout import Axis, Drone
 from robochoc.view.palette import GREY, Colour, colours
 from robochoc.view.quadrotor import Shape, disc, joined, quadrotor
 from robochoc.view.recorder import Recorder, Track
-from robochoc.view.scene import Scene
+from robochoc.view.scene import Drone, Scene
 
 _Corners = npt.NDArray[np.float64]
 """The lowest and the highest x, y and z of something, a row each."""
@@ -53,12 +53,12 @@ def still(scene: Scene) -> list[bytes]:
     return _drawn(scene).commands
 
 
-def path_of(number: int, drone: Drone) -> str:
-    """Where in meshcat's tree, below its root, `drone` is: the scene's `number`-th, counted from 0.
+def path_of(number: int, name: str) -> str:
+    """Where in meshcat's tree, below its root, the drone called `name` is: the scene's `number`-th, counted from 0.
 
     The number keeps paths apart, and away from names that mean something in JavaScript.
     """
-    return f"drones/{number + 1} " + re.sub(r"[^\w.-]", "_", drone.name)
+    return f"drones/{number + 1} " + re.sub(r"[^\w.-]", "_", name)
 
 
 def _drawn(scene: Scene) -> Recorder:
@@ -172,7 +172,7 @@ def _draw_drones(recorder: Recorder, drones: Sequence[Drone], radius: float) -> 
     paint = _paint(drones)
     texts = _texts([drone.name for drone in drones], _READABLE * radius)
     for number, (drone, text) in enumerate(zip(drones, texts, strict=True)):
-        path = path_of(number, drone)
+        path = path_of(number, drone.name)
         recorder.mesh(f"{path}/body", quadrotor(), paint[drone.group])
         height = min(_TEXT * radius, _NAME_WIDTH / label(text).aspect)
         _write(recorder, f"{path}/name", text, np.array([0, 0, 0.42]), height)
@@ -183,7 +183,7 @@ def _animate(recorder: Recorder, drones: Sequence[Drone]) -> None:
     paint = _paint(drones)
     tracks = []
     for number, (drone, keys) in enumerate(zip(drones, flights(drones), strict=True)):
-        path = path_of(number, drone)
+        path = path_of(number, drone.name)
         if keys:
             tracks.append(Track(path, "position", "vector3", keys))
         if drone.aside:

@@ -17,9 +17,9 @@ import msgspec
 
 from robochoc.formats import InvalidInput, robot_in
 from robochoc.problem import Assignment, Robot, natural
-from robochoc.view.crew import Craft, crafts_of, lone_craft
-from robochoc.view.layout import Layout, Point, lay_out
-from robochoc.view.scene import Scene
+from robochoc.ros.crew import Craft, crafts_of, lone_craft
+from robochoc.ros.layout import Field, Point, field_of
+from robochoc.view.scene import Drone, Scene
 from robochoc.view.sniffer.feed import BadRequest
 from robochoc.view.sniffer.trace import Trace
 from robochoc.view.stage import path_of, still
@@ -62,7 +62,7 @@ class Stage:
         order = sorted(range(len(crew)), key=lambda place: (natural(crew[place][1].name), crew[place][1].name))
         self._owners = [crew[place][0] for place in order]
         crafts = [crew[place][1] for place in order]
-        self._layout: Layout = lay_out(crafts, [*self._others()])
+        self._field: Field = field_of(crafts, self._others())
         self._drones: dict[str, list[int]] = {}
         for number, owner in enumerate(self._owners):
             self._drones.setdefault(owner, []).append(number)
@@ -74,7 +74,6 @@ class Stage:
 
     def answer(self, first: int = 0) -> dict[str, Any]:
         """What the page draws, with the moves of the decisions from the `first` on; JSON."""
-        drones = self._layout.drones
         upto = len(self._trace.decisions)
         if first > upto:
             raise BadRequest(f"there are {upto} decisions")
@@ -82,8 +81,10 @@ class Stage:
         return {
             "commands": [base64.b64encode(command).decode() for command in commands],
             "drones": [
-                {"robot": owner, "path": path_of(number, drone), "ground": drone.home}
-                for number, (owner, drone) in enumerate(zip(self._owners, drones, strict=True))
+                {"robot": owner, "path": path_of(number, name), "ground": home}
+                for number, (owner, name, home) in enumerate(
+                    zip(self._owners, self._names, self._field.homes, strict=True)
+                )
             ],
             "moves": [*self.moves(first, upto)],
             "decisions": upto,
@@ -97,13 +98,14 @@ class Stage:
         opened = [step for step in opened if step > before]
         for step, values in islice(trace.decisions, first, end):
             while opened and opened[0] <= step:
-                yield from ((opened[0], number, *drone.home) for number, drone in enumerate(self._layout.drones))
+                yield from ((opened[0], number, *home) for number, home in enumerate(self._field.homes))
                 del opened[0]
             robot = trace.robots[trace.steps.robot[step]]
             yield from ((step, number, *point) for number, point in self._places(robot, values))
 
     def _commands(self) -> list[bytes]:
-        return still(Scene("", (), self._layout.drones, self._layout.axes))
+        homes = zip(self._names, self._field.homes, strict=True)
+        return still(Scene("", (), tuple(Drone(name, round(home[0]), home) for name, home in homes), self._field.axes))
 
     def _crafts(self, name: str, values: Assignment) -> list[Craft]:
         robot = self._robots[name]
@@ -117,9 +119,9 @@ class Stage:
         if not numbers:
             return
         crafts = {craft.name: craft for craft in self._crafts(name, values)}
-        rows, columns, levels = self._layout.axes
+        rows, columns, levels = self._field.axes
         for number in numbers:
-            home = self._layout.drones[number].home
+            home = self._field.homes[number]
             craft = crafts.get(self._names[number])
             if craft is None or craft.level is None:
                 yield number, home

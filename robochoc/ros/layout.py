@@ -1,16 +1,16 @@
-"""Where drones stand, fly to and step aside: crafts become drones in a box of rows, columns and levels.
+"""Where drones stand, fly to and step aside: a crew in a box of rows, columns and levels.
 
-Lengths are in cells: a drone is a little narrower than one.
+Lengths are in cells: a drone is a little narrower than one. An axis says which value of the problem a cell stands for.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import count
 
-from robochoc.view.crew import Cell, Craft, numbers
+from robochoc.ros.crew import Cell, Craft, numbers
 
 Point = tuple[float, float, float]
 
@@ -26,18 +26,6 @@ _FAR = 1000
 """Positions beyond it are moved to begin at 1: a browser draws in single precision."""
 _TOO_CLOSE = 0.5
 _GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
-
-
-@dataclass(frozen=True)
-class Drone:
-    """Begins at `home`, on the ground. It flies to its `place`, or steps `aside`, or (neither) stays at home."""
-
-    name: str
-    group: int
-    """Its row: drones of a row look alike."""
-    home: Point
-    place: Point | None = None
-    aside: Point | None = None
 
 
 @dataclass(frozen=True)
@@ -65,11 +53,22 @@ class Axis:
         """How many cells long."""
         return self.high - self.low + 1
 
-    def at(self, value: int) -> float:
+    def at(self, value: float) -> float:
         """Where `value` lies."""
-        if self.cells == self.last - self.first + 1:
+        if self._is_even:
             return float(self.low + value - self.first)
         return self.low + (value - self.first) * (self.high - self.low) / (self.last - self.first)
+
+    def value(self, cell: float) -> float:
+        """What lies there: `at`, the other way round."""
+        if self._is_even:
+            return cell - self.low + self.first
+        return self.first + (cell - self.low) * (self.last - self.first) / (self.high - self.low)
+
+    @property
+    def _is_even(self) -> bool:
+        """Whether each value has a cell of its own."""
+        return self.cells == self.last - self.first + 1
 
     @property
     def middle(self) -> float:
@@ -90,44 +89,54 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Layout:
-    """Where everything is. The axes are those of x, y and z; the ground is one cell below the lowest level."""
+class Field:
+    """The box, and for each craft of a crew the spot on the ground where it stands in the beginning."""
 
-    drones: tuple[Drone, ...]
     axes: tuple[Axis, Axis, Axis]
+    homes: tuple[Point, ...]
+
+    @property
+    def ground(self) -> float:
+        """The height on which drones stand: one cell below the lowest level."""
+        return self.axes[2].ground
+
+    def places(self, crew: Sequence[Craft]) -> list[Point | None]:
+        """Where each of `crew`, as many as have homes, flies to; nowhere without a level. No two meet."""
+        taken: list[Point] = []
+        around: dict[Point, Iterator[Point]] = {}
+        found: list[Point | None] = []
+        rows, columns, levels = self.axes
+        for craft, (x, y, _) in zip(crew, self.homes, strict=True):
+            place = None
+            if craft.level is not None:
+                here = (rows.at(craft.cell[0]), columns.at(craft.cell[1])) if craft.cell else (x, y)
+                middle = (*here, levels.at(craft.level))
+                spots = around.setdefault(middle, _spiral(middle))
+                place = next(spot for spot in spots if not _is_near(spot, taken))
+                taken.append(place)
+            found.append(place)
+        return found
+
+    def edge(self, number: int) -> Iterator[Point]:
+        """Spots for `number` drones that step aside, in lines before the box."""
+        rows, columns, _ = self.axes
+        across = max(1, min(number, max(rows.cells, columns.cells) * 3 // 2))
+        for x, y in _lines(rows.middle - (across - 1) / 2, across, columns.low - _GAP, -1):
+            yield x, y, self.ground
 
 
-def lay_out(crew: Sequence[Craft], others: Sequence[Craft] = ()) -> Layout:
-    """A place of its own for each of `crew`, in the air and on the ground.
-
-    The axes also reach to the cells and levels of `others`: where some of the crew may be at another time.
-    """
+def field_of(crew: Sequence[Craft], others: Iterable[Craft] = ()) -> Field:
+    """The field for `crew`. Its axes also reach to `others`: where some of the crew may be at another time."""
+    others = [*others]
     cells = _cells(crew)
     axes = _axes(crew, others, [*cells, *(other.cell for other in others if other.cell)])
     rows, columns, levels = axes
-    ground = levels.ground
     beside = _lines(rows.low, rows.cells, columns.high + _GAP, 1)
-    withdrawn = sum(craft.withdrew for craft in crew)
-    across = min(withdrawn, max(rows.cells, columns.cells) * 3 // 2)
-    aside = _lines(rows.middle - (across - 1) / 2, across, columns.low - _GAP, -1)
     homes: list[Point] = []
-    places: list[Point] = []
-    drones = []
-    for craft, (x, y) in zip(crew, cells, strict=True):
-        here = (rows.at(x), columns.at(y))
-        home = (*here, ground)
-        if _near(home, homes):
-            home = (*next(beside), ground)
-        homes.append(home)
-        drone = Drone(craft.name, x, home)
-        if craft.level is not None:
-            place = (*here, levels.at(craft.level))
-            drone = replace(drone, place=_beside(place, _near(place, places)))
-            places.append(place)
-        elif craft.withdrew:
-            drone = replace(drone, aside=(*next(aside), ground))
-        drones.append(drone)
-    return Layout(tuple(drones), axes)
+    for x, y in cells:
+        home = (rows.at(x), columns.at(y), levels.ground)
+        homes.append((*next(beside), levels.ground) if _is_near(home, homes) else home)
+    return Field(axes, tuple(homes))
 
 
 def _cells(crew: Sequence[Craft]) -> list[Cell]:
@@ -165,13 +174,14 @@ def _lines(x: float, across: int, y: int, step: int) -> Iterator[tuple[float, fl
         yield float(x + number % across), float(y + number // across * step)
 
 
-def _near(point: Point, others: Sequence[Point]) -> int:
-    """How many of `others` would be drawn into `point`."""
-    return sum(math.dist(point, other) < _TOO_CLOSE for other in others)
+def _is_near(point: Point, others: Sequence[Point]) -> bool:
+    """Whether one of `others` is too close to `point`."""
+    return any(math.dist(point, other) < _TOO_CLOSE for other in others)
 
 
-def _beside(point: Point, number: int) -> Point:
-    """The point itself for the first to come there; newcomers spiral outwards, like a sunflower's seeds."""
+def _spiral(point: Point) -> Iterator[Point]:
+    """The point itself, then spots around it, further and further out, like a sunflower's seeds."""
     x, y, z = point
-    turn, radius = number * _GOLDEN_ANGLE, 0.3 * math.sqrt(number)
-    return (x + radius * math.cos(turn), y + radius * math.sin(turn), z)
+    for number in count():
+        turn, radius = number * _GOLDEN_ANGLE, _TOO_CLOSE * math.sqrt(number)
+        yield (x + radius * math.cos(turn), y + radius * math.sin(turn), z)

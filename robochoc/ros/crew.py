@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 from robochoc.expression import Expression, Undefined, evaluate
 from robochoc.outcome import Outcome, Verdict
@@ -29,6 +30,10 @@ class Craft:
     cell: Cell | None = None
     level: int | None = None
     withdrew: bool = False
+    robot: str = ""
+    """Who decides about it; empty where only a variable is known."""
+    topic: Topic | None = None
+    """Where its decisions are published, if its file says so."""
 
 
 def crew_of(outcome: Outcome, team: Team | None = None) -> tuple[Craft, ...]:
@@ -63,10 +68,15 @@ def crafts_of(robot: Robot, values: Assignment, *, withdrew: bool = False) -> li
     topics = [topic for topic in robot.topics if topic.x is not None and topic.y is not None]
     if len(topics) > 1:
         named = zip(_short_names(topics), topics, strict=True)
-        return [_craft(name, own, topic, values, withdrew=withdrew) for name, topic in named]
-    if not topics and len(own) > 1 and all(numbers(name) for name in own):
-        return [_craft(name, [name], None, values, withdrew=withdrew) for name in own]
-    return [_craft(robot.name, own, topics[0] if topics else None, values, withdrew=withdrew)]
+        crew = [_craft(name, own, topic, values, withdrew=withdrew) for name, topic in named]
+    elif not topics and len(own) > 1 and all(numbers(name) for name in own):
+        topics = [topic for topic in robot.topics[: len(own)] if len(robot.topics) == len(own)]
+        named_topics = zip_longest(own, topics)
+        crew = [_craft(name, [name], topic, values, withdrew=withdrew) for name, topic in named_topics]
+    else:
+        topics = topics or [*robot.topics[:1]]
+        crew = [_craft(robot.name, own, topics[0] if topics else None, values, withdrew=withdrew)]
+    return [replace(craft, robot=robot.name) for craft in crew]
 
 
 def _craft(
@@ -79,7 +89,7 @@ def _craft(
     if known and not withdrew:
         height = _value(topic.z, values) if topic else None
         level = known[0] if height is None else height
-    return Craft(name, next(filter(None, cells), None), level, withdrew)
+    return Craft(name, next(filter(None, cells), None), level, withdrew, topic=topic)
 
 
 def _sent(topic: Topic, values: Assignment) -> Cell | None:

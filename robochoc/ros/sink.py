@@ -1,0 +1,52 @@
+"""Sinks: where a mission's messages go. Packages offer them under the entry point group `robochoc.sinks`."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Any, Self
+
+Fields = Mapping[str, Any]
+"""A message's fields by their ROS names, nested; times (`stamp`) are integers, in nanoseconds. What is not named is
+zero, or empty."""
+
+
+class SinkFailed(Exception):  # noqa: N818 - named for what happened
+    """The sink cannot be opened, or written to any more: why, and what might help."""
+
+
+class Sink(ABC):
+    """Takes messages. Whoever opens it closes it: it is a context manager.
+
+    `place` is what stands behind its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SinkFailed`.
+    """
+
+    def __init__(self, place: str) -> None:
+        self.place = place
+
+    def advertise(self, topics: Mapping[str, str]) -> None:  # noqa: B027 - nothing to do for files
+        """Messages of these types will be published on these topics (both by their ROS names). Raises `SinkFailed`."""
+
+    @abstractmethod
+    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
+        """Publish a message of the ROS type `kind` on `topic`, at a time since the epoch. Raises `SinkFailed`."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """All has been published. What is written becomes what was asked for only now. Raises `SinkFailed`."""
+
+    def discard(self) -> None:
+        """Something went wrong: leave nothing half-written."""
+        self.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.close()
+        else:
+            self.discard()

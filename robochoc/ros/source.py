@@ -1,0 +1,56 @@
+"""Sources: where messages about the robots' situation come from. Packages offer them under `robochoc.sources`."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from types import TracebackType
+from typing import NamedTuple, Self
+
+from robochoc.ros.sink import Fields
+
+
+class SourceFailed(Exception):  # noqa: N818 - named for what happened
+    """The source cannot be opened, or read any further: why, and what might help."""
+
+
+class Heard(NamedTuple):
+    """A message: where it was published, its ROS type, its fields (as a sink takes them), and when it was received."""
+
+    topic: str
+    kind: str
+    fields: Fields
+    at_ns: int
+
+
+class Source(ABC):
+    """Gives messages. Whoever opens it closes it: it is a context manager.
+
+    `place` is what stands behind its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SourceFailed`.
+    """
+
+    def __init__(self, place: str) -> None:
+        self.place = place
+
+    @abstractmethod
+    def listen(self, topics: Mapping[str, str]) -> None:
+        """From now on, give what is published on these topics with these types (both by their ROS names).
+
+        What stands on such a topic with another type is passed over. Raises `SourceFailed`.
+        """
+
+    @abstractmethod
+    def next(self, wait_s: float) -> Heard | None:
+        """The next message. None: a recording is over, or nothing came within `wait_s`. Raises `SourceFailed`."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Leave nothing behind."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
