@@ -7,9 +7,10 @@ the two numbers its name ends in (`Robot3.1`, `V3.1`), with its first value for 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import zip_longest
+from itertools import product, zip_longest
+from math import prod
 
 from robochoc.expression import Expression, Undefined, evaluate
 from robochoc.outcome import Outcome, Verdict
@@ -20,6 +21,9 @@ Cell = tuple[int, int]
 
 # Longer numbers are dates or serial numbers, not rows.
 _ROW_AND_COLUMN = re.compile(r"(?<![0-9])([0-9]{1,4})[._,:;-]([0-9]{1,4})$")
+
+_MOST_DECISIONS = 1_000
+"""Of a robot whose places are all looked at before it decides."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,14 @@ def crafts_of(robot: Robot, values: Assignment, *, withdrew: bool = False) -> li
         topics = topics or [*robot.topics[:1]]
         crew = [_craft(robot.name, own, topics[0] if topics else None, values, withdrew=withdrew)]
     return [replace(craft, robot=robot.name) for craft in crew]
+
+
+def possible_crafts(robot: Robot) -> Iterator[Craft]:
+    """The crafts of `robot` for all that it might decide; none where that would be too much to look at."""
+    if 0 < prod(len(own.domain) for own in robot.variables) <= _MOST_DECISIONS:
+        names = [own.name for own in robot.variables]
+        for decided in product(*(own.domain for own in robot.variables)):
+            yield from crafts_of(robot, dict(zip(names, decided, strict=True)))
 
 
 def _craft(

@@ -12,13 +12,15 @@ from dataclasses import dataclass, replace
 
 from robochoc.outcome import Epoch, Outcome, Verdict
 from robochoc.problem import AddAgent, Assignment, Robot, Team, Topic, natural
-from robochoc.ros.crew import Craft, crafts_of, lone_craft, numbers
+from robochoc.ros.crew import Craft, crafts_of, lone_craft, numbers, possible_crafts
 from robochoc.ros.layout import Axis, Field, Point, field_of
 
 UNIT_M = 1.0
 """A unit of coordinates, where nobody says otherwise: drones are a little narrower."""
 VAST_M = 40.0
 """A field is no longer than that, where nobody says how long."""
+_FAR_BELOW = 40
+"""Levels."""
 
 
 @dataclass(frozen=True)
@@ -156,6 +158,7 @@ def mission_of(outcome: Outcome, team: Team | None = None, scale: float | None =
     if team is not None:
         robots, names = everybody(team), []
         others = [craft for values in decided for robot in robots for craft in crafts_of(robot, values)]
+        others += _lowest(robots, others)
     else:
         robots, names = [], [*first, *outcome.withdrawn]
         others = [lone_craft(name, values) for values in decided for name in values]
@@ -168,6 +171,16 @@ def everybody(team: Team) -> list[Robot]:
     """All robots that ever take part: those of the beginning, and those that the scenario adds."""
     added = [change.robot for event in team.scenario for change in event.changes if isinstance(change, AddAgent)]
     return [*{robot.name: robot for robot in (*team.robots, *added)}.values()]
+
+
+def _lowest(robots: Iterable[Robot], decided: Iterable[Craft]) -> list[Craft]:
+    """The lowest that anybody could be, unless that is far below all `decided`: the ground is the same for all runs."""
+    possible = [craft for robot in robots for craft in possible_crafts(robot) if craft.level is not None]
+    if not possible:
+        return []
+    lowest = min(possible, key=lambda craft: craft.level or 0)
+    highest = max((craft.level for craft in decided if craft.level is not None), default=0)
+    return [Craft("", level=lowest.level)] if highest - (lowest.level or 0) < _FAR_BELOW else []
 
 
 def _leaving(epochs: Sequence[Epoch], outcome: Outcome) -> int:

@@ -9,15 +9,14 @@ from __future__ import annotations
 import base64
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from itertools import islice, product
-from math import prod
+from itertools import islice
 from typing import Any
 
 import msgspec
 
 from robochoc.formats import InvalidInput, robot_in
 from robochoc.problem import Assignment, Robot, natural
-from robochoc.ros.crew import Craft, crafts_of, lone_craft
+from robochoc.ros.crew import Craft, crafts_of, lone_craft, possible_crafts
 from robochoc.ros.layout import Field, Point, field_of
 from robochoc.view.scene import Drone, Scene
 from robochoc.view.sniffer.feed import BadRequest
@@ -27,7 +26,7 @@ from robochoc.view.stage import path_of, still
 _MOST_DRONES = 2_000
 """More than that no browser moves smoothly, nor can anybody tell them apart."""
 _MOST_PLACES = 1_000
-"""Of a robot whose places are all looked at before it decides, for the box to hold them."""
+"""Of all robots: when so many places are known, what is decided need not be looked at for the box to hold it."""
 
 Move = tuple[int, int, float, float, float]
 """From a step on, a drone (by its number) is at x, y, z."""
@@ -134,10 +133,8 @@ class Stage:
         """Where drones might be, or have been."""
         seen: set[Craft] = set()
         for robot in self._robots.values():
-            if robot is not None and 0 < prod(len(own.domain) for own in robot.variables) <= _MOST_PLACES:
-                names = [own.name for own in robot.variables]
-                for decided in product(*(own.domain for own in robot.variables)):
-                    seen.update(crafts_of(robot, dict(zip(names, decided, strict=True))))
+            if robot is not None:
+                seen.update(possible_crafts(robot))
         known = {name for name, robot in self._robots.items() if robot is not None}
         for step, values in self._trace.decisions:
             name = self._trace.robots[self._trace.steps.robot[step]]
