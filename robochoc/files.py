@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import secrets
+import shutil
 from contextlib import suppress
 from pathlib import Path
 
@@ -84,6 +85,58 @@ class Growing:
         os.close(self._descriptor)
 
 
+class Unfinished:
+    """A file that takes the place of `path` when it is complete: write to `stream`, then `keep` or `discard` it.
+
+    Whoever looks meanwhile sees the old file. Where Linux allows it the new one has no name until then, so that not
+    even SIGKILL leaves a trace. Symbolic links are followed; what is no file (devices, pipes, and what standard output
+    goes to) is refused. Raises `OSError`.
+    """
+
+    def __init__(self, path: Path, mode: int = 0o666) -> None:
+        self._target = path.resolve()
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        if _stream_to(path) is not None or (path.exists() and not path.is_file()):
+            raise OSError(errno.ENOTSUP, "is no file that could be replaced", str(path))
+        self._named: Path | None = None
+        descriptor = _unnamed(self._target, mode)
+        if descriptor is None:
+            self._named = _beside(self._target)
+            descriptor = os.open(self._named, os.O_CREAT | os.O_EXCL | os.O_RDWR, mode)
+        self.stream = os.fdopen(descriptor, "w+b")
+
+    def keep(self) -> None:
+        """Put the file in its place. Raises `OSError`; nothing is left behind then."""
+        try:
+            self.stream.flush()
+            if self._named is None:
+                self._named = _linked(self.stream.fileno(), self._target) or self._copied()
+            self._named.replace(self._target)
+        except BaseException:
+            self.discard()
+            raise
+        self._named = None
+        self.stream.close()
+
+    def discard(self) -> None:
+        """Leave nothing behind. Does nothing when that has been done, or the file has been kept."""
+        with suppress(OSError):  # what is still buffered may not fit
+            self.stream.close()
+        if self._named is not None:
+            self._named.unlink(missing_ok=True)
+            self._named = None
+
+    def _copied(self) -> Path:
+        """The same once more, with a name: for systems that give none to what had none."""
+        self._named = _beside(self._target)
+        mode = os.fstat(self.stream.fileno()).st_mode & 0o777
+        self.stream.seek(0)
+        with os.fdopen(os.open(self._named, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode), "wb") as copy:
+            shutil.copyfileobj(self.stream, copy)
+        return self._named
+
+
 def _replaced(target: Path, content: bytes, mode: int) -> int:
     """Put a new file with `content` where `target` is; its descriptor, open for writing."""
     descriptor, complete = _written_unnamed(target, content, mode) or _written_named(target, content, mode)
@@ -107,27 +160,42 @@ def _stream_to(path: Path) -> int | None:
 
 def _written_unnamed(target: Path, content: bytes, mode: int) -> tuple[int, Path] | None:
     """The complete file beside `target`, named at the last moment; None where the system cannot do that."""
+    descriptor = _unnamed(target, mode)
+    if descriptor is None:
+        return None
+    try:
+        _write_all(descriptor, content)
+        complete = _linked(descriptor, target)
+    except BaseException:
+        os.close(descriptor)
+        raise
+    if complete is None:
+        os.close(descriptor)
+        return None
+    return descriptor, complete
+
+
+def _unnamed(target: Path, mode: int) -> int | None:
+    """A file without a name in the folder of `target`, open for writing and reading; None where there are none."""
     if not hasattr(os, "O_TMPFILE"):
         return None
     try:
-        descriptor = os.open(target.parent, os.O_TMPFILE | os.O_WRONLY, mode)
+        return os.open(target.parent, os.O_TMPFILE | os.O_RDWR, mode)
     except OSError as error:
         if error.errno in _NO_UNNAMED:
             return None
         raise
+
+
+def _linked(descriptor: int, target: Path) -> Path | None:
+    """A hidden name beside `target` for the file that has none; None where the system cannot do that."""
+    complete = _beside(target)
     try:
-        _write_all(descriptor, content)
-        complete = _beside(target)
-        try:
-            # Only with a folder's descriptor does Python ask the kernel to follow the link in /proc.
-            os.link(f"/proc/self/fd/{descriptor}", complete, src_dir_fd=descriptor, follow_symlinks=True)
-        except OSError:
-            os.close(descriptor)
-            return None
-    except BaseException:
-        os.close(descriptor)
-        raise
-    return descriptor, complete
+        # Only with a folder's descriptor does Python ask the kernel to follow the link in /proc.
+        os.link(f"/proc/self/fd/{descriptor}", complete, src_dir_fd=descriptor, follow_symlinks=True)
+    except OSError:
+        return None
+    return complete
 
 
 def _written_named(target: Path, content: bytes, mode: int) -> tuple[int, Path]:

@@ -25,6 +25,9 @@ class Sink(ABC):
     def __init__(self, place: str) -> None:
         self.place = place
 
+    def explain(self, original: Mapping[str, str]) -> None:  # noqa: B027 - only a recording can keep it
+        """What topics (by their ROS names) are called in the team's files. Raises `SinkFailed`."""
+
     def advertise(self, topics: Mapping[str, str]) -> None:  # noqa: B027 - nothing to do for files
         """Messages of these types will be published on these topics (both by their ROS names). Raises `SinkFailed`."""
 

@@ -1,0 +1,140 @@
+"""How a waypoint becomes a message of the ROS type that its topic has.
+
+Some types are built in. Packages offer others under the entry point group `robochoc.waypoints`; the entry's name is the
+ROS type, such as `mavros_msgs/PositionTarget`. What it names is a function that makes a message's fields of a
+`Waypoint`, or a `WaypointMapping`, which also brings the definition of a type that no distribution of ROS has.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
+from typing import cast
+
+from robochoc.formats.diagnostics import on_one_line
+from robochoc.installed import loaded, named, names_in
+from robochoc.ros.layout import Point
+from robochoc.ros.sink import Fields
+from robochoc.ros.waypoint import Waypoint
+
+GROUP = "robochoc.waypoints"
+
+_SPELLING = re.compile(r"([A-Za-z]\w*)/(?:msg/)?([A-Za-z]\w*)", re.ASCII)
+_UPRIGHT = {"w": 1.0}
+
+
+class NoMapping(Exception):  # noqa: N818 - named for what is missing
+    """Nobody says how a waypoint becomes a message of the type that a topic has: which, and what types there are."""
+
+
+@dataclass(frozen=True)
+class WaypointMapping:
+    """How a waypoint becomes a message of one ROS type.
+
+    `definition` is the text of the type's `.msg` file, for a type that no distribution of ROS has. Types of its fields
+    that none has follow it, each after a line of 80 `=` and a line `MSG: package/Type`, as in a recording.
+    """
+
+    fields: Callable[[Waypoint], Fields]
+    definition: str = ""
+
+
+def short_kind(kind: str) -> str:
+    """`geometry_msgs/PoseStamped`, also where it is called `geometry_msgs/msg/PoseStamped`. Others stay as they are."""
+    found = _SPELLING.fullmatch(kind.strip())
+    return f"{found[1]}/{found[2]}" if found else kind
+
+
+def kinds() -> tuple[str, ...]:
+    """All types that a waypoint can become, built in and installed, sorted."""
+    return tuple(sorted({*_BUILT_IN, *map(short_kind, names_in(GROUP))}))
+
+
+@cache
+def mapping_for(kind: str) -> WaypointMapping | None:
+    """How a waypoint becomes a `kind`, in either spelling; None if nobody says. Raises `NoMapping`: it is broken."""
+    short = short_kind(kind)
+    if short in _BUILT_IN:
+        return WaypointMapping(_BUILT_IN[short])
+    namesakes = [entry for name in names_in(GROUP) if short_kind(name) == short for entry in named(GROUP, name)]
+    if not namesakes:
+        return None
+    found = loaded(namesakes[0], namesakes, _fault)
+    if found.broken:
+        raise NoMapping(on_one_line(f"{namesakes[0].value}, installed for waypoints as {kind}, {found.broken}"))
+    if isinstance(found.what, WaypointMapping):
+        return found.what
+    return WaypointMapping(cast("Callable[[Waypoint], Fields]", found.what))
+
+
+def mapping_of(topic: str, robot: str, kind: str) -> WaypointMapping:
+    """How waypoints of `robot` become what is published on `topic`. Raises `NoMapping`, which names those there are."""
+    found = mapping_for(kind)
+    if found is None:
+        who = f"topic {topic!r} of {robot}" if robot else f"topic {topic!r}"
+        told = f"{who} has the type {kind!r}, and nobody says how a waypoint becomes one"
+        known = f"known are {', '.join(kinds())}; a package may offer others ({GROUP})"
+        raise NoMapping(on_one_line(f"{told}: {known}"))
+    return found
+
+
+def definition_of(kind: str) -> str:
+    """The definition of `kind` that an installed package brings; empty if none does."""
+    try:
+        found = mapping_for(kind)
+    except NoMapping:
+        return ""
+    return found.definition if found else ""
+
+
+def _fault(found: object) -> str:
+    return "" if isinstance(found, WaypointMapping) or callable(found) else "is no function and no WaypointMapping"
+
+
+def point(at: Point) -> Fields:
+    """The fields of a `geometry_msgs/Point`, or a `Vector3`."""
+    return {"x": at[0], "y": at[1], "z": at[2]}
+
+
+def header(waypoint: Waypoint) -> Fields:
+    """The fields of a `std_msgs/Header`."""
+    return {"stamp": waypoint.stamp, "frame_id": waypoint.frame}
+
+
+def _pose(waypoint: Waypoint) -> Fields:
+    return {"position": point(waypoint.at), "orientation": _UPRIGHT}
+
+
+def _transform(waypoint: Waypoint) -> Fields:
+    return {"translation": point(waypoint.at), "rotation": _UPRIGHT}
+
+
+def _with_header(part: str, make: Callable[[Waypoint], Fields]) -> Callable[[Waypoint], Fields]:
+    return lambda waypoint: {"header": header(waypoint), part: make(waypoint)}
+
+
+def _place(waypoint: Waypoint) -> Fields:
+    return point(waypoint.at)
+
+
+def _transform_stamped(waypoint: Waypoint) -> Fields:
+    child = waypoint.topic.removeprefix("/")
+    return {"header": header(waypoint), "child_frame_id": child, "transform": _transform(waypoint)}
+
+
+_BUILT_IN: Mapping[str, Callable[[Waypoint], Fields]] = MappingProxyType(
+    {
+        "geometry_msgs/PoseStamped": _with_header("pose", _pose),
+        "geometry_msgs/Pose": _pose,
+        "geometry_msgs/PoseWithCovarianceStamped": _with_header("pose", lambda waypoint: {"pose": _pose(waypoint)}),
+        "geometry_msgs/PointStamped": _with_header("point", _place),
+        "geometry_msgs/Point": _place,
+        "geometry_msgs/Vector3Stamped": _with_header("vector", _place),
+        "geometry_msgs/Vector3": _place,
+        "geometry_msgs/TransformStamped": _transform_stamped,
+        "geometry_msgs/Transform": _transform,
+    }
+)

@@ -1,0 +1,130 @@
+"""Names for ROS: the team's files call a topic `/drone3.1/waypoint3.1`, and neither ROS 1 nor ROS 2 allows that name.
+
+A name here is `/` and tokens of letters, digits and single underscores, each beginning with a letter: legal in ROS 1
+(wiki.ros.org/Names) and in ROS 2 (design.ros2.org, "Topic and Service name mapping to DDS"). What is legal stays as it
+is.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+
+from robochoc.formats.diagnostics import on_one_line
+from robochoc.ros.mission import Drone
+
+REPORTS: Mapping[str, str] = MappingProxyType(
+    {
+        "battery": "sensor_msgs/BatteryState",
+        "pose": "geometry_msgs/PoseStamped",
+        "blocked": "geometry_msgs/PointStamped",
+        "cleared": "geometry_msgs/PointStamped",
+        "out_of_order": "std_msgs/String",
+    }
+)
+"""What is published in a drone's space, besides its waypoints: the last token, and the ROS type."""
+
+LONGEST = 240
+"""Characters of a name: ROS 2 passes on a few more to DDS."""
+
+_LEGAL = re.compile(r"[A-Za-z](?:_?[A-Za-z0-9])*_?")
+_TAKEN = {"/tf", "/tf_static", "/clock", "/rosout", "/rosout_agg", "/parameter_events", "/diagnostics", "/bond"}
+"""Topics with a meaning of their own in every ROS."""
+
+
+class NameClash(Exception):  # noqa: N818 - named for what happened
+    """Two topics would have one name in ROS, or a name is too long for it: which, and what to do."""
+
+
+class Names:
+    """The names in ROS of what `drones` publish; drones are known by their numbers. Raises `NameClash`."""
+
+    original: Mapping[str, str]
+    """The way back: from a waypoint's topic in ROS to its name in the robot's file, and, for a drone whose file names
+    no topic, from its space to the drone's name."""
+
+    def __init__(self, drones: Sequence[Drone]) -> None:
+        self._waypoints = [None if drone.topic is None else ros_name(drone.topic.name) for drone in drones]
+        self._spaces = [*_spaces(drones, self._waypoints)]
+        owners: dict[str, int] = {}
+        for number, topic in self._topics():
+            if len(topic) > LONGEST:
+                raise NameClash(on_one_line(f"{_told(drones[number])}: the name is too long for ROS: shorten it"))
+            other = owners.setdefault(topic, number)
+            if other != number:
+                raise NameClash(_clash(topic, drones[other], drones[number]))
+        table = zip(self._waypoints, self._spaces, drones, strict=True)
+        self.original = MappingProxyType(
+            {topic or space: drone.name if drone.topic is None else drone.topic.name for topic, space, drone in table}
+        )
+
+    def waypoint(self, number: int) -> str | None:
+        """The topic of a drone's waypoints; None if its robot's file names none."""
+        return self._waypoints[number]
+
+    def space(self, number: int) -> str:
+        """The namespace of what a drone reports: `/drone3_1`, so that its battery is `/drone3_1/battery`."""
+        return self._spaces[number]
+
+    def reports(self) -> dict[str, str]:
+        """The topics of all that drones may report, and their types."""
+        return {f"{space}/{token}": kind for space in self._spaces for token, kind in REPORTS.items()}
+
+    def _topics(self) -> Iterator[tuple[int, str]]:
+        for number, topic in enumerate(self._waypoints):
+            if topic is not None:
+                yield number, topic
+        for number in range(len(self._spaces)):
+            for token in REPORTS:
+                yield number, f"{self._spaces[number]}/{token}"
+
+
+def ros_name(name: str) -> str:
+    """`name` as ROS allows it: `/drone3_1/waypoint3_1`. Different names may become the same."""
+    tokens = [_token(token) for token in name.split("/") if token] or [_token("")]
+    found = "/" + "/".join(tokens)
+    return f"{found}_topic" if found in _TAKEN else found
+
+
+def _token(text: str) -> str:
+    if _LEGAL.fullmatch(text):
+        return text
+    plain = "".join(map(_plain, unicodedata.normalize("NFKD", text)))
+    token = re.sub(r"_+", "_", plain).strip("_")
+    return token if token[:1].isalpha() else f"n{token}"
+
+
+def _plain(char: str) -> str:
+    """Letters and digits as they are, accents dropped, other alphabets by their code, the rest as underscores."""
+    if char.isascii():
+        return char if char.isalnum() else "_"
+    if unicodedata.combining(char):
+        return ""
+    return f"u{ord(char):x}" if char.isalnum() else "_"
+
+
+def _spaces(drones: Sequence[Drone], waypoints: Sequence[str | None]) -> Iterator[str]:
+    """The first token of the waypoints' topic where no other drone's topic has it, else all of that topic."""
+    names = [ros_name(drone.name.replace("/", "_")) for drone in drones]
+    first = ["/" + topic.split("/")[1] if topic else name for topic, name in zip(waypoints, names, strict=True)]
+    shared = Counter(first)
+    for topic, own in zip(waypoints, first, strict=True):
+        reports = topic is not None and topic in {f"{own}/{token}" for token in REPORTS}
+        yield topic if topic and (shared[own] > 1 or reports) else own
+
+
+def _clash(topic: str, first: Drone, second: Drone) -> str:
+    if first.topic and second.topic and first.topic.name == second.topic.name:
+        who = [f"{drone.name} ({drone.robot})" if drone.robot else drone.name for drone in (first, second)]
+        told = f"{who[0]} and {who[1]} both publish on {second.topic.name!r}: give each a topic of its own"
+    else:
+        told = f"{_told(first)} and {_told(second)} would both publish on {topic} in ROS: rename one of them"
+    return on_one_line(told)
+
+
+def _told(drone: Drone) -> str:
+    what = f"drone {drone.name!r}" if drone.topic is None else f"topic {drone.topic.name!r}"
+    return f"{what} of {drone.robot}" if drone.robot else what

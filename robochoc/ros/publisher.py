@@ -1,0 +1,110 @@
+"""Decisions, poses and reports of a mission's drones, as messages on their way into sinks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import assert_never
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robochoc.formats.diagnostics import on_one_line
+from robochoc.ros.layout import Point
+from robochoc.ros.mappings import NoMapping, WaypointMapping, mapping_of, point
+from robochoc.ros.mission import Drone, Leg
+from robochoc.ros.names import REPORTS, Names
+from robochoc.ros.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
+from robochoc.ros.sink import Fields, Sink
+from robochoc.ros.waypoint import Waypoint, waypoints
+
+_NOT_MEASURED = {
+    name: float("nan")
+    for name in ("voltage", "temperature", "current", "charge", "capacity", "design_capacity", "percentage")
+}
+"""As `sensor_msgs/BatteryState` says: "if unmeasured NaN"."""
+
+
+class NothingToPublish(Exception):  # noqa: N818 - named for what was found
+    """No drone of the team has a topic: why, and what to do."""
+
+
+class Publisher:
+    """Publishes what `drones` of `team` are to do, and what they report, to each of `sinks`, which it does not close.
+
+    Times are in nanoseconds since the epoch; places in metres, in `frame`. Raises `NameClash`, `NoMapping`,
+    `NothingToPublish`, and `SinkFailed`; its methods raise `SinkFailed`, and `NoMapping` where a package's mapping
+    fails.
+    """
+
+    def __init__(self, team: str, drones: Sequence[Drone], sinks: Sequence[Sink], frame: str = "map") -> None:
+        if all(drone.topic is None for drone in drones):
+            told = f"no drone of {team or 'the team'} has a topic to publish its waypoints on"
+            raise NothingToPublish(on_one_line(f"{told}: give its robot's file a <topic> (FORMAT.md)"))
+        self.names = Names(drones)
+        self._drones = drones
+        self._sinks = sinks
+        self._frame = frame
+        self._numbers = {drone.name: number for number, drone in reversed([*enumerate(drones)])}
+        self._mappings: dict[str, WaypointMapping] = {}
+        topics: dict[str, str] = {}
+        for number, drone in enumerate(drones):
+            topic = self.names.waypoint(number)
+            if drone.topic is not None and topic is not None:
+                kind = drone.topic.type
+                self._mappings[kind] = mapping_of(drone.topic.name, drone.robot, kind)
+                topics[topic] = kind
+        for sink in sinks:
+            sink.explain(self.names.original)
+            sink.advertise({**topics, **self.names.reports()})
+
+    def decide(self, leg: Leg, at_ns: int) -> None:
+        """Publish where `leg` sends drones: who flies, and who lands."""
+        for waypoint in waypoints(leg, self._drones, self.names, self._frame, at_ns):
+            self._publish(waypoint.topic, waypoint.kind, self._fields(waypoint), at_ns)
+
+    def poses(self, positions: NDArray[np.float64], attitudes: NDArray[np.float64], at_ns: int) -> None:
+        """Publish where all drones are: metres (N, 3), and quaternions x y z w (N, 4)."""
+        header = self._header(at_ns)
+        flown = zip(positions.tolist(), attitudes.tolist(), strict=True)
+        for number, (at, (x, y, z, w)) in enumerate(flown):
+            turned = {"x": x, "y": y, "z": z, "w": w}
+            self._report(number, "pose", {"header": header, "pose": _pose(at, turned)}, at_ns)
+
+    def report(self, report: Report, at_ns: int) -> None:
+        """Publish what a drone reports. Raises `KeyError` if no drone has that name."""
+        number, header = self._numbers[report.drone], self._header(at_ns)
+        match report:
+            case Battery():
+                measured = {**_NOT_MEASURED, "percentage": report.level, "present": True}
+                self._report(number, "battery", {"header": header, **measured}, at_ns)
+            case Pose():
+                self._report(number, "pose", {"header": header, "pose": _pose(report.place, {"w": 1.0})}, at_ns)
+            case Blocked():
+                self._report(number, "blocked", {"header": header, "point": point(report.place)}, at_ns)
+            case Cleared():
+                self._report(number, "cleared", {"header": header, "point": point(report.place)}, at_ns)
+            case OutOfOrder():
+                self._report(number, "out_of_order", {"data": report.why}, at_ns)
+            case _:
+                assert_never(report)
+
+    def _fields(self, waypoint: Waypoint) -> Fields:
+        try:
+            return self._mappings[waypoint.kind].fields(waypoint)
+        except Exception as error:
+            told = f"what is installed for waypoints as {waypoint.kind} failed: {type(error).__name__}: {error}"
+            raise NoMapping(on_one_line(told)) from error
+
+    def _header(self, at_ns: int) -> Fields:
+        return {"stamp": at_ns, "frame_id": self._frame}
+
+    def _report(self, number: int, token: str, fields: Fields, at_ns: int) -> None:
+        self._publish(f"{self.names.space(number)}/{token}", REPORTS[token], fields, at_ns)
+
+    def _publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
+        for sink in self._sinks:
+            sink.publish(topic, kind, fields, at_ns)
+
+
+def _pose(at: Point, orientation: Fields) -> Fields:
+    return {"position": point(at), "orientation": orientation}

@@ -1,0 +1,83 @@
+"""Sinks and sources by name, as installed packages offer them: `mcap:run.mcap`, `rosbridge://localhost:9090`, `rospy`.
+
+They stand under the entry point groups `robochoc.sinks` and `robochoc.sources`, and are called with what stands behind
+the name. Whoever opens one closes it.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint
+from typing import cast
+
+from robochoc.formats.diagnostics import on_one_line
+from robochoc.installed import loaded, missing, named
+from robochoc.ros.sink import Sink, SinkFailed
+from robochoc.ros.source import Source, SourceFailed
+
+SINKS, SOURCES = "robochoc.sinks", "robochoc.sources"
+
+_ENDINGS = {".mcap": "mcap", ".bag": "rosbag"}
+"""Files that may stand alone, without the name of what writes or reads them."""
+
+
+class NoSuchSink(SinkFailed):
+    """Nothing of that name is installed, or it cannot be used: why, and what to install or write instead."""
+
+
+class NoSuchSource(SourceFailed):
+    """Nothing of that name is installed, or it cannot be used: why, and what to install or write instead."""
+
+
+def open_sink(text: str) -> Sink:
+    """The sink that `text` names. Raises `NoSuchSink`, and `SinkFailed` where it cannot be opened."""
+    name, place = _parts(text)
+    return cast("type[Sink]", _offered(SINKS, "sink", name, Sink, NoSuchSink))(place)
+
+
+def open_source(text: str) -> Source:
+    """The source that `text` names. Raises `NoSuchSource`, and `SourceFailed` where it cannot be opened."""
+    name, place = _parts(text)
+    return cast("type[Source]", _offered(SOURCES, "source", name, Source, NoSuchSource))(place)
+
+
+def _parts(text: str) -> tuple[str, str]:
+    """The name, and what stands behind it: `rosbridge://localhost:9090` is `rosbridge` and `localhost:9090`."""
+    name, colon, place = text.partition(":")
+    alone = next((kind for ending, kind in _ENDINGS.items() if text.endswith(ending)), None)
+    if alone and (not colon or "/" in name):
+        return alone, text
+    return name, place.removeprefix("//")
+
+
+def _offered(group: str, kind: str, name: str, base: type, wrong: type[Exception]) -> object:
+    """The class that is installed as `name`. Raises `wrong`."""
+    namesakes = named(group, name)
+    if not namesakes:
+        hint = "" if name else f"; a {kind} is written NAME:PLACE, such as mcap:run.mcap"
+        raise wrong(on_one_line(missing(group, kind, name) + hint))
+    entry = namesakes[0]
+    lacking = _lacking(entry) if len(namesakes) == 1 else ""
+    if lacking:
+        raise wrong(on_one_line(lacking))
+    found = loaded(entry, namesakes, lambda what: _fault(what, base))
+    if found.broken:
+        raise wrong(on_one_line(f"{entry.value}, installed as {kind} {name!r}, {found.broken}"))
+    return found.what
+
+
+def _fault(found: object, base: type) -> str:
+    return "" if isinstance(found, type) and issubclass(found, base) else f"is no {base.__name__}"
+
+
+def _lacking(entry: EntryPoint) -> str:
+    """What to install, if what `entry` needs is an extra of its package that is not there; else empty."""
+    try:
+        entry.load()
+    except ModuleNotFoundError as error:
+        extras = entry.dist.metadata.get_all("Provides-Extra") or [] if entry.dist else []
+        if entry.dist and entry.name in extras:
+            wanted = f"{entry.dist.name}[{entry.name}]"
+            return f"{entry.name} needs {error.name}, which is not installed: pip install '{wanted}'"
+    except (Exception, SystemExit):  # noqa: BLE001 - told by whoever loads it once more
+        return ""
+    return ""
