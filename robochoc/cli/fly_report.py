@@ -1,0 +1,139 @@
+"""What `robochoc fly` says of a flight: a table for people, an object for machines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import isfinite
+
+import msgspec
+
+from robochoc.formats import on_one_line
+from robochoc.formats.diagnostics import shortened
+from robochoc.ros.flight import Flown, Nearest
+from robochoc.ros.mission import Leg, Mission
+
+ARRIVED_M = 0.01
+"""So near to its place a drone has arrived."""
+_NAMES = 6
+
+
+def as_planned(flown: Flown) -> bool:
+    """Whether everybody has arrived, nobody has fallen, and no two came nearer than the set distance."""
+    apart = flown.nearest is None or flown.nearest.distance_m >= flown.distance
+    return apart and all(error <= ARRIVED_M for error in flown.errors_m)
+
+
+def report(mission: Mission, flown: Flown) -> str:
+    """Leg by leg, then who has arrived, how near they came, and how fast it was simulated."""
+    lines = [f"{on_one_line(mission.team)}: {_verdict(mission, flown)}", *_legs(mission, flown)]
+    lines += [f"  {happening.at_s:6.1f} s  {_name(flown, happening.drone)}: {happening.what}" for happening in flown.happenings]
+    lines += [f"  {line}" for line in (_arrival(flown), _apart(flown), _speed(flown))]
+    return "\n".join(lines)
+
+
+def _verdict(mission: Mission, flown: Flown) -> str:
+    last = mission.legs[-1].goals.values() if mission.legs else ()
+    landing = sum(goal.lands for goal in last)
+    fallen = sum(not isfinite(error) for error in flown.errors_m)
+    counts = {"at their places": len(last) - landing, "at the edge": landing, "fallen": fallen}
+    told = ", ".join(f"{number} {words}" for words, number in counts.items() if number)
+    return f"{len(flown.names)} drones: {told or 'nobody has anywhere to go'}"
+
+
+def _legs(mission: Mission, flown: Flown) -> Iterator[str]:
+    rows = [("leg", "opened by", "verdict", "fly", "land", "from s", "to s")]
+    for number, (leg, stage) in enumerate(zip(mission.legs, flown.stages, strict=True)):
+        opened = shortened(on_one_line(leg.opened_by))
+        span = f"{stage.begins_s:.1f}", f"{stage.ends_s:.1f}"
+        rows.append((f"{number}", opened, leg.verdict, *_movers(leg), *span))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    words = {1, 2}
+    for row in rows:
+        cells = (f"{cell:{'<' if place in words else '>'}{widths[place]}}" for place, cell in enumerate(row))
+        yield "  " + "  ".join(cells)
+
+
+def _movers(leg: Leg) -> tuple[str, str]:
+    landing = sum(goal.lands for goal in leg.goals.values())
+    return f"{len(leg.goals) - landing}", f"{landing}"
+
+
+def _arrival(flown: Flown) -> str:
+    away = [number for number, error in enumerate(flown.errors_m) if isfinite(error) and error > ARRIVED_M]
+    fallen = [number for number, error in enumerate(flown.errors_m) if not isfinite(error)]
+    whole = max((error for error in flown.errors_m if isfinite(error)), default=0.0)
+    parts = [f"{_names(flown, fallen)} fell"] if fallen else []
+    if away:
+        parts.append(f"not at their places: {_names(flown, away)} (up to {_length(whole)} away)")
+    else:
+        others = "all others" if fallen else "all"
+        parts.append(f"{others} within {_length(whole)} of where they should be")
+    return "; ".join(parts)
+
+
+def _apart(flown: Flown) -> str:
+    told = [f"nearest: {_pair(flown, flown.nearest)}" if flown.nearest else "nobody met anybody"]
+    told.append(f"set: {_length(flown.distance)}")
+    if flown.nearest_fallen:
+        told.append(f"with one that fell: {_pair(flown, flown.nearest_fallen)}")
+    return "; ".join(told)
+
+
+def _speed(flown: Flown) -> str:
+    seconds = flown.times[-1] if len(flown.times) else 0.0
+    times = f", {seconds / flown.wall_s:.0f} times as fast" if flown.wall_s > 0 else ""
+    return f"{seconds:.1f} s of flight in {flown.wall_s:.2f} s{times}"
+
+
+def _pair(flown: Flown, nearest: Nearest) -> str:
+    both = f"{_name(flown, nearest.first)} and {_name(flown, nearest.second)}"
+    return f"{_length(nearest.distance_m)} ({both}, at {nearest.at_s:.1f} s)"
+
+
+def _length(metres: float) -> str:
+    return f"{1000 * metres:.1f} mm" if metres < 0.1 else f"{metres:.2f} m"  # noqa: PLR2004 - ten centimetres
+
+
+def _name(flown: Flown, number: int) -> str:
+    return on_one_line(flown.names[number])
+
+
+def _names(flown: Flown, numbers: Sequence[int]) -> str:
+    more = f" and {len(numbers) - _NAMES} more" if len(numbers) > _NAMES else ""
+    return ", ".join(_name(flown, number) for number in numbers[:_NAMES]) + more
+
+
+def flight_json(mission: Mission, flown: Flown) -> bytes:
+    """The same as one line of JSON: lengths in metres, times in seconds; null for a drone that fell."""
+
+    def pair(nearest: Nearest | None) -> dict[str, object] | None:
+        if nearest is None:
+            return None
+        drones = [flown.names[nearest.first], flown.names[nearest.second]]
+        return {"distance_m": nearest.distance_m, "drones": drones, "at_s": nearest.at_s}
+
+    ends = flown.positions[-1] if len(flown.positions) else ()
+    stages = zip(mission.legs, flown.stages, strict=True)
+    told = {
+        "team": mission.team,
+        "scale": mission.scale,
+        "as_planned": as_planned(flown),
+        "flight_s": float(flown.times[-1]) if len(flown.times) else 0.0,
+        "wall_s": flown.wall_s,
+        "distance_m": flown.distance,
+        "nearest": pair(flown.nearest),
+        "nearest_fallen": pair(flown.nearest_fallen),
+        "drones": {
+            name: {"at": [float(part) for part in end], "error_m": float(error) if isfinite(error) else None}
+            for name, end, error in zip(flown.names, ends, flown.errors_m, strict=True)
+        },
+        "legs": [
+            {"opened_by": leg.opened_by, "verdict": leg.verdict, "begins_s": stage.begins_s, "ends_s": stage.ends_s}
+            for leg, stage in stages
+        ],
+        "happenings": [
+            {"at_s": happening.at_s, "drone": flown.names[happening.drone], "what": happening.what}
+            for happening in flown.happenings
+        ],
+    }
+    return msgspec.json.encode(told)
