@@ -1,0 +1,73 @@
+"""How far things are from each other: points, straight lines, and what moves along them.
+
+Lengths are in metres, arrays are of float64, a point is a row of three.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+SLACK_M = 1e-10
+"""Rounding: so much nearer than the distance is not yet too near."""
+
+
+class TooClose(ValueError):  # noqa: N818 - named for what was found
+    """Two that are to be at rest at the same time stand nearer than the distance that is to be kept.
+
+    `first` and `second` are drones' numbers; standing points are counted on from the drones. `where` says whether
+    they are too close before they fly (`start`) or would be after it (`goal`).
+    """
+
+    def __init__(self, first: int, second: int, distance_m: float, where: Literal["start", "goal"]) -> None:
+        self.first = first
+        self.second = second
+        self.distance_m = distance_m
+        self.where = where
+        super().__init__(f"the {where}s of drones {first} and {second} are only {distance_m:.3g} m apart")
+
+
+def gaps(origins: Array, ends: Array, points: Array) -> Array:
+    """The distance (K, P) of each straight line `origins` to `ends` (K, 3) from each of `points` (P, 3)."""
+    along = ends - origins
+    squared = np.einsum("kc,kc->k", along, along)
+    squared[squared == 0] = 1
+    apart = points[None] - origins[:, None]
+    share = np.einsum("kpc,kc->kp", apart, along) / squared[:, None]
+    np.clip(share, 0, 1, out=share)
+    apart -= share[..., None] * along[:, None]
+    return norms(apart)
+
+
+def norms(vectors: Array) -> Array:
+    """The lengths of vectors, which are the last axis."""
+    lengths: Array = np.sqrt(np.einsum("...c,...c->...", vectors, vectors))
+    return lengths
+
+
+def nearest(apart: Array, later: Array) -> Array:
+    """How near two come that are `apart` first and `later` then, both in even motion (vectors: the last axis)."""
+    change = later - apart
+    squared = np.einsum("...c,...c->...", change, change)
+    squared[squared == 0] = 1
+    share = -np.einsum("...c,...c->...", apart, change) / squared
+    np.clip(share, 0, 1, out=share)
+    return norms(apart + share[..., None] * change)
+
+
+def check_spacing(points: Array, standing: Array, distance: float, where: Literal["start", "goal"]) -> None:
+    """Raise `TooClose` for the nearest two of `points` and `standing`, one of `points` at least, if too near."""
+    count = len(points)
+    if not count:
+        return
+    everything = np.vstack((points, standing))
+    apart = norms(points[:, None] - everything[None])
+    apart[np.tril_indices(count, m=len(everything))] = np.inf
+    first, second = divmod(int(apart.argmin()), len(everything))
+    if apart[first, second] < distance - SLACK_M:
+        raise TooClose(first, second, float(apart[first, second]), where)
