@@ -15,6 +15,7 @@ from pathlib import Path
 import channels
 import dynamic
 import flagship
+import flight
 import journals
 import local_search
 import network
@@ -40,6 +41,7 @@ PARTS: dict[str, Callable[[], Section]] = {
     "simulator": simulated.measured,
     "journal": journals.measured,
     "solver": solver.measured,
+    "flight": flight.measured,
 }
 LONG: dict[str, Callable[[], Section]] = {
     "sweep": sweep.measured,

@@ -1,0 +1,70 @@
+"""Part `flight`: how much faster than in real time it is simulated."""
+
+from __future__ import annotations
+
+import statistics
+
+from measure import RUNS, say, spread
+from report import Row, Section
+
+from robochoc.generators.queens3d import queens3d
+from robochoc.outcome import Outcome, Verdict
+from robochoc.ros.flight import Conditions, Flown, fly
+from robochoc.ros.mission import Mission, mission_of
+from robochoc.ros.simulation import DT
+
+SIZES = (4, 7, 11)
+WIND = Conditions(wind=(3.0, 4.0, 0.0), gusts=1.0)
+
+
+def measured() -> Section:
+    """One mission a size, calm and in wind."""
+    notes = (
+        "3D queens, planar, a drone in each cell, with levels 3 i + 5 j modulo n; in each third row one has withdrawn "
+        f"and lands at the edge (for n = 4, whose levels are not a solution, too). Steps of 1/{1 / DT:.0f} s, the "
+        "distances of all pairs measured at each; in this process, planning of paths included. In wind: 5 m/s, gusts "
+        "of 1 m/s. `nearest`: of two drones at any step, where 0.5 m are to be kept; `off its goal`: who is "
+        "farthest from it in the end. Median (min..max)."
+    )
+    return Section("flight", "The simulated flight", notes, (_speed(),))
+
+
+def _speed() -> list[Row]:
+    rows: list[Row] = [
+        ("drones", "air", "aim", "simulated s", "wall s", "simulated s a wall s", "nearest, m", "off its goal, mm")
+    ]
+    for n in SIZES:
+        mission = _mission(n)
+        for air, conditions in (("calm", Conditions()), ("wind", WIND)):
+            say(f"flight, {len(mission.drones)} drones, {air}")
+            runs = [fly(mission, conditions) for _ in range(RUNS)]
+            rows.append(_row(air, runs))
+    return rows
+
+
+def _row(air: str, runs: list[Flown]) -> Row:
+    flown = runs[0]
+    drones = len(flown.names)
+    rates = [run.simulated_s / run.wall_s for run in runs]
+    nearest = f"{flown.nearest.distance_m:.2f}" if flown.nearest else "-"
+    aim = "> 5" if drones == max(SIZES) ** 2 else "> 1"
+    return (
+        str(drones),
+        air,
+        aim,
+        f"{statistics.median(run.simulated_s for run in runs):.1f}",
+        spread(run.wall_s for run in runs),
+        spread(rates, 1),
+        nearest,
+        f"{flown.errors_m.max() * 1e3:.1f}",
+    )
+
+
+def _mission(n: int) -> Mission:
+    team = queens3d(n)
+    away = tuple(f"Robot{i}.{i}" for i in range(1, n + 1, 3))
+    names = [variable.name for robot in team.robots if robot.name not in away for variable in robot.variables]
+    cells = {name: [int(part) for part in name[1:].split(".")] for name in names}
+    values = {name: (3 * row + 5 * column) % n + 1 for name, (row, column) in cells.items()}
+    outcome = Outcome(team.name, "abt", "simulator", 0, Verdict.SOLUTION, assignment=values, withdrawn=away)
+    return mission_of(outcome, team)

@@ -1,0 +1,323 @@
+"""The flight: whole missions, and what may happen on the way."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robochoc.generators.queens3d import queens3d
+from robochoc.outcome import Outcome, Verdict
+from robochoc.ros.airframe import GRAVITY
+from robochoc.ros.flight import Conditions, Failure, Flight, Flown, fly
+from robochoc.ros.layout import Point
+from robochoc.ros.mission import Goal, Mission, mission_of
+from robochoc.ros.reports import Blocked, OutOfOrder
+from robochoc.ros.simulation import DT, Simulation
+
+IN_THE_WIND = (3.0, 4.0, 0.0)
+PAIR = np.array([[0.0, 0, 0], [2, 0, 0]])
+UP = {0: Goal((0.0, 0.0, 2.0)), 1: Goal((2.0, 0.0, 3.0))}
+
+
+def planar(n: int, *away: str) -> Mission:
+    """The mission of a solution made by hand: 3 i + 5 j, modulo n. Who is `away` has withdrawn."""
+    team = queens3d(n)
+    heights = {
+        variable.name: sum(
+            factor * int(part) for factor, part in zip((3, 5), variable.name[1:].split("."), strict=True)
+        )
+        for robot in team.robots
+        if robot.name not in away
+        for variable in robot.variables
+    }
+    values = {name: height % n + 1 for name, height in heights.items()}
+    return mission_of(Outcome(team.name, "abt", "simulator", 0, Verdict.SOLUTION, values, withdrawn=away), team)
+
+
+def least(flown: Flown) -> float:
+    assert flown.nearest is not None
+    return flown.nearest.distance_m
+
+
+def same(one: Flown, other: Flown) -> bool:
+    """Whether two flights are equal to the last bit."""
+    arrays = [(mine, yours) for mine, yours in zip(vars(one).values(), vars(other).values(), strict=True)]
+    return all(
+        np.array_equal(mine, yours, equal_nan=True) if isinstance(mine, np.ndarray) else mine == yours
+        for mine, yours in arrays
+        if not isinstance(mine, float)
+    )
+
+
+def whats(flown: Flown) -> list[tuple[int, str]]:
+    return [(happening.drone, happening.what) for happening in flown.happenings]
+
+
+@pytest.fixture(scope="module")
+def four() -> Mission:
+    return planar(4, "Robot1.1", "Robot2.2", "Robot2.3", "Robot4.4")
+
+
+@pytest.fixture(scope="module")
+def calm(four: Mission) -> Flown:
+    return fly(four)
+
+
+# Missions
+
+
+def test_all_reach_their_places_and_keep_their_distance(four: Mission, calm: Flown) -> None:
+    assert len(four.legs[0].goals) == 16
+    assert calm.errors_m.max() < 0.01
+    assert least(calm) >= calm.distance == 0.5
+    assert (calm.happenings, calm.nearest_fallen) == ((), None)
+    assert calm.positions.shape == (len(calm.times), 16, 3)
+    assert np.abs(np.linalg.norm(calm.attitudes, axis=2) - 1).max() < 1e-12
+    assert np.array_equal(calm.positions[0], [drone.home for drone in four.drones])
+    assert np.array_equal(calm.positions[:30], np.broadcast_to(calm.positions[0], (30, 16, 3)))
+    assert [stage.title for stage in calm.stages] == ["the start"]
+    assert calm.stages[0].begins_s == 1
+    assert calm.stages[0].ends_s == pytest.approx(calm.times[-1] - 1)
+    assert calm.positions[:, :, 2].min() >= four.ground
+    for number, goal in four.legs[0].goals.items():
+        if goal.lands:
+            assert calm.positions[-1, number, 2] == four.ground
+
+
+def test_samples_agree_with_the_nearest(calm: Flown) -> None:
+    first, second = np.triu_indices(16, 1)
+    apart = np.linalg.norm(calm.positions[:, first] - calm.positions[:, second], axis=2)
+    assert least(calm) <= apart.min() <= least(calm) + 0.01
+
+
+@pytest.mark.parametrize("n", [7, 11])
+def test_larger_fields_are_flown_faster_than_in_real_time(n: int) -> None:
+    mission = planar(n, *(f"Robot{i}.{i}" for i in range(1, n, 3)))
+    began = time.process_time()
+    flown = fly(mission)
+    assert flown.times[-1] / (time.process_time() - began) > 2
+    assert flown.errors_m.max() < 0.01
+    assert least(flown) >= flown.distance == 0.5
+    assert flown.wall_s > 0
+
+
+def test_the_same_flight_is_the_same_to_the_last_bit(four: Mission, calm: Flown) -> None:
+    short = replace(four, drones=four.drones[:4], legs=(replace(four.legs[0], goals={3: four.legs[0].goals[3]}),))
+    conditions = Conditions(wind=IN_THE_WIND, gusts=0.5, seed=3, failures=(Failure("Robot1.4", 3.0),))
+    first = fly(short, conditions)
+    assert same(first, fly(short, conditions))
+    assert not same(first, fly(short, replace(conditions, seed=4)))
+    assert same(calm, fly(four))
+
+
+def test_wind_and_gusts_are_withstood(four: Mission) -> None:
+    steady = fly(four, Conditions(wind=IN_THE_WIND))
+    assert steady.errors_m.max() < 0.01
+    assert least(steady) >= steady.distance
+    gusty = fly(four, Conditions(wind=IN_THE_WIND, gusts=1.0))
+    assert 0.001 < gusty.errors_m.max() < 0.1
+    assert least(gusty) >= gusty.distance
+
+
+@pytest.mark.parametrize("wind", [60.0, 200.0])
+def test_a_storm_ends_and_is_told(wind: float) -> None:
+    flight = Flight(["a", "b"], PAIR, Conditions(wind=(wind, 0.0, 0.0), gusts=wind))
+    assert flight.fly("storm", UP) == ()
+    flown = flight.flown()
+    assert np.isfinite(flown.positions).all()
+    assert np.isfinite(flown.attitudes).all()
+    assert flown.happenings
+    assert not (flown.errors_m < 0.1).any()
+    assert flown.times[-1] < 15
+
+
+def test_who_is_out_of_all_bounds_is_given_up() -> None:
+    flight = Flight(["a", "b"], PAIR, Conditions())
+    simulation = flight._simulation  # noqa: SLF001 - nothing that can be asked for gets it there
+    flight.fly("up", UP)
+    simulation._bodies.rates[:, 0] = math.nan  # noqa: SLF001
+    (report,) = flight.fly("and on", {1: Goal((2.0, 0.0, 1.0))}, heed=True)
+    assert isinstance(report, OutOfOrder)
+    assert (report.drone, report.why) == ("a", "has got out of all bounds")
+    flight.fly("at last", {1: Goal((2.0, 0.0, 1.0))})
+    flown = flight.flown()
+    assert np.isfinite(flown.positions).all()
+    assert flown.errors_m[1] < 0.01
+    assert math.isnan(flown.errors_m[0])
+
+
+# What happens on the way
+
+
+def test_a_drone_whose_motor_stops_falls_and_the_others_go_on(four: Mission) -> None:
+    drone = next(number for number, goal in four.legs[0].goals.items() if goal.at[2] == 4)
+    name = four.drones[drone].name
+    flown = fly(four, Conditions(failures=(Failure(name, 4.0, 2), Failure(name, 1e6))))
+    assert whats(flown) == [(drone, "motor 2 has stopped"), (drone, "hits the ground")]
+    failed, hit = (happening.at_s for happening in flown.happenings)
+    assert failed == pytest.approx(4, abs=DT)
+    assert 0.5 < hit - failed < 3
+    assert np.flatnonzero(np.isnan(flown.errors_m)).tolist() == [drone]
+    assert np.nanmax(flown.errors_m) < 0.01
+    assert least(flown) >= flown.distance
+    assert flown.nearest_fallen is not None
+    falling = flown.positions[(hit - 0.25 < flown.times) & (flown.times < hit), drone, 2]
+    assert np.diff(falling, 2) * 900 == pytest.approx(-GRAVITY, abs=1.8)  # its other motors are off; drag is not
+    lying = flown.positions[flown.times > hit + 0.1, drone]
+    assert (lying == lying[0]).all()
+    assert lying[0, 2] == four.ground
+    x, y, _, _ = flown.attitudes[-1, drone]
+    assert 1 - 2 * (x * x + y * y) < 0.9
+
+
+def test_a_failure_is_reported_and_the_next_leg_keeps_away() -> None:
+    homes = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    goals = {number: Goal((number, 0.0, 2.0)) for number in range(3)}
+    flight = Flight(["a", "b", "c"], homes, Conditions(failures=(Failure("b", 2.0, 3), Failure("c", 900.0))))
+    (report,) = flight.fly("up", goals, heed=True)
+    assert isinstance(report, OutOfOrder)
+    assert (report.drone, report.why) == ("b", "motor 3 has stopped")
+    assert report.at_s == pytest.approx(2, abs=DT)
+    stopped = flight.flown()
+    assert 0.1 < stopped.errors_m[0] < 1.9
+    assert stopped.times[-1] < 6
+    lies = stopped.positions[-1, 1]
+    spot = (float(lies[0]), float(lies[1]) + 0.1, 0.0)
+    assert flight.fly("down", {0: Goal(spot, lands=True), 1: Goal((1.0, 0.0, 3.0))}, heed=True) == ()
+    flown = flight.flown()
+    assert math.isnan(flown.errors_m[1])
+    assert 0.3 < flown.errors_m[0] < 2
+    assert flown.positions[-1, 0, 2] == 0
+    assert np.linalg.norm(flown.positions[-1, 0] - lies) >= 0.49
+    assert dict(whats(flown))[0].startswith("lands ")
+
+
+def test_nobody_slides_along_the_ground() -> None:
+    simulation = Simulation(["a"], np.zeros((1, 3)), 0.0, Conditions())
+    for _ in range(60):
+        simulation.reference[3] = 0.5
+        simulation.reference[0] += 0.5 * DT
+        simulation.advance()
+    assert simulation.places[0, 2] > 0.05
+    simulation.reference[3] = 0
+    for _ in range(240):
+        simulation.advance()
+    assert simulation.places[0] == pytest.approx([0.25, 0, 0], abs=0.05)
+    assert simulation.settled(0.0, 0.0)
+
+
+def test_a_motor_that_stops_on_the_ground_keeps_its_drone_there() -> None:
+    flight = Flight(["a", "b"], PAIR, Conditions(failures=(Failure("a", 0.5),)))
+    flight.fly("up", UP)
+    flown = flight.flown()
+    assert (flown.positions[:, 0] == PAIR[0]).all()
+    assert whats(flown) == [(0, "motor 0 has stopped")]
+    assert flown.errors_m[1] < 0.01
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "start"),
+    [((0.0, 0.0, 3.0), (-6.0, 2.0)), ((0.3, 0.0, 3.1), (-2.0, 0.0)), ((0.0, -0.2, 2.7), (0.0, 0.0))],
+)
+def test_an_obstacle_is_seen_reported_and_kept_away_from(obstacle: Point, start: tuple[float, float]) -> None:
+    homes = np.array([[*start, 0.0], [2, 0, 0]])
+    goals = {0: Goal((0.0, 0.0, 3.0)), 1: Goal((2.0, 0.0, 3.0))}
+    flight = Flight(["a", "b"], homes, Conditions(obstacles=(obstacle,)))
+    (report,) = flight.fly("up", goals, heed=True)
+    assert isinstance(report, Blocked)
+    assert (report.drone, report.place) == ("a", obstacle)
+    stopped = flight.flown()
+    assert stopped.errors_m[0] > 0.1
+    assert flight.fly("again", goals, heed=True) == ()
+    flown = flight.flown()
+    assert np.linalg.norm(flown.positions - obstacle, axis=2).min() >= 0.5
+    assert flown.errors_m[1] < 0.01
+    assert flown.errors_m[0] < 1.1
+    assert [stage.title for stage in flown.stages] == ["up", "again"]
+
+
+def test_without_heed_a_blocked_drone_hovers_where_it_stopped_and_the_others_go_on() -> None:
+    obstacles = ((0.1, 0.0, 3.0), (1.0, 0.0, 1.5))
+    flown_by: dict[bool, Flown] = {}
+    for blocked in (True, False):
+        flight = Flight(["a", "b"], PAIR, Conditions(obstacles=obstacles[not blocked :]))
+        assert flight.fly("up", {0: Goal((0.0, 0.0, 3.0)), 1: Goal((0.0, 0.0, 1.5))}) == ()
+        flown_by[blocked] = flight.flown()
+    flown = flown_by[True]
+    assert [what.split()[0] for _, what in whats(flown)] == ["sees", "hovers"]
+    assert flown.errors_m[0] > 0.5
+    assert flown.errors_m[1] < 0.01
+    assert flown_by[False].errors_m.max() < 0.01
+    assert whats(flown_by[False]) == []
+    for one in flown_by.values():
+        for obstacle in one.obstacles:
+            assert np.linalg.norm(one.positions - obstacle, axis=2).min() >= 0.5
+
+
+# Legs and conditions
+
+
+def test_legs_follow_each_other_and_who_has_no_goal_stays() -> None:
+    flight = Flight(["a", "b"], PAIR, Conditions())
+    flight.fly("one", {0: Goal((0.0, 0.0, 2.0))})
+    middle = flight.flown()
+    assert middle.errors_m.tolist() == [pytest.approx(0, abs=0.01), 0]
+    assert (middle.positions[:, 1] == PAIR[1]).all()
+    again = flight.flown()
+    assert same(middle, again)
+    flight.fly("two", {1: Goal((0.0, 0.0, 3.0)), 0: Goal((2.0, 0.0, 0.0), lands=True)})
+    flight.fly("three", {0: Goal((2.0, 0.0, 1.0))})
+    flown = flight.flown()
+    assert flown.errors_m.max() < 0.01
+    assert least(flown) >= 0.5
+    ends = [stage.ends_s for stage in flown.stages]
+    assert [stage.begins_s for stage in flown.stages] == [1, ends[0] + 1, ends[1]]
+    assert np.array_equal(flown.positions[: len(middle.times)], middle.positions)
+
+
+def test_the_distance_is_less_where_places_are_nearer() -> None:
+    homes = np.array([[0.0, 0, 0], [0.4, 0, 0]])
+    flight = Flight(["a", "b"], homes, Conditions())
+    flight.fly("up", {0: Goal((0.0, 0.0, 1.0)), 1: Goal((0.3, 0.0, 1.0))})
+    flown = flight.flown()
+    assert flown.distance == pytest.approx(0.24)
+    assert flown.errors_m.max() < 0.01
+    assert least(flown) >= flown.distance
+
+
+def test_goals_that_are_too_near_are_refused() -> None:
+    flight = Flight(["a", "b"], PAIR, Conditions(distance=1.0))
+    with pytest.raises(ValueError, match=r"the goals of a and b are 0\.50 m apart, and 1 m are to be kept"):
+        flight.fly("up", {0: Goal((0.0, 0.0, 1.0)), 1: Goal((0.5, 0.0, 1.0))})
+    with pytest.raises(ValueError, match=r"the homes of a and b are 2\.00 m apart"):
+        Flight(["a", "b"], PAIR, Conditions(distance=2.5))
+    with pytest.raises(ValueError, match="no number 2"):
+        flight.fly("up", {2: Goal((0.0, 0.0, 1.0))})
+    with pytest.raises(ValueError, match="no drones"):
+        Flight([], np.zeros((0, 3)), Conditions())
+    with pytest.raises(ValueError, match="no drone is called 'c'; there are: a, b"):
+        Flight(["a", "b"], PAIR, Conditions(failures=(Failure("c", 1.0),)))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "why"),
+    [
+        ({"distance": 0.0}, "positive"),
+        ({"distance": math.nan}, "positive"),
+        ({"gusts": -1.0}, "gusts"),
+        ({"gusts": math.inf}, "gusts"),
+        ({"wind": (0.0, math.nan, 0.0)}, "finite"),
+        ({"wind": (1e9, 0.0, 0.0)}, "faster"),
+        ({"obstacles": ((0.0, 0.0, math.inf),)}, "finite"),
+        ({"seed": -1}, "seed"),
+        ({"failures": (Failure("a", -1.0),)}, "second 0"),
+        ({"failures": (Failure("a", 1.0, 4),)}, "no motor 4"),
+    ],
+)
+def test_conditions_that_make_no_sense_are_refused(wrong: dict[str, object], why: str) -> None:
+    with pytest.raises(ValueError, match=why):
+        replace(Conditions(), **wrong)  # type: ignore[arg-type]
