@@ -13,6 +13,7 @@ from robochoc.cli.saved import saved_content
 
 if TYPE_CHECKING:
     from robochoc.outcome import Outcome
+    from robochoc.problem import Team
 
 NEXT_STEP = "give what 'robochoc solve --json' or '--journal' wrote"
 
@@ -32,7 +33,6 @@ NEXT_STEP = "give what 'robochoc solve --json' or '--journal' wrote"
 @invalid_input_fails
 def animate(saved: Path, output: Path | None, folder: Path | None, port: int, *, serve: bool) -> None:
     """Make the 3D scene of what `robochoc solve --json` printed, or of the journal that `--journal` wrote."""
-    from robochoc.change import changed_by
     from robochoc.cli.scene import serve_scene, write_page
     from robochoc.formats import read_team
     from robochoc.view.scene import scene_of
@@ -43,8 +43,8 @@ def animate(saved: Path, output: Path | None, folder: Path | None, port: int, *,
         raise click.UsageError("--port is for --serve")
     outcome = _outcome(saved)
     folder = folder or _usual_folder(outcome)
-    team = changed_by(read_team(folder), outcome.events) if folder else None
-    if team and not (team.variables.keys() >= outcome.assignment.keys() and {*team.order} >= {*outcome.withdrawn}):
+    team = read_team(folder) if folder else None
+    if team and not _is_team_of(outcome, team):
         raise Failure(
             INVALID, f"{folder}: this is not the team of {saved}, {outcome.team} (give its folder with --team)"
         )
@@ -53,6 +53,19 @@ def animate(saved: Path, output: Path | None, folder: Path | None, port: int, *,
         write_page(scene, output)
     if serve:
         serve_scene(scene, port)
+
+
+def _is_team_of(outcome: Outcome, team: Team) -> bool:
+    """Whether all who took part, and all that they decided, are known to `team` or come with its scenario."""
+    from robochoc.ros.mission import everybody
+
+    robots = everybody(team)
+    names = {robot.name for robot in robots}
+    variables = {variable.name for robot in robots for variable in robot.variables}
+    epochs = outcome.epochs
+    there = {*outcome.withdrawn, *(name for epoch in epochs for name in epoch.robots)}
+    decided = {*outcome.assignment, *(name for epoch in epochs for name in epoch.assignment)}
+    return there <= names and decided <= variables
 
 
 def _usual_folder(outcome: Outcome) -> Path | None:

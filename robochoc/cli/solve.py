@@ -344,11 +344,10 @@ def _show(team: Team, outcome: Outcome, products: Products, *, quiet: bool) -> N
     """Write the page and serve the scene, as asked."""
     if not (products.html or products.serve):
         return
-    from robochoc.change import changed_by
     from robochoc.cli.scene import serve_scene, write_page
     from robochoc.view.scene import scene_of
 
-    scene = scene_of(outcome, changed_by(team, outcome.events))
+    scene = scene_of(outcome, team)
     if products.html:
         write_page(scene, products.html, quiet=quiet)
     if products.serve:

@@ -1,28 +1,172 @@
-"use strict";
+// The page: everything together.
 try {
-  const viewer = new MeshCat.Viewer(document.getElementById("stage"));
+  const THREE = MeshCat.THREE;
+  const element = (id) => document.getElementById(id);
+  const film = JSON.parse(element("film").textContent);
+  const viewer = new MeshCat.Viewer(element("stage"));
   const dark = matchMedia("(prefers-color-scheme: dark)");
+  const still = matchMedia("(prefers-reduced-motion: reduce)");
+  const narrow = matchMedia("(max-width: 40rem)");
   const paintSky = () => {
     viewer.set_property(["Background"], "top_color", dark.matches ? [0.05, 0.07, 0.1] : [0.8, 0.88, 0.95]);
     viewer.set_property(["Background"], "bottom_color", dark.matches ? [0.12, 0.15, 0.2] : [0.97, 0.97, 0.95]);
   };
-  // On a narrow screen the scene must fit the width, not the height.
-  const fit = () => { viewer.camera.zoom = Math.min(1, innerWidth / innerHeight); viewer.set_dirty(); };
+  const free = () => {
+    const [caption, controls] = [element("caption"), element("controls")].map((one) => one.getBoundingClientRect());
+    const bottom = controls.top;
+    if (narrow.matches) return { left: 0, top: caption.bottom, right: innerWidth, bottom };
+    const beside = Math.max(Math.min(caption.right, innerWidth - bottom), 0);
+    return { left: beside, top: 0, right: innerWidth, bottom };
+  };
+  for (const one of document.querySelectorAll(".film")) one.hidden = !film.duration;
+  element("facts").open = !narrow.matches;
+  element("controls").hidden = false;
+  const object = (path) => viewer.scene_tree.find(["meshcat", ...path.split("/")]).object;
+  const player = new Player(film.duration);
+  const timeline = film.duration ? new Timeline(film, player) : null;
+  const trails = new Trails(viewer);
+  const camera = new Camera(viewer, film.corners, film.cell, free, still);
+  const fit = () => { trails.resize(); camera.fit(); timeline?.spread(); };
+  const drones = film.drones.map((drone) => object(drone.path));
+
+  const frame = (now) => {
+    player.step(now);
+    camera.step(now);
+    requestAnimationFrame(frame);
+  };
+
+  // Time
+  player.ontime = (time) => {
+    viewer.animator.seek(time);
+    trails.now = time;
+    timeline.show(time);
+  };
+  player.onstate = () => {
+    const label = player.playing ? "Pause" : player.ended ? "Play again" : "Play";
+    element("play").classList.toggle("playing", player.playing);
+    element("play").setAttribute("aria-label", label);
+  };
+  const setSpeed = (speed) => { player.speed = speed; element("speed").value = String(speed); };
+  const setTrail = (wanted) => { element("trail").value = wanted; trails.show(wanted); };
+  element("play").addEventListener("click", () => player.toggle());
+  element("again").addEventListener("click", () => { player.seek(0); player.play(); });
+  element("speed").addEventListener("change", () => setSpeed(Number(element("speed").value)));
+  element("trail").addEventListener("change", () => setTrail(element("trail").value));
+
+  // The scene's own camera comes with the commands: the window decides how far off it stands.
+  const handle = viewer.handle_command.bind(viewer);
+  viewer.handle_command = (command) => {
+    handle(command);
+    if (String(command.path).startsWith("/Cameras")) fit();
+  };
+
+  // The film comes with the commands, at once or over the WebSocket: from then on its time is ours.
+  const load = viewer.animator.load.bind(viewer.animator);
+  viewer.animator.load = (animations, options) => {
+    load(animations, options);
+    viewer.animator.pause();
+    const ways = [];
+    for (const action of viewer.animator.actions) {
+      const number = drones.indexOf(action.getRoot());
+      const moves = action.getClip().tracks.find((track) => track.name === ".position");
+      if (number >= 0 && moves) ways.push([moves.times, moves.values, film.drones[number].looks, film.drones[number].colour]);
+    }
+    trails.draw(ways, viewer.scene_tree.find(["meshcat"]).object);
+    setTrail(element("trail").value);
+    player.seek(still.matches ? player.duration : 0);
+    if (!still.matches) player.play(Player.LEAD);
+  };
+
+  // Camera
+  const views = ["overview", "top", "front"];
+  const chosen = element("drone");
+  for (const [number, drone] of film.drones.entries()) {
+    const option = document.createElement("option");
+    option.value = String(number);
+    option.textContent = drone.name;
+    chosen.append(option);
+  }
+  const follow = (number) => {
+    chosen.value = String(number);
+    camera.follow(drones[number]);
+  };
+  camera.onview = (view) => {
+    for (const name of [...views, "follow"]) element(name).setAttribute("aria-pressed", name === view);
+  };
+  for (const view of views) element(view).addEventListener("click", () => camera.see(view));
+  element("follow").addEventListener("click", () => drones.length && follow(Number(chosen.value)));
+  chosen.addEventListener("change", () => follow(Number(chosen.value)));
+  element("follow").disabled = chosen.disabled = !drones.length;
+
+  // The drone under the pointer, or the nearest within a finger's width.
+  const under = (event) => {
+    let [found, least] = [-1, event.pointerType === "mouse" ? 20 : 30];
+    drones.forEach((drone, number) => {
+      const spot = drone.getWorldPosition(new THREE.Vector3()).project(viewer.camera);
+      const off = Math.hypot((spot.x + 1) / 2 * innerWidth - event.clientX, (1 - spot.y) / 2 * innerHeight - event.clientY);
+      if (spot.z < 1 && off < least) [found, least] = [number, off];
+    });
+    return found;
+  };
+  let pressed = null;
+  element("stage").addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
+  element("stage").addEventListener("pointermove", (event) => {
+    if (!event.buttons) element("stage").classList.toggle("pointed", under(event) >= 0);
+  });
+  addEventListener("pointerup", (event) => {
+    const clicked = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) < 5;
+    pressed = null;
+    const number = clicked ? under(event) : -1;
+    if (number >= 0) follow(number);
+  });
+
+  // Keys
+  const keys = {
+    1: () => camera.see("overview"),
+    2: () => camera.see("top"),
+    3: () => camera.see("front"),
+    4: () => drones.length && follow((Number(chosen.value) + (camera.view === "follow" ? 1 : 0)) % drones.length),
+  };
+  const step = (seconds) => { player.pause(); player.seek(player.time + seconds); };
+  const jump = (forth) => player.seek(timeline.beside(player.time, forth));
+  const faster = (by) => setSpeed(Player.SPEEDS[
+    Math.min(Math.max(Player.SPEEDS.indexOf(player.speed) + by, 0), Player.SPEEDS.length - 1)]);
+  const trailed = [...element("trail").options].map((option) => option.value);
+  if (timeline)
+    Object.assign(keys, {
+      " ": () => player.toggle(),
+      ArrowLeft: (event) => (event.shiftKey ? jump(false) : step(-0.1)),
+      ArrowRight: (event) => (event.shiftKey ? jump(true) : step(0.1)),
+      Home: () => player.seek(0),
+      End: () => { player.pause(); player.seek(player.duration); },
+      "-": () => faster(-1),
+      "+": () => faster(1),
+      t: () => setTrail(trailed[(trailed.indexOf(element("trail").value) + 1) % trailed.length]),
+    });
+  addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("select")) return;
+    if (event.key === " " && event.target.matches("button, summary")) return; // which it presses
+    const does = Object.hasOwn(keys, event.key) ? keys[event.key] : keys[event.key.toLowerCase()];
+    if (typeof does !== "function" || event.key.length > 1 && !Object.hasOwn(keys, event.key)) return;
+    event.preventDefault();
+    does(event);
+  });
+
   dark.addEventListener("change", paintSky);
   addEventListener("resize", fit);
+  // There, an epoch of many words, or the facts unfolded, take room from the scene.
+  new ResizeObserver(() => { if (narrow.matches) fit(); }).observe(element("caption"));
   paintSky();
-  fit();
-  document.getElementById("again").addEventListener("click", () => { viewer.animator.reset(); viewer.animator.play(); });
 
-  const commands = document.getElementById("commands").textContent.trim();
+  const commands = element("commands").textContent.trim();
   if (commands) {
     for (const command of commands.split("\n"))
       viewer.handle_command_bytearray(Uint8Array.from(atob(command), (sign) => sign.charCodeAt(0)));
-    if (matchMedia("(prefers-reduced-motion: reduce)").matches) {
-      viewer.animator.pause();
-      viewer.animator.seek(viewer.animator.duration);
-    }
   } else viewer.connect("ws://" + location.host + "/commands");
+  viewer.set_3d_pane_size();
+  fit();
+  requestAnimationFrame(frame);
+  globalThis.Film = { viewer, camera, player, trails, drones };
 } catch (error) {
   const trouble = document.getElementById("trouble");
   trouble.append(error.message);

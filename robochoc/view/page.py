@@ -1,4 +1,4 @@
-"""A scene as one self-contained HTML page: meshcat's viewer, the commands that fill it, and a caption.
+"""A scene as one self-contained HTML page: meshcat's viewer, the commands that fill it, a caption and a player.
 
 Team and robot names come from files of strangers. Here they reach HTML as escaped text only, and the page's
 Content-Security-Policy lets no other script run than the two it was made with, and nothing be loaded from anywhere.
@@ -11,11 +11,15 @@ from html import escape
 from importlib.resources import files
 from string import Template
 
+from robochoc.view.film_json import film_json
 from robochoc.view.label import printable
 from robochoc.view.policy import policy
 from robochoc.view.scene import Scene
 from robochoc.view.script import viewer_script
 from robochoc.view.stage import commands
+
+_PLAYER = ("trails.js", "camera.js", "player.js", "timeline.js", "page.js")
+"""The player's parts, in this order one script."""
 
 
 def page(scene: Scene) -> bytes:
@@ -30,7 +34,7 @@ def live_page(scene: Scene, port: int) -> bytes:
 
 def _filled(scene: Scene, embedded: str, connections: str) -> bytes:
     here = files(__package__)
-    viewer, player = viewer_script(), (here / "page.js").read_text(encoding="utf-8")
+    viewer, player = viewer_script(), "".join((here / part).read_text(encoding="utf-8") for part in _PLAYER)
     return (
         Template((here / "page.html").read_text(encoding="utf-8"))
         .substitute(
@@ -38,6 +42,7 @@ def _filled(scene: Scene, embedded: str, connections: str) -> bytes:
             title=_text(scene.title),
             facts="".join(f"<dt>{_text(name)}</dt><dd>{_text(fact)}</dd>" for name, fact in scene.facts),
             commands=embedded,
+            film=film_json(scene),
             viewer=viewer,
             player=player,
         )

@@ -9,6 +9,8 @@ Colour = tuple[float, float, float]
 
 GREY: Colour = (0.62, 0.64, 0.67)
 """Of those that withdrew."""
+RED: Colour = (0.86, 0.16, 0.18)
+"""Of what is in the way, and of those that fell."""
 
 _RAMP = np.array(
     [
@@ -28,3 +30,8 @@ def colours(count: int) -> list[Colour]:
     at = np.linspace(0, 1, count)
     red, green, blue = (np.interp(at, stops, _RAMP[:, part]) for part in range(3))
     return [(float(r), float(g), float(b)) for r, g, b in zip(red, green, blue, strict=True)]
+
+
+def web(colour: Colour) -> str:
+    """`colour` as a web page writes it."""
+    return "#" + "".join(f"{round(255 * part):02x}" for part in colour)

@@ -1,8 +1,9 @@
-"""The shape of a drone: a body on skids, four arms, four guarded rotors. About 0.8 cells wide, standing on z = 0."""
+"""The shape of a drone: a body on skids, four arms, four guarded rotors. About 0.8 cells wide."""
 
 from __future__ import annotations
 
 from functools import cache
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -11,12 +12,14 @@ import numpy.typing as npt
 _Vertices = npt.NDArray[np.float64]
 _Faces = npt.NDArray[np.int64]
 
-_SHELL, _ROTOR, _DARK = 0.95, 1.0, 0.28
+_SHELL, _ROTOR, _DARK = 0.95, 1.0, 0.42
 """Shades that multiply the drone's colour."""
 _REACH = 0.23
 """From the centre to a rotor's, along x and along y."""
 _DECK = 0.17
 """Height of the arms."""
+HUB = (0.0, 0.0, _DECK)
+"""What it turns about, from where it stands."""
 
 
 class Shape(NamedTuple):
@@ -29,12 +32,13 @@ class Shape(NamedTuple):
 
 @cache
 def quadrotor() -> Shape:
-    """The one shape all drones share; so small that every drone can carry a copy of it."""
+    """The one shape all drones share, around its `HUB`; so small that every drone can carry a copy of it."""
     corners = [(x, y) for x in (-_REACH, _REACH) for y in (-_REACH, _REACH)]
     parts = [_body(), _bar((-_REACH, -_REACH), (_REACH, _REACH)), _bar((-_REACH, _REACH), (_REACH, -_REACH))]
     parts += [_rotor(x, y) for x, y in corners]
     parts += [_skid(side) for side in (-0.11, 0.11)]
-    return joined(parts)
+    whole = joined(parts)
+    return whole._replace(vertices=whole.vertices - np.array(HUB))
 
 
 def disc(centre: tuple[float, float, float], radius: float, colour: tuple[float, float, float]) -> Shape:
@@ -44,6 +48,14 @@ def disc(centre: tuple[float, float, float], radius: float, colour: tuple[float,
     here = np.arange(sides)
     faces = np.column_stack([np.zeros_like(here), here + 1, (here + 1) % sides + 1])
     return Shape(vertices, faces, np.tile(colour, (sides + 1, 1)))
+
+
+def box(centre: tuple[float, float, float], size: float) -> Shape:
+    """A cube, for what is in the way."""
+    corners = np.array([*product((-0.5, 0.5), repeat=3)]) * size + np.array(centre)
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = np.array([face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))])
+    return _painted(corners, faces, 1)
 
 
 def joined(parts: list[Shape]) -> Shape:

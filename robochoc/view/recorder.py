@@ -21,12 +21,12 @@ from robochoc.view.quadrotor import Shape
 
 
 class Track(NamedTuple):
-    """How a property (`position`, or `material.color`) of the object at `path` changes: values by frame."""
+    """How a property (`position`, `quaternion`, `material.color`) of the object at `path` changes: values by frame."""
 
     path: str
     name: str
     type: str
-    keys: Sequence[tuple[int, Sequence[float]]]
+    keys: Sequence[tuple[float, Sequence[float]]]
 
 
 class _Command(Protocol):
@@ -101,8 +101,9 @@ class Recorder:
         """Play `tracks` once, all at the same time, and stay where they end."""
         animation = self._meshcat.animation.Animation(default_framerate=fps)
         for track in tracks:
+            animated = self._at(track.path)
             for frame, value in track.keys:
-                with animation.at_frame(self._at(track.path), frame) as then:
+                with animation.at_frame(animated, frame) as then:
                     then.set_property(track.name, track.type, list(value))
         self._root.set_animation(animation)
 
@@ -119,7 +120,9 @@ class Recorder:
     def _keep(self, message: dict[str, Any]) -> None:
         import umsgpack  # noqa: PLC0415 - comes with meshcat, and like it only when a scene is drawn
 
-        self.commands.append(umsgpack.packb(message))
+        # Key frames are many, and finer than single precision nobody sees.
+        precision = "single" if message["type"] == "set_animation" else "double"
+        self.commands.append(umsgpack.packb(message, force_float_precision=precision))
 
 
 def _meshcat() -> Any:  # noqa: ANN401 - meshcat is untyped

@@ -1,22 +1,35 @@
-"""What there is to see of an outcome, as data: the drones, where each begins and ends, and the box around them.
+"""What there is to see of an outcome, as data: the drones, how they flew, and the box around them.
 
 Lengths are in cells: one cell is one row, one column or one level. Nothing here draws; `stage` does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
+
+import numpy as np
 
 from robochoc.outcome import Outcome, Verdict
 from robochoc.problem import Team
-from robochoc.ros.crew import Craft, crew_of
-from robochoc.ros.layout import Axis, Field, Point, field_of
+from robochoc.ros.flight import fly
+from robochoc.ros.flown import Flown
+from robochoc.ros.layout import Axis, Point
+from robochoc.ros.mission import Goal, Mission, mission_of
+from robochoc.view.film import Film, fell, film_of, in_cells, roomy
+
+_NO_FLIGHT = (ValueError, ArithmeticError, MemoryError)
+"""What makes a flight impossible: places too close to each other, no way between them, numbers beyond all bounds. That
+is no reason not to show the rest."""
+_MOST_DRONES = 500
+"""More than that are not flown here: to find their ways takes minutes."""
+_MOST_FLIGHTS = 2_000
+"""Of all drones, in all epochs, likewise."""
 
 
 @dataclass(frozen=True)
 class Drone:
-    """Begins at `home`, on the ground. It flies to its `place`, or steps `aside`, or (neither) stays at home."""
+    """Begins at `home`, on the ground. It ends at its `place` in the air, or `aside`, or (neither) stays there."""
 
     name: str
     group: int
@@ -25,15 +38,24 @@ class Drone:
     place: Point | None = None
     aside: Point | None = None
 
+    @property
+    def end(self) -> Point:
+        """Where it is to be in the end."""
+        return self.place or self.aside or self.home
+
 
 @dataclass(frozen=True)
 class Scene:
-    """One run, ready to be drawn. `facts` is the caption: pairs of a label and what it says, in plain text."""
+    """One run, ready to be drawn. `facts` is the caption: pairs of a label and what it says, in plain text.
+
+    Without a `film`, drones are where they are to be in the end.
+    """
 
     title: str
     facts: tuple[tuple[str, str], ...]
     drones: tuple[Drone, ...]
     axes: tuple[Axis, Axis, Axis]
+    film: Film | None = None
 
     @property
     def ground(self) -> float:
@@ -41,26 +63,77 @@ class Scene:
         return self.axes[2].ground
 
 
-def scene_of(outcome: Outcome, team: Team | None = None) -> Scene:
+def scene_of(
+    outcome: Outcome, team: Team | None = None, *, mission: Mission | None = None, flown: Flown | None = None
+) -> Scene:
     """The scene of `outcome`. With its `team` also robots that stay behind are shown, and topics say where to fly.
 
+    `team` is as its files have it, before its scenario. `mission` is what the outcome asks of the drones, where that
+    is known already, and `flown` how they flew that; without one they are flown here, in calm air.
+
     Never raises for want of a place: a robot whose coordinates are missing or undefined is placed by the two
-    numbers its name ends in (row and column), and failing that in a tidy grid, at the height of its first value.
+    numbers its name ends in (row and column), and failing that in a tidy grid, at the height of its first value. Nor
+    for want of a way: then the drones are where they are to be, and the caption says why.
     """
-    crew = crew_of(outcome, team)
-    field = field_of(crew)
-    drones = tuple(_drones(crew, field))
+    mission = mission or mission_of(outcome, team)
+    axes, why_not = mission.axes, ""
+    if flown is None:
+        mission = roomy(mission)
+        flown, why_not = _flown(mission)
+    drones = tuple(_drones(mission))
+    withdrawn = {*outcome.withdrawn}
+    aside = sum(drone.robot in withdrawn or drone.name in withdrawn for drone in mission.drones)
     flying = sum(drone.place is not None for drone in drones)
-    aside = len(drones) - flying  # drones, as a robot may fly several
     title = f"{outcome.team}: {_ending(outcome, flying, aside)}"
-    return Scene(title, _facts(outcome, flying, aside), drones, field.axes)
+    facts = (*_facts(outcome, flying, aside), *_flight_facts(flown, why_not))
+    return Scene(title, facts, drones, axes, film_of(mission, flown) if flown else None)
 
 
-def _drones(crew: Sequence[Craft], field: Field) -> Iterator[Drone]:
-    spots = field.edge(sum(craft.withdrew for craft in crew))
-    for craft, home, place in zip(crew, field.homes, field.places(crew), strict=True):
-        aside = next(spots) if craft.withdrew and place is None else None
-        yield Drone(craft.name, craft.cell[0] if craft.cell else round(home[0]), home, place, aside)
+def _flown(mission: Mission) -> tuple[Flown | None, str]:
+    """How the drones fly their mission in calm air; if they do not, why, unless nobody is to fly."""
+    drones, legs = len(mission.drones), len(mission.legs)
+    if not any(leg.goals for leg in mission.legs):
+        return None, ""
+    if drones > _MOST_DRONES or drones * legs > _MOST_FLIGHTS:
+        return None, f"{drones} drones in {legs} epochs are more than are flown for a picture"
+    try:
+        return fly(mission), ""
+    except _NO_FLIGHT as error:
+        return None, str(error) or type(error).__name__
+
+
+def _drones(mission: Mission) -> Iterator[Drone]:
+    """Each drone, and where the last leg that says something of it wants it to be."""
+    last: dict[int, Goal] = {}
+    for leg in mission.legs:
+        last.update(leg.goals)
+    for number, drone in enumerate(mission.drones):
+        goal = last.get(number)
+        end = _cell(mission, goal.at) if goal else None
+        home = _cell(mission, drone.home)
+        if goal and goal.lands:
+            yield Drone(drone.name, drone.group, home, aside=end)
+        else:
+            yield Drone(drone.name, drone.group, home, place=end)
+
+
+def _cell(mission: Mission, metres: Point) -> Point:
+    x, y, z = in_cells(mission, np.array(metres, dtype=np.float64)).tolist()
+    return x, y, z
+
+
+def _flight_facts(flown: Flown | None, why_not: str) -> Iterator[tuple[str, str]]:
+    """How the flight went; or why there was none."""
+    if flown is None:
+        if why_not:
+            yield "flight", f"none: {why_not}"
+        return
+    yield "flown", f"{flown.times[-1]:.1f} s"
+    for label, nearest in (("nearest", flown.nearest), ("near fallen", flown.nearest_fallen)):
+        if nearest:
+            yield label, f"{nearest.distance_m:.2f} m (set: {flown.distance:.2g} m)"
+    for number, happening in fell(flown).items():
+        yield "fallen", f"{flown.names[number]} ({happening.what})"
 
 
 def _ending(outcome: Outcome, flying: int, aside: int) -> str:

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
+from typing import assert_never
 
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.ros.layout import Axis
-from robochoc.view.flight import FPS, Key, flights
+from robochoc.ros.layout import Axis, Point
+from robochoc.view.film import Film, Look
+from robochoc.view.keyframes import Keys, Samples, angle, attitude_keys, position_keys
 from robochoc.view.label import label
-from robochoc.view.palette import GREY, Colour, colours
-from robochoc.view.quadrotor import Shape, disc, joined, quadrotor
+from robochoc.view.palette import GREY, RED, Colour, colours
+from robochoc.view.quadrotor import HUB, Shape, box, disc, joined, quadrotor
 from robochoc.view.recorder import Recorder, Track
 from robochoc.view.scene import Drone, Scene
 
 _Corners = npt.NDArray[np.float64]
 """The lowest and the highest x, y and z of something, a row each."""
+_Corner = npt.NDArray[np.float64]
+"""An x, a y and a z."""
 
 _LINE: Colour = (0.45, 0.52, 0.60)
 _GROUND: Colour = (0.50, 0.56, 0.62)
@@ -37,20 +41,31 @@ _READABLE = 0.03
 """Height of text that can still be read, likewise."""
 _NAME_WIDTH = 0.8
 """Of a drone's name, at most, in cells: the neighbour needs room for its own."""
+FPS = 30
+"""Frames a second, of the animation."""
 _FADE = 25
 """Frames in which a drone that steps aside turns grey."""
+_CLOSE = 0.002
+"""Of a cell: so much may an animated drone be off where it was flown."""
+_ALIKE = math.radians(0.5)
+"""So much may it be turned."""
+_IN_THE_WAY = 0.9
+"""Of a cell, that an obstacle takes up."""
 
 
 def commands(scene: Scene) -> list[bytes]:
-    """The packed commands that make meshcat's viewer show `scene` and play its flight once."""
-    recorder = _drawn(scene)
-    _animate(recorder, scene.drones)
+    """The packed commands that make meshcat's viewer show `scene` and play its film once."""
+    if scene.film is None:
+        return _drawn(scene, [drone.end for drone in scene.drones]).commands
+    recorder = _drawn(scene, [drone.home for drone in scene.drones])
+    _draw_obstacles(recorder, scene.film.obstacles)
+    _animate(recorder, scene.drones, scene.film)
     return recorder.commands
 
 
 def still(scene: Scene) -> list[bytes]:
-    """The same without the flight: every drone stays at home."""
-    return _drawn(scene).commands
+    """The same without the film: every drone stays at home."""
+    return _drawn(scene, [drone.home for drone in scene.drones]).commands
 
 
 def path_of(number: int, name: str) -> str:
@@ -61,27 +76,46 @@ def path_of(number: int, name: str) -> str:
     return f"drones/{number + 1} " + re.sub(r"[^\w.-]", "_", name)
 
 
-def _drawn(scene: Scene) -> Recorder:
+def corners(scene: Scene) -> list[list[float]]:
+    """Points around all there is to see, names of axes included, in a frame scaled to radius 1 around the drones."""
+    extent, radius = _measured(scene)
+    names = [2 * name_at - origin for _, _, origin, name_at in _beside(scene.axes, _TEXT * radius)]
+    found: list[list[float]] = ((np.array([*_corners(extent), *names]) - extent.mean(axis=0)) / radius).tolist()
+    return found
+
+
+def cell_of(scene: Scene) -> float:
+    """How long a cell is in that frame."""
+    return 1 / _measured(scene)[1]
+
+
+def _drawn(scene: Scene, points: Sequence[Point]) -> Recorder:
+    """Everything, each drone at its point of `points`."""
     recorder = Recorder()
-    extent = _extent(scene)
-    radius = float(np.linalg.norm(extent[1] - extent[0])) / 2
+    extent, radius = _measured(scene)
     _aim(recorder, extent, radius)
     _draw_ground(recorder, scene, extent)
     _draw_box(recorder, scene.axes)
     _label_axes(recorder, scene.axes, _TEXT * radius)
-    _draw_drones(recorder, scene.drones, radius)
+    _draw_drones(recorder, scene.drones, points, radius)
     return recorder
+
+
+def _measured(scene: Scene) -> tuple[_Corners, float]:
+    """What the scene takes up, and the radius of the sphere around that."""
+    points = [point for drone in scene.drones for point in (drone.home, drone.place, drone.aside) if point]
+    everything = np.array([*points, *_box(scene.axes)])
+    margin = np.array([_MARGIN, _MARGIN, 0])
+    extent = np.array([everything.min(axis=0) - margin, everything.max(axis=0) + margin])
+    return extent, float(np.linalg.norm(extent[1] - extent[0])) / 2
 
 
 def _box(axes: Sequence[Axis]) -> _Corners:
     return np.array([[axis.low - 0.5 for axis in axes], [axis.high + 0.5 for axis in axes]])
 
 
-def _extent(scene: Scene) -> _Corners:
-    points = [point for drone in scene.drones for point in (drone.home, drone.place, drone.aside) if point]
-    everything = np.array([*points, *_box(scene.axes)])
-    margin = np.array([_MARGIN, _MARGIN, 0])
-    return np.array([everything.min(axis=0) - margin, everything.max(axis=0) + margin])
+def _corners(extent: _Corners) -> _Corners:
+    return np.array([*product(*extent.T)])
 
 
 def _aim(recorder: Recorder, extent: _Corners, radius: float) -> None:
@@ -90,8 +124,8 @@ def _aim(recorder: Recorder, extent: _Corners, radius: float) -> None:
     recorder.place("", (x, y, z), (1 / radius, 1 / radius, 1 / radius))
     for default in ("/Grid", "/Axes"):
         recorder.set(default, "visible", value=False)
-    corners = np.array([*product(*extent.T)]) - extent.mean(axis=0)
-    x, y, z = (float(part) for part in _from_where_to_see(corners / radius))
+    around = (_corners(extent) - extent.mean(axis=0)) / radius
+    x, y, z = (float(part) for part in _from_where_to_see(around))
     camera = "/Cameras/default/rotated/<object>"
     recorder.set(camera, "fov", _FIELD_OF_VIEW_DEG)
     recorder.set(camera, "position", [x, z, -y])  # the camera's own y is up
@@ -115,8 +149,8 @@ def _draw_ground(recorder: Recorder, scene: Scene, extent: _Corners) -> None:
     recorder.mesh("ground/plane", plane, _GROUND, opacity=0.3)
     recorder.place("ground/plane", (0, 0, scene.ground - 0.02))
     if scene.drones:
-        paint = _paint(scene.drones)
-        pads = [disc(drone.home, 0.36, paint[drone.group]) for drone in scene.drones]
+        paint = paints(scene.drones)
+        pads = [disc(drone.home, 0.36, colour) for drone, colour in zip(scene.drones, paint, strict=True)]
         recorder.mesh("ground/pads", joined(pads), _WHITE, opacity=0.45)
         recorder.place("ground/pads", (0, 0, -0.01))
 
@@ -138,23 +172,27 @@ def _draw_box(recorder: Recorder, axes: Sequence[Axis]) -> None:
 
 def _label_axes(recorder: Recorder, axes: Sequence[Axis], height: float) -> None:
     """Each named axis' name and numbers, beside the edge of the box that is nearest to the viewer."""
-    low, high = _box(axes)
-    middle = (low + high) / 2
-    near = 1.2 * height
-    beside = [
-        np.array([middle[0], low[1] - near, low[2]]),
-        np.array([high[0] + near, middle[1], low[2]]),
-        np.array([low[0] - near, low[1], middle[2]]),
-    ]
-    for number, (axis, origin) in enumerate(zip(axes, beside, strict=True)):
-        if not axis.name:
-            continue
+    for number, axis, origin, name_at in _beside(axes, height):
         for at, text in axis.ticks:
             spot = origin.copy()
             spot[number] = at
             _write(recorder, f"axes/{axis.name} {text}", text, spot, height)
-        away = np.sign(origin - middle) * [1, 1, 0] * 2.2 * height
-        _write(recorder, f"axes/{axis.name}", axis.name, origin + away, 1.2 * height)
+        _write(recorder, f"axes/{axis.name}", axis.name, name_at, 1.2 * height)
+
+
+def _beside(axes: Sequence[Axis], height: float) -> Iterator[tuple[int, Axis, _Corner, _Corner]]:
+    """The named axes by their numbers, the line beside the box for the numbers of each, the spot for its name."""
+    low, high = _box(axes)
+    middle = (low + high) / 2
+    near = 1.2 * height
+    lines = [
+        np.array([middle[0], low[1] - near, low[2]]),
+        np.array([high[0] + near, middle[1], low[2]]),
+        np.array([low[0] - near, low[1], middle[2]]),
+    ]
+    for number, (axis, origin) in enumerate(zip(axes, lines, strict=True)):
+        if axis.name:
+            yield number, axis, origin, origin + np.sign(origin - middle) * [1, 1, 0] * 2.2 * height
 
 
 def _lattice(walls: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
@@ -168,34 +206,59 @@ def _lattice(walls: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64
     return np.concatenate(ends)
 
 
-def _draw_drones(recorder: Recorder, drones: Sequence[Drone], radius: float) -> None:
-    paint = _paint(drones)
+def _draw_drones(recorder: Recorder, drones: Sequence[Drone], points: Sequence[Point], radius: float) -> None:
     texts = _texts([drone.name for drone in drones], _READABLE * radius)
-    for number, (drone, text) in enumerate(zip(drones, texts, strict=True)):
+    drawn = zip(drones, points, texts, paints(drones), strict=True)
+    for number, (drone, point, text, colour) in enumerate(drawn):
         path = path_of(number, drone.name)
-        recorder.mesh(f"{path}/body", quadrotor(), paint[drone.group])
+        recorder.mesh(f"{path}/body", quadrotor(), colour)
+        recorder.place(f"{path}/body", HUB)
         height = min(_TEXT * radius, _NAME_WIDTH / label(text).aspect)
         _write(recorder, f"{path}/name", text, np.array([0, 0, 0.42]), height)
-        recorder.place(path, drone.home)
+        recorder.place(path, point)
 
 
-def _animate(recorder: Recorder, drones: Sequence[Drone]) -> None:
-    paint = _paint(drones)
-    tracks = []
-    for number, (drone, keys) in enumerate(zip(drones, flights(drones), strict=True)):
+def _draw_obstacles(recorder: Recorder, obstacles: Sequence[Point]) -> None:
+    for number, place in enumerate(obstacles, 1):
+        recorder.mesh(f"obstacles/{number}/body", box(place, _IN_THE_WAY), RED, opacity=0.35)
+        sides = [np.array([at - _IN_THE_WAY / 2, at + _IN_THE_WAY / 2]) for at in place]
+        recorder.segments(f"obstacles/{number}/edges", _lattice(sides), RED, 0.9)
+
+
+def _animate(recorder: Recorder, drones: Sequence[Drone], film: Film) -> None:
+    paint = paints(drones)
+    tracks: list[Track] = []
+    for number, (drone, colour) in enumerate(zip(drones, paint, strict=True)):
         path = path_of(number, drone.name)
-        if keys:
-            tracks.append(Track(path, "position", "vector3", keys))
-        if drone.aside:
-            tracks.append(_fading(f"{path}/body/<object>", keys, paint[drone.group]))
+        tracks += _moves(path, film, number)
+        if film.looks[number]:
+            tracks.append(_painting(f"{path}/body/<object>", film.looks[number], colour))
     if tracks:
         recorder.animate(tracks, FPS)
 
 
-def _fading(path: str, keys: Sequence[Key], colour: Colour) -> Track:
-    begin, end = keys[1][0], keys[-1][0]
-    fade = [(0, colour), (begin, colour), (begin + _FADE, GREY), (end, GREY)]
-    return Track(path, "material.color", "color", fade)
+def _moves(path: str, film: Film, number: int) -> Iterator[Track]:
+    """How a drone moves and tilts, if it does at all."""
+    frames = FPS * film.times
+    positions, attitudes = film.positions[:, number], film.attitudes[:, number]
+    if np.linalg.norm(positions - positions[0], axis=1).max() > _CLOSE:
+        yield Track(path, "position", "vector3", _keys(frames, positions, position_keys(frames, positions, _CLOSE)))
+    if angle(attitudes, attitudes[0]).max() > _ALIKE:
+        keys = attitude_keys(frames, attitudes, _ALIKE)
+        yield Track(f"{path}/body", "quaternion", "quaternion", _keys(frames, attitudes, keys))
+
+
+def _keys(frames: Samples, values: Samples, keys: Keys) -> list[tuple[float, list[float]]]:
+    return [*zip(frames[keys].round(6).tolist(), values[keys].tolist(), strict=True)]
+
+
+def _painting(path: str, looks: Sequence[tuple[float, Look]], colour: Colour) -> Track:
+    """How a drone changes its colour."""
+    keys: list[tuple[float, Colour]] = [(0, colour)]
+    for at_s, look in looks:
+        begin, now = max(FPS * at_s, keys[-1][0]), keys[-1][1]
+        keys += [(begin, now), (begin + _FADE, tint(look, colour))]
+    return Track(path, "material.color", "color", keys)
 
 
 def _texts(names: Sequence[str], readable: float) -> list[str]:
@@ -214,6 +277,21 @@ def _write(recorder: Recorder, path: str, text: str, at: npt.NDArray[np.float64]
     recorder.place(path, (x, y, z), (height * picture.aspect, height, 1))
 
 
-def _paint(drones: Sequence[Drone]) -> dict[int, Colour]:
+def paints(drones: Sequence[Drone]) -> list[Colour]:
+    """The colour of each drone: that of its row."""
     groups = sorted({drone.group for drone in drones})
-    return dict(zip(groups, colours(len(groups)), strict=True))
+    shades = dict(zip(groups, colours(len(groups)), strict=True))
+    return [shades[drone.group] for drone in drones]
+
+
+def tint(look: Look, colour: Colour) -> Colour:
+    """What a drone looks like, if it is of that `colour` by itself."""
+    match look:
+        case Look.FLIES:
+            return colour
+        case Look.ASIDE:
+            return GREY
+        case Look.FALLEN:
+            return RED
+        case _ as never:
+            assert_never(never)

@@ -1,0 +1,183 @@
+"""What was flown, as a picture shows it: where each drone was when, the epochs on a line of time, what happened.
+
+Lengths are in cells, as in `scene`; times in seconds from the beginning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from robochoc.outcome import Verdict
+from robochoc.ros.flown import Flown, Happening
+from robochoc.ros.layout import Axis, Point
+from robochoc.ros.mission import Leg, Mission
+
+_HIT = "hits the ground"
+"""What the flight says in the end of one that falls."""
+
+_LEAST_CELL_M = 0.25
+"""Of a cell's sides: a drone is larger."""
+
+_Array = npt.NDArray[np.float64]
+
+
+class Look(StrEnum):
+    """What a drone looks like: in the colour of its row, or grey, or red."""
+
+    FLIES = "flies"
+    ASIDE = "aside"
+    FALLEN = "fallen"
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """An epoch: when its flight begins, what opened it, and what came of it."""
+
+    begins_s: float
+    opened_by: str
+    says: str
+
+
+@dataclass(frozen=True)
+class Mark:
+    """Something that happened to a drone, by its number."""
+
+    at_s: float
+    drone: int
+    says: str
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """A flight to be shown. Arrays have a row for each of T times, and in it one for each of N drones.
+
+    `looks` are for each drone its changes, in order: from when on it looks how.
+    """
+
+    times: _Array
+    positions: _Array
+    """(T, N, 3)"""
+    attitudes: _Array
+    """(T, N, 4): unit quaternions x, y, z, w."""
+    looks: tuple[tuple[tuple[float, Look], ...], ...]
+    chapters: tuple[Chapter, ...] = ()
+    marks: tuple[Mark, ...] = ()
+    obstacles: tuple[Point, ...] = ()
+
+    @property
+    def duration_s(self) -> float:
+        """How long it lasts."""
+        return float(self.times[-1]) if len(self.times) else 0.0
+
+
+def film_of(mission: Mission, flown: Flown) -> Film:
+    """How `flown` looks in the box of `mission`, whose drones it flew."""
+    marks = [Mark(happening.at_s, happening.drone, happening.what) for happening in flown.happenings]
+    obstacles = [in_cells(mission, np.array(place)) for place in flown.obstacles]
+    return Film(
+        flown.times,
+        in_cells(mission, flown.positions),
+        flown.attitudes,
+        tuple(tuple(_looks(number, mission, flown)) for number in range(len(mission.drones))),
+        tuple(_chapters(mission, flown)),
+        tuple(sorted(marks, key=lambda mark: mark.at_s)),
+        tuple((float(x), float(y), float(z)) for x, y, z in obstacles),
+    )
+
+
+def roomy(mission: Mission) -> Mission:
+    """`mission`; where its cells are smaller than drones, the same in a box whose cells are metres.
+
+    Problems with vast numbers are no fields to scale: they are flown as they are drawn.
+    """
+    cells_m = [_cell_m(axis) * mission.scale for axis in mission.axes]
+    if min(cells_m) >= _LEAST_CELL_M:
+        return mission
+
+    def moved(point: Point) -> Point:
+        x, y, z = in_cells(mission, np.array(point)).tolist()
+        return x, y, z
+
+    rows, columns, levels = (replace(axis, first=axis.low, last=axis.high) for axis in mission.axes)
+    return replace(
+        mission,
+        drones=tuple(replace(drone, home=moved(drone.home)) for drone in mission.drones),
+        legs=tuple(
+            replace(leg, goals={number: replace(goal, at=moved(goal.at)) for number, goal in leg.goals.items()})
+            for leg in mission.legs
+        ),
+        axes=(rows, columns, levels),
+        scale=1.0,
+    )
+
+
+def _cell_m(axis: Axis) -> float:
+    """How many units a cell of `axis` is."""
+    return (axis.last - axis.first) / (axis.high - axis.low) if axis.high > axis.low else 1.0
+
+
+def in_cells(mission: Mission, metres: _Array) -> _Array:
+    """Points (..., 3) in metres, in the cells of the mission's box."""
+    parts = [_cells(axis, metres[..., number] / mission.scale) for number, axis in enumerate(mission.axes)]
+    return np.stack(parts, axis=-1)
+
+
+def _cells(axis: Axis, values: _Array) -> _Array:
+    """`Axis.at`, of many values."""
+    span = axis.last - axis.first
+    return axis.low + (values - axis.first) * ((axis.high - axis.low) / span if span else 1.0)
+
+
+def fell(flown: Flown) -> dict[int, Happening]:
+    """Who lies fallen in the end, and what made it fall: the last that happened to it before it hit the ground."""
+    told: dict[int, list[Happening]] = {}
+    for happening in flown.happenings:
+        if np.isnan(flown.errors_m[happening.drone]):
+            told.setdefault(happening.drone, []).append(happening)
+    for own in told.values():
+        if len(own) > 1 and own[-1].what == _HIT:
+            own.pop()
+    return {number: own[-1] for number, own in told.items()}
+
+
+def _looks(number: int, mission: Mission, flown: Flown) -> Iterator[tuple[float, Look]]:
+    fallen = fell(flown).get(number)
+    falls_s = fallen.at_s if fallen else np.inf
+    now = Look.FLIES
+    for leg, begins_s in _begun(mission, flown):
+        goal = leg.goals.get(number)
+        then = now if goal is None else Look.ASIDE if goal.lands else Look.FLIES
+        if then is not now and begins_s < falls_s:
+            yield begins_s, then
+            now = then
+    if fallen:
+        yield falls_s, Look.FALLEN
+
+
+def _begun(mission: Mission, flown: Flown) -> list[tuple[Leg, float]]:
+    """The legs that were flown, and when each began."""
+    return [(leg, stage.begins_s) for leg, stage in zip(mission.legs, flown.stages, strict=False)]
+
+
+def _chapters(mission: Mission, flown: Flown) -> Iterator[Chapter]:
+    flying: set[int] = set()
+    for leg, begins_s in _begun(mission, flown):
+        for number, goal in leg.goals.items():
+            (flying.discard if goal.lands else flying.add)(number)
+        yield Chapter(begins_s, leg.opened_by, f"{_told(leg.verdict)}, {_flying(flying, leg)}")
+
+
+def _told(verdict: Verdict) -> str:
+    return verdict.value.replace("-", " ")
+
+
+def _flying(flying: set[int], leg: Leg) -> str:
+    if not flying:
+        return "nobody flies"
+    stay = leg.verdict in {Verdict.NO_SOLUTION, Verdict.UNKNOWN}
+    return f"{len(flying)} {'hover on' if stay else 'fly'}"

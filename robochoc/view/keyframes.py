@@ -1,0 +1,84 @@
+"""Key frames: what of a motion's samples a player needs, that goes straight (or turns evenly) from key to key."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+Samples = npt.NDArray[np.float64]
+"""Times: (T,). Positions: (T, 3). Attitudes: (T, 4), unit quaternions x, y, z, w."""
+Keys = npt.NDArray[np.int64]
+"""The numbers of the samples that are kept, in order; always the first and the last."""
+
+_NEARLY_ONE = 1 - 1e-9
+"""Quaternions whose product is more are as good as equal."""
+
+
+def position_keys(times: Samples, positions: Samples, tolerance: float) -> Keys:
+    """The samples to keep so that straight moves between them are never further off a sample than `tolerance`."""
+
+    def off(first: int, last: int, between: Samples) -> Samples:
+        start, end = positions[first], positions[last]
+        line = start + between[:, None] * (end - start)
+        return _lengths(positions[first + 1 : last] - line)
+
+    return _kept(times, off, tolerance)
+
+
+def attitude_keys(times: Samples, attitudes: Samples, tolerance: float) -> Keys:
+    """The same for attitudes, which turn evenly from key to key (slerp); `tolerance` is an angle, in radians."""
+
+    def off(first: int, last: int, between: Samples) -> Samples:
+        turned = slerp(attitudes[first], attitudes[last], between)
+        return angle(turned, attitudes[first + 1 : last])
+
+    return _kept(times, off, tolerance)
+
+
+def slerp(start: Samples, end: Samples, between: Samples) -> Samples:
+    """Attitudes on the shortest turn from `start` to `end`, at the fractions `between` (T,)."""
+    cosine = float(start @ end)
+    if cosine < 0:
+        end, cosine = -end, -cosine
+    if cosine > _NEARLY_ONE:
+        turned = start + between[:, None] * (end - start)
+        return np.asarray(turned / _lengths(turned)[:, None])
+    whole = np.arccos(cosine)
+    parts = np.sin(np.outer(whole, np.stack([1 - between, between]))) / np.sin(whole)
+    first, last = parts.reshape(2, -1, 1)
+    return np.asarray(first * start + last * end)
+
+
+def angle(one: Samples, other: Samples) -> Samples:
+    """The angles, in radians, between two rows of attitudes."""
+    # By the sine: the cosine of a small angle is 1, whatever it is.
+    apart = np.minimum(_lengths(one - other), _lengths(one + other))
+    return np.asarray(4 * np.arcsin(np.clip(apart / 2, 0, 1)))
+
+
+def _lengths(rows: Samples) -> Samples:
+    return np.asarray(np.sqrt(np.einsum("...c,...c->...", rows, rows)))
+
+
+def _kept(times: Samples, off: Callable[[int, int, Samples], Samples], tolerance: float) -> Keys:
+    """Douglas and Peucker's way: between two keys the sample that is furthest off becomes one, until none is far off.
+
+    D. Douglas, T. Peucker: Algorithms for the reduction of the number of points required to represent a digitized
+    line. Cartographica 10(2), 1973.
+    """
+    keep = {0, len(times) - 1}
+    spans = [(0, len(times) - 1)] if len(keep) > 1 else []
+    while spans:
+        first, last = spans.pop()
+        if last == first + 1:
+            continue
+        between = (times[first + 1 : last] - times[first]) / (times[last] - times[first])
+        errors = off(first, last, between)
+        worst = int(errors.argmax())
+        if errors[worst] > tolerance:
+            middle = first + 1 + worst
+            keep.add(middle)
+            spans += [(first, middle), (middle, last)]
+    return np.array(sorted(keep))

@@ -1,0 +1,91 @@
+"""Flights that were never flown: what tests of the picture show, made without a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from robochoc.outcome import Epoch, Outcome, Verdict
+from robochoc.problem import Domain, Robot, Team, Variable
+from robochoc.ros.flown import Flown, Happening, Stage
+from robochoc.ros.layout import Point
+from robochoc.ros.mission import Mission
+from robochoc.ros.nearest import Nearest
+
+FPS = 30
+LEG_S = 2
+"""How long each leg takes."""
+TILT = 0.1
+"""Radians, by which everybody leans when under way."""
+
+
+def straight(mission: Mission, *, falls: Mapping[int, float] | None = None, obstacles: tuple[Point, ...] = ()) -> Flown:
+    """Everybody goes straight to each goal, all at the same time; who `falls` (since when) drops to the ground."""
+    here = np.array([drone.home for drone in mission.drones], dtype=np.float64).reshape(-1, 3)
+    positions = [here[None]]
+    for leg in mission.legs:
+        there = here.copy()
+        for number, goal in leg.goals.items():
+            there[number] = goal.at
+        part = np.arange(1, FPS * LEG_S + 1) / (FPS * LEG_S)
+        positions.append(here + (part * part * (3 - 2 * part))[:, None, None] * (there - here))
+        here = there
+    flown = _record(mission, np.concatenate(positions), obstacles)
+    for number, since in (falls or {}).items():
+        flown = _fallen(flown, number, since, mission.ground)
+    return flown
+
+
+def _record(mission: Mission, positions: np.ndarray, obstacles: tuple[Point, ...]) -> Flown:
+    times = np.arange(len(positions)) / FPS
+    lean = TILT / 2 * np.sin(np.pi * times / LEG_S) ** 2
+    attitudes = np.zeros((*positions.shape[:2], 4))
+    attitudes[..., 0], attitudes[..., 3] = np.sin(lean)[:, None], np.cos(lean)[:, None]
+    return Flown(
+        names=tuple(drone.name for drone in mission.drones),
+        times=times,
+        positions=positions,
+        attitudes=attitudes,
+        stages=tuple(
+            Stage(leg.opened_by, LEG_S * number, LEG_S * (number + 1)) for number, leg in enumerate(mission.legs)
+        ),
+        happenings=(),
+        errors_m=np.zeros(positions.shape[1]),
+        nearest=Nearest(0.98, 0, 1, 1.0),
+        nearest_fallen=None,
+        distance=0.5,
+        obstacles=obstacles,
+        wall_s=0.0,
+    )
+
+
+def _fallen(flown: Flown, number: int, since: float, ground: float) -> Flown:
+    positions, errors = flown.positions.copy(), flown.errors_m.copy()
+    after = flown.times >= since
+    height = positions[after][0, number, 2] - 4.9 * (flown.times[after] - since) ** 2
+    positions[after, number] = positions[after][0, number]
+    positions[after, number, 2] = np.maximum(height, ground)
+    errors[number] = np.nan
+    stopped = Happening(since, number, "motor 2 stopped")
+    return replace(flown, positions=positions, errors_m=errors, happenings=(*flown.happenings, stopped))
+
+
+def five() -> Team:
+    """A team of five, one drone each."""
+    domain = Domain("D", (range(1, 6),))
+    return Team("watch", tuple(Robot(f"R{place}.1", (Variable(f"V{place}.1", domain),)) for place in range(1, 6)))
+
+
+def epochs_of_three(team: str = "watch") -> Outcome:
+    """What `five` decide: the first knows no place yet; the fifth leaves, and there is no solution; then there is."""
+    everybody = five().order
+    places = {f"V{place}.1": place for place in range(2, 6)}
+    last = {"V1.1": 1, "V2.1": 4, "V3.1": 3, "V4.1": 4}
+    epochs = (
+        Epoch(Verdict.SOLUTION, everybody, assignment=places),
+        Epoch(Verdict.NO_SOLUTION, everybody[:4], "-R5.1"),
+        Epoch(Verdict.SOLUTION, everybody[:4], "V2.1 without <2>", last),
+    )
+    return Outcome(team, "dynabt", "simulator", 0, Verdict.SOLUTION, last, epochs=epochs)
