@@ -11,7 +11,7 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.outcome import Outcome, Verdict
 from robochoc.ros.flight import Conditions, Flown, fly
 from robochoc.ros.mission import Mission, mission_of
-from robochoc.ros.simulation import DT
+from robochoc.ros.quadrotor.simulation import DT
 
 SIZES = (4, 7, 11)
 WIND = Conditions(wind=(3.0, 4.0, 0.0), gusts=1.0)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robochoc.defaults import suits
+from robochoc.epochs import Field
 from robochoc.formats import read_robot, read_team
 from robochoc.observers.events import Observer
 from robochoc.options import Options, Runtime, Withdrawal
@@ -47,11 +48,13 @@ class Problem:
         withdraw: str | None = None,
         settings: Mapping[str, object] = {},
         observer: Observer | None = None,
+        field: Field | None = None,
         **options: Any,  # noqa: ANN401 - the other fields of `Options`, by their names
     ) -> Outcome:
         """Let the robots solve it together; see `robochoc.options.Options` for what else can be said.
 
-        Without a `protocol`, the one that suits the team. Raises what `robochoc.run.solve` raises, and `ValueError` or
+        Without a `protocol`, the one that suits the team. A `field` is told of each answer, and says what changes
+        next (`robochoc.epochs.Field`). Raises what `robochoc.run.solve` raises, and `ValueError` or
         `TypeError` where an option is none. A program that starts processes is to do so below
         `if __name__ == "__main__":`.
         """
@@ -63,7 +66,7 @@ class Problem:
             settings={name: str(value) for name, value in settings.items()},
             **options,
         )
-        return solve(self.team, asked, observer=observer)
+        return solve(self.team, asked, observer=observer, field=field)
 
 
 def load(path: Path | str) -> Problem:

@@ -75,10 +75,18 @@ def changed_by(team: Team, events: int) -> Team:
     """
     now = replace(team, scenario=()) if team.scenario else team
     for event in team.scenario[:events]:
-        for change in event.changes:
-            with suppress(BadChange):
-                now = changed(now, [change])
+        now, _ = possible(now, event.changes)
     return now
+
+
+def possible(team: Team, changes: Iterable[Change]) -> tuple[Team, list[Change]]:
+    """`team` after those of `changes` that it can take, one after the other, and which these are."""
+    taken = []
+    for change in changes:
+        with suppress(BadChange):
+            team = changed(team, [change])
+            taken.append(change)
+    return team, taken
 
 
 def described(change: Change) -> str:

@@ -3,6 +3,8 @@
 An epoch ends when its problem is solved, when the scenario's next event comes, or when robots are lost. What changes
 the problem opens the next one. A protocol that can (`DynamicProtocol`) goes on with what still stands; any other
 begins anew, so that the two can be compared.
+
+What is to come may be known from the beginning, as a scenario, or be told epoch by epoch, by a `Field`.
 """
 
 from __future__ import annotations
@@ -13,21 +15,30 @@ from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
-from robochoc.change import BadChange, changed, changed_by, concerns, described, rejoined, without
+from robochoc.change import BadChange, changed, changed_by, concerns, described, possible, rejoined, without
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.formats import InvalidInput, read_robot
 from robochoc.observers.events import Began, Observer
 from robochoc.observers.given import TeamWriter
 from robochoc.orders import reordered
+from robochoc.outcome import Epoch as Answered
 from robochoc.outcome import Verdict
-from robochoc.problem import AddAgent, Event, Robot, Team
+from robochoc.problem import AddAgent, Change, Event, Robot, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.explanation import Void, void
 from robochoc.solver.part import NO_BRIEF, Brief
 
 Compile = Callable[[Team], Mapping[str, CompiledDomain]]
+
+Field = Callable[[Team, Answered, float | None], Event | None]
+"""Where decisions go and changes come from, while the team waits: the robots' surroundings.
+
+It is given each epoch's team and how that epoch ended, once the answer was held against every constraint, and how many
+seconds there are left (None: no limit; 0: nothing that comes is heeded any more). It says what happens next, or None:
+nothing. An event of its own comes after those of the files; changes in it that cannot be are passed over.
+"""
 
 
 class Played(NamedTuple):
@@ -105,6 +116,7 @@ class Journey:
         self._spares = spares
         self._brief = brief
         self._lossy = False
+        self._loose = False
 
     def arranged(self) -> Team:
         """The team as the robots see it: in the order of the run. Raises `CannotTurn`."""
@@ -124,7 +136,7 @@ class Journey:
             if result.lost:
                 fresh = self._back_after(result.lost)
                 opened = _loss(result.lost, fresh)
-            elif self._next is None or (result.verdict is Verdict.UNKNOWN and self._is_over):
+            elif self._next is None or (result.verdict is Verdict.UNKNOWN and self.is_over):
                 return
             else:
                 opened = self._described(self._next)
@@ -138,7 +150,7 @@ class Journey:
     def _search(self, session: Session) -> RunResult:
         if not self.team.robots:  # all have left, and others may come: nobody is against it
             return RunResult.of(Verdict.SOLUTION, None, {}, (), 0)
-        if self._is_over:
+        if self.is_over:
             return RunResult.of(Verdict.UNKNOWN, None, {}, (), 0)
         limits = [self._messages, self._next.after if self._next else None]
         enough = min((limit for limit in limits if limit is not None), default=None)
@@ -153,9 +165,14 @@ class Journey:
         return self._files.scenario[self._happened] if self._happened < len(self._files.scenario) else None
 
     @property
-    def _is_over(self) -> bool:
+    def is_over(self) -> bool:
         """Whether the time is over, or all messages have been sent."""
         return self._left_s() == 0 or (self._messages is not None and self._messages <= 0)
+
+    def expect(self, event: Event) -> None:
+        """`event` will happen, too, after all that is known to come. What of it cannot be is left out then."""
+        self._files = replace(self._files, scenario=(*self._files.scenario, event))
+        self._loose = True
 
     def leave(self, lost: Collection[str]) -> None:
         """The robots `lost` are out for good."""
@@ -165,14 +182,21 @@ class Journey:
     def _described(self, event: Event) -> str:
         """What of `event` can still happen, in a few words."""
         out = set(self.withdrawn)
-        words = [described(change) for change in event.changes if out.isdisjoint(concerns(self._full, change))]
+        changes = possible(self._full, event.changes)[1] if self._loose else event.changes
+        words = [described(change) for change in changes if out.isdisjoint(concerns(self._full, change))]
         return ", ".join(words) or "nothing"
 
     def _added_by(self, event: Event) -> Collection[str]:
         """Let `event` happen; returns who comes. After losses, what cannot be any more is left out."""
         self._happened += 1
-        self._full = changed_by(self._files, self._happened) if self._lossy else changed(self._full, event.changes)
-        return [change.robot.name for change in event.changes if isinstance(change, AddAgent)]
+        changes: Sequence[Change] = event.changes
+        if self._lossy:
+            self._full = changed_by(self._files, self._happened)
+        elif self._loose:
+            self._full, changes = possible(self._full, changes)
+        else:
+            self._full = changed(self._full, changes)
+        return [change.robot.name for change in changes if isinstance(change, AddAgent)]
 
     def _back_after(self, lost: Mapping[str, str]) -> Collection[str]:
         """Those of `lost` that come back; the others are out."""

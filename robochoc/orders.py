@@ -82,6 +82,14 @@ def order_of(team: Team, order: Order, seed: int = 0) -> tuple[str, ...]:
     return names
 
 
+def favourable(team: Team) -> Team:
+    """`team` in an order that soon shows who has to step aside, if it can be turned around."""
+    try:
+        return in_order(team, Order.DOM_DEG)
+    except CannotTurn:
+        return team
+
+
 def neighbours(team: Team) -> Graph:
     """For each robot those that share a constraint with it, and those that the files link to it without one."""
     near: dict[str, set[str]] = {robot.name: set() for robot in team.robots}

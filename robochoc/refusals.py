@@ -7,7 +7,7 @@ from collections.abc import Callable
 from robochoc.change import changed_by
 from robochoc.communication.host import BadSettings, settings_of
 from robochoc.observers.objective import aside_cost
-from robochoc.options import Options, Runtime, ScheduleName, Withdrawal
+from robochoc.options import CENTRAL, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.problem import Kind, Model, Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
@@ -74,6 +74,19 @@ def refuse_central(team: Team, options: Options) -> None:
         raise Unsupported(
             "--withdraw maximal is settled by the robots, in priority order; the central judge finds the fewest"
             " (--withdraw fewest)"
+        )
+
+
+def refuse_field(team: Team, options: Options) -> None:
+    """Raise `Unsupported` for what cannot be had of a problem that changes with its robots' situation."""
+    asked = {
+        "--protocol central": options.protocol == CENTRAL,
+        "--withdraw": options.withdraw is not None,
+        "--runtime network": options.runtime is Runtime.NETWORK,
+    }
+    for option in (name for name, given in asked.items() if given):
+        raise Unsupported(
+            f"{team.name} is to change with its robots' situation; {option} is for problems that do not change so"
         )
 
 

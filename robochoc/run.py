@@ -17,18 +17,18 @@ from robochoc.communication.session import Session
 from robochoc.communication.simulator import Simulation
 from robochoc.communication.timed import Timed
 from robochoc.defaults import FIRST_FIT, MINIMISES
-from robochoc.epochs import Announcer, Journey, Opening, Played
+from robochoc.epochs import Announcer, Field, Journey, Opening, Played
 from robochoc.observers.checker import has_local_solution
 from robochoc.observers.events import Observer
 from robochoc.observers.objective import aside_cost
 from robochoc.opinion import contradiction, decided, total_cost
 from robochoc.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
-from robochoc.orders import CannotTurn, Order, in_order, order_of
+from robochoc.orders import CannotTurn, Order, favourable, order_of
 from robochoc.outcome import Epoch, Metrics, Outcome, Verdict
 from robochoc.problem import INFINITE, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
-from robochoc.refusals import instead, refuse_central, refuse_unfit
+from robochoc.refusals import instead, refuse_central, refuse_field, refuse_unfit
 from robochoc.registry import protocol_named, spoken
 from robochoc.solver.ace import AceProcess, SolverTimeout
 from robochoc.solver.cache import SolutionCache
@@ -48,15 +48,19 @@ def solve(
     observer: Observer | None = None,
     progress: Callable[[Progress], None] | None = None,
     solver: AceProcess | None = None,
+    field: Field | None = None,
 ) -> Outcome:
     """Let `team` solve its problem, epoch by epoch if it changes, and hold each answer against every constraint.
 
-    Who solves many teams may lend a `solver` that stays warm between them. When a limit is reached, the verdict is
+    Who solves many teams may lend a `solver` that stays warm between them. A `field` is told of each epoch's answer,
+    and says what happens next: the problem changes over time. When a limit is reached, the verdict is
     `unknown`. Raises `UnknownProtocol`, `Unsupported`, `RobotsLost` (processes), `CompileFailed` and `SolverLost`
     (the constraint solver), `SolverMissing`, and `Refuted` when a second opinion does not agree.
     """
     try:
-        run = _Run(team, options, observer, progress, solver)
+        if field:
+            refuse_field(team, options)
+        run = _Run(team, options, observer, progress, solver, field)
         return run.centrally() if options.protocol == CENTRAL else run.distributed()
     except CannotTurn as refused:
         raise Unsupported(str(refused)) from None
@@ -76,8 +80,11 @@ class _Run:
         observer: Observer | None,
         progress: Callable[[Progress], None] | None,
         solver: AceProcess | None,
+        field: Field | None,
     ) -> None:
         self._team = team
+        self._field = field
+        self._dynamic = team.dynamic or field is not None
         self._solver = solver
         self._options = options
         self._observer = observer
@@ -128,7 +135,7 @@ class _Run:
             return self._placed(self._outcome, journey, protocol)
         domains = self._domains(journey.team)
         alone = next((name for name, domain in domains.items() if not domain.values), None)
-        if alone is None or self._team.dynamic:
+        if alone is None or self._dynamic:
             lost = self._play(journey, protocol, domains)
             if lost:
                 raise RobotsLost(lost)
@@ -166,8 +173,16 @@ class _Run:
         with self._session(protocol, journey.arranged(), domains) as session:
             for played in journey.go(session, lambda opening: self._announce(protocol, opening, session)):
                 self._epochs.append(self._epoch(played, protocol.traits))
+                self._tell_field(journey)
                 lost = played.result.lost
         return lost
+
+    def _tell_field(self, journey: Journey) -> None:
+        """The field, if there is one, is told of the last epoch; what it says will happen."""
+        left_s = 0 if journey.is_over else self._left_s()
+        event = self._field(journey.team, self._epochs[-1], left_s) if self._field else None
+        if event:
+            journey.expect(event)
 
     def _placed(self, outcome: Outcome, journey: Journey, protocol: type[Protocol]) -> Outcome:
         """Who finds a place among those that are left, as `protocol` has it; the others step aside.
@@ -180,7 +195,7 @@ class _Run:
         while True:
             team = journey.arranged()
             if outcome.placed_by == MINIMISES and self._options.order is None:
-                team = _favourable(team)
+                team = favourable(team)
             self._announce(protocol, Opening.of(team, brief))
             domains = self._domains(team)
             with self._session(protocol, team, domains, brief) as session:
@@ -240,7 +255,7 @@ class _Run:
         if not self._epochs:
             return replace(self._outcome, metrics=Metrics(compile_s=self._compile_s))
         total = sum((epoch.metrics for epoch in self._epochs), Metrics())
-        several = len(self._epochs) > 1 or self._team.dynamic
+        several = len(self._epochs) > 1 or self._dynamic
         outcome = self._told(replace(self._epochs[-1], metrics=total))
         return replace(outcome, epochs=tuple(self._epochs) if several else ())
 
@@ -312,7 +327,7 @@ class _Run:
                     raise _TimeOver(f"the time (--timeout) was over while {robot.name} was compiled") from None
                 solved = solved or compilation.source is not Source.DIRECT
                 domains[robot.name] = compilation.domain
-                if not compilation.domain.values and self._options.withdraw is None and not self._team.dynamic:
+                if not compilation.domain.values and self._options.withdraw is None and not self._dynamic:
                     break
         if solved:
             self._compile_s += time.monotonic() - began
@@ -368,14 +383,6 @@ def _without(outcome: Outcome, journey: Journey) -> Outcome:
     """`outcome`, without the robots that were lost on the way."""
     lost = tuple(journey.withdrawn)
     return replace(outcome, withdrawn=lost, lost=lost)
-
-
-def _favourable(team: Team) -> Team:
-    """`team` in an order that soon shows who has to step aside, if it can be turned around."""
-    try:
-        return in_order(team, Order.DOM_DEG)
-    except CannotTurn:
-        return team
 
 
 def _schedule(options: Options) -> Schedule:

@@ -16,7 +16,7 @@ from typing import Any, Self
 
 import pytest
 
-from robochoc.ros.rospy_node import RospySink
+from robochoc.ros.live.rospy_node import RospySink
 from robochoc.ros.sink import SinkFailed
 
 PACKAGES = (

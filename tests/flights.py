@@ -9,10 +9,10 @@ import numpy as np
 
 from robochoc.outcome import Epoch, Outcome, Verdict
 from robochoc.problem import Domain, Robot, Team, Variable
-from robochoc.ros.flown import Flown, Happening, Stage
 from robochoc.ros.layout import Point
 from robochoc.ros.mission import Mission
-from robochoc.ros.nearest import Nearest
+from robochoc.ros.quadrotor.flown import Flown, Happening, Stage
+from robochoc.ros.quadrotor.nearest import Nearest
 
 FPS = 30
 LEG_S = 2

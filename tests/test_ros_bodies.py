@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robochoc.ros.airframe import GRAVITY, HUMMINGBIRD, Airframe, Array
-from robochoc.ros.bodies import Bodies
-from robochoc.ros.control import Controller
 from robochoc.ros.layout import Point
-from robochoc.ros.simulation import DT
-from robochoc.ros.timetable import plan
+from robochoc.ros.quadrotor.airframe import GRAVITY, HUMMINGBIRD, Airframe, Array
+from robochoc.ros.quadrotor.bodies import Bodies
+from robochoc.ros.quadrotor.control import Controller
+from robochoc.ros.quadrotor.simulation import DT
+from robochoc.ros.routes.timetable import plan
 
 CALM = np.zeros((3, 1))
 OFF = np.zeros((4, 1))

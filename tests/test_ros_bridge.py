@@ -17,9 +17,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbridge_server import Manner, Server
 
-from robochoc.ros import rosbridge
-from robochoc.ros.inbox import Inbox
-from robochoc.ros.rosbridge import Address, Malformed, RosbridgeSink, RosbridgeSource, incoming, outgoing
+from robochoc.ros.live import rosbridge
+from robochoc.ros.live.inbox import Inbox
+from robochoc.ros.live.rosbridge import Address, Malformed, RosbridgeSink, RosbridgeSource, incoming, outgoing
 from robochoc.ros.sink import SinkFailed
 from robochoc.ros.source import Heard, SourceFailed
 
@@ -247,7 +247,7 @@ def test_a_server_that_dies_wakes_who_waits(server: Server) -> None:
 
 PROGRAM = """
 import sys
-from robochoc.ros.rosbridge import RosbridgeSink, RosbridgeSource
+from robochoc.ros.live.rosbridge import RosbridgeSink, RosbridgeSource
 from robochoc.ros.sink import SinkFailed
 source = RosbridgeSource(sys.argv[1])
 source.listen({"/a": "std_msgs/String"})

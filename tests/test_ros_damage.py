@@ -25,10 +25,10 @@ from ros_recordings import (
 )
 from rosbags.rosbag1 import Writer as BagWriter
 
-from robochoc.ros import recording
+from robochoc.ros.recordings import recording
+from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sinks import open_source
 from robochoc.ros.source import SourceFailed
-from robochoc.ros.types import types_of
 
 
 @pytest.fixture(autouse=True)
@@ -191,7 +191,7 @@ def test_bombs_are_refused_and_eat_no_memory(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_file_larger_than_it_says_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robochoc.ros.mcap_file._CHUNK_BYTES", 500)
+    monkeypatch.setattr("robochoc.ros.recordings.mcap_file._CHUNK_BYTES", 500)
     file = write(FILES[0], messages(200))
     monkeypatch.setattr(recording, "WAITING_AT_MOST", 1000)
     with pytest.raises(SourceFailed, match="out of order"):

@@ -15,9 +15,9 @@ from ros_recordings import FILES, TOPICS, messages, read, write
 from robochoc.problem import Topic
 from robochoc.ros.mission import Drone
 from robochoc.ros.publisher import Publisher
+from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sinks import open_sink
 from robochoc.ros.source import SourceFailed
-from robochoc.ros.types import types_of
 
 pytestmark = pytest.mark.slow
 

@@ -64,7 +64,7 @@ rospy.sleep(1)
 
 SOURCE = """
 import json, sys
-from robochoc.ros.rospy_node import RospySource
+from robochoc.ros.live.rospy_node import RospySource
 with RospySource("") as source:
     source.listen({
         "/drone1_1/blocked": "geometry_msgs/PointStamped",

@@ -33,10 +33,10 @@ from rosbags.rosbag1 import Reader as BagReader
 from rosbags.rosbag1 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
 
-from robochoc.ros.mcap_file import NAMES
+from robochoc.ros.recordings.mcap_file import NAMES
+from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sink import SinkFailed
 from robochoc.ros.sinks import NoSuchSink, NoSuchSource, open_sink, open_source
-from robochoc.ros.types import types_of
 
 
 @pytest.fixture(autouse=True)
@@ -108,7 +108,7 @@ def test_rosbags_reads_a_bag() -> None:
 
 @pytest.mark.parametrize("text", FILES)
 def test_messages_come_in_the_order_of_their_times(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robochoc.ros.mcap_file._CHUNK_BYTES", 500)
+    monkeypatch.setattr("robochoc.ros.recordings.mcap_file._CHUNK_BYTES", 500)
     said = messages(300)
     shuffled = random.Random(3).sample(said, len(said))
     write(text, shuffled)
@@ -288,7 +288,7 @@ def test_sinks_that_there_are_not(text: str, told: str) -> None:
 
 
 def test_an_extra_that_is_not_installed_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, "robochoc.ros.mcap_file", raising=False)
+    monkeypatch.delitem(sys.modules, "robochoc.ros.recordings.mcap_file", raising=False)
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     with pytest.raises(
         NoSuchSink, match=r"mcap needs mcap.writer, which is not installed: pip install 'robochoc\[mcap\]'"

@@ -11,12 +11,12 @@ import pytest
 
 from robochoc.generators.queens3d import queens3d
 from robochoc.outcome import Outcome, Verdict
-from robochoc.ros.airframe import GRAVITY
 from robochoc.ros.flight import Conditions, Failure, Flight, Flown, fly
 from robochoc.ros.layout import Point
 from robochoc.ros.mission import Goal, Mission, mission_of
+from robochoc.ros.quadrotor.airframe import GRAVITY
+from robochoc.ros.quadrotor.simulation import DT, Simulation
 from robochoc.ros.reports import Blocked, OutOfOrder
-from robochoc.ros.simulation import DT, Simulation
 
 IN_THE_WIND = (3.0, 4.0, 0.0)
 PAIR = np.array([[0.0, 0, 0], [2, 0, 0]])

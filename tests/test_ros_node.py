@@ -13,8 +13,8 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
 
-from robochoc.ros import rospy_node
-from robochoc.ros.rospy_node import RospySink, RospySource, fields_of, filled, message_class
+from robochoc.ros.live import rospy_node
+from robochoc.ros.live.rospy_node import RospySink, RospySource, fields_of, filled, message_class
 from robochoc.ros.sink import SinkFailed
 from robochoc.ros.source import SourceFailed
 

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mcap_ros2._dynamic import generate_dynamic
 
-from robochoc.ros.definitions import LONGEST, same_fields
 from robochoc.ros.names import REPORTS
-from robochoc.ros.types import BadFields, UnknownType, Version, types_of
+from robochoc.ros.recordings.definitions import LONGEST, same_fields
+from robochoc.ros.recordings.types import BadFields, UnknownType, Version, types_of
 
 POSE = "geometry_msgs/PoseStamped"
 BATTERY = "sensor_msgs/BatteryState"

@@ -17,9 +17,9 @@ from robochoc.ros.mappings import NoMapping, WaypointMapping, kinds, mapping_for
 from robochoc.ros.mission import Drone, Goal, Leg
 from robochoc.ros.names import REPORTS
 from robochoc.ros.publisher import NothingToPublish, Publisher
+from robochoc.ros.recordings.types import UnknownType, types_of
 from robochoc.ros.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.ros.sink import Fields, Sink
-from robochoc.ros.types import UnknownType, types_of
 from robochoc.ros.waypoint import Waypoint
 
 POSE = "geometry_msgs/PoseStamped"

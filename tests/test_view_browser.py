@@ -18,8 +18,8 @@ from flights import LEG_S, epochs_of_three, five, straight
 from PIL import Image
 from sniffer_pages import CONTRAST, NAMELESS, until
 
-from robochoc.ros.flown import Flown
 from robochoc.ros.mission import mission_of
+from robochoc.ros.quadrotor.flown import Flown
 from robochoc.view.page import page
 from robochoc.view.scene import Scene, scene_of
 

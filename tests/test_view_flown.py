@@ -23,10 +23,10 @@ from program import robochoc
 from robochoc.formats import write_team
 from robochoc.formats.result import result_json
 from robochoc.outcome import Outcome, Verdict
-from robochoc.ros.conditions import Conditions, Failure
 from robochoc.ros.flight import fly
-from robochoc.ros.flown import Happening
 from robochoc.ros.mission import Mission, mission_of
+from robochoc.ros.quadrotor.conditions import Conditions, Failure
+from robochoc.ros.quadrotor.flown import Happening
 from robochoc.view import scene as scenes
 from robochoc.view.film import Look
 from robochoc.view.keyframes import angle, attitude_keys, position_keys, slerp

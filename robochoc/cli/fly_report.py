@@ -26,7 +26,10 @@ def as_planned(flown: Flown) -> bool:
 def report(mission: Mission, flown: Flown) -> str:
     """Leg by leg, then who has arrived, how near they came, and how fast it was simulated."""
     lines = [f"{on_one_line(mission.team)}: {_verdict(mission, flown)}", *_legs(mission, flown)]
-    lines += [f"  {happening.at_s:6.1f} s  {_name(flown, happening.drone)}: {happening.what}" for happening in flown.happenings]
+    lines += [
+        f"  {happening.at_s:6.1f} s  {_name(flown, happening.drone)}: {happening.what}"
+        for happening in flown.happenings
+    ]
     lines += [f"  {line}" for line in (_arrival(flown), _apart(flown), _speed(flown))]
     return "\n".join(lines)
 

@@ -14,6 +14,14 @@ if TYPE_CHECKING:
 REFRESH_S = 0.1
 
 
+def waiting(show: Callable[[Progress], None]) -> Callable[[], None]:
+    """What tells of time that goes by while the robots have nothing to report: for whoever waits to call."""
+    from robochoc.communication.run_result import Progress
+
+    began = time.monotonic()
+    return lambda: show(Progress(0, time.monotonic() - began, "the robots may report"))
+
+
 @contextmanager
 def progress_line(team: str) -> Iterator[Callable[[Progress], None] | None]:
     """A function that shows how far the run has come, while it lasts; None where stderr is no terminal.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from robochoc.cli.local import limits, local_options
 from robochoc.cli.network import PlaceType, network_failures_told
 from robochoc.cli.paths import InputPath
 from robochoc.cli.progress import progress_line
+from robochoc.cli.ros import outlets, ros_options
 
 if TYPE_CHECKING:
     from robochoc.machines.place import Place
@@ -48,6 +50,7 @@ if TYPE_CHECKING:
     help="Let the master's journal, and so who may sniff, have all that this robot says and hears.",
 )
 @local_options
+@ros_options
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
 @click.pass_context
 def robot(
@@ -74,7 +77,7 @@ def robot(
         from robochoc.solver.cache import SolutionCache
         from robochoc.solver.compile import Compiler
 
-        with progress_line(file.stem) as progress:
+        with progress_line(file.stem) as progress, ExitStack() as stack:
             began = _seconds()
 
             def stage(words: str) -> None:
@@ -82,22 +85,26 @@ def robot(
                     progress(Progress(0, _seconds() - began, words))
 
             itself = read_robot(file)  # before its token is spent
+            published = stack.enter_context(outlets(itself, given))
             stage(f"looking for the master at {place}")
             proof = identity_of(file.stem, place, identity, token, given["patience"])
             manner = Manner(given["patience"], sniffed=given["sniff"], stage=stage)
             cache = None if given["no_cache"] else SolutionCache()
             with Compiler(limits(given["local_solutions"], given["local_timeout"]), cache) as compiler:
                 ending = join(itself, place, proof, manner, compiler)
-        if ending.failed:
-            raise Failure(LOST, f"{file.stem}: {ending.why}")
+            if ending.failed:
+                raise Failure(LOST, f"{file.stem}: {ending.why}")
+            told = published(ending.why, ending.assignment)
         if as_json:
             import msgspec
 
-            told = {"robot": file.stem, "outcome": ending.why, "assignment": ending.assignment}
-            click.echo(msgspec.json.encode(told).decode())
+            result = {"robot": file.stem, "outcome": ending.why, "assignment": ending.assignment}
+            click.echo(msgspec.json.encode(result).decode())
         else:
             decision = ", ".join(f"{name} = {value}" for name, value in ending.assignment.items())
             click.echo(f"{file.stem}: {ending.why}; {decision or 'no value'}")
+            for line in told:
+                click.echo(line, err=True)
     context.exit(LIMIT if ending.why.startswith("unknown") else 0)
 
 

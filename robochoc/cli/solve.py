@@ -16,6 +16,15 @@ from robochoc.cli.local import limits, local_options
 from robochoc.cli.order import GIVEN, OrderName, order_for
 from robochoc.cli.paths import InputPath, OutputFile
 from robochoc.cli.recording import recording, shown_and_flushed
+from robochoc.cli.ros import (
+    check_ros,
+    flight_options,
+    looped,
+    ros_asked,
+    ros_options,
+    situation_options,
+    told_of,
+)
 from robochoc.cli.solve_settings import (
     WITHDRAWALS,
     Products,
@@ -32,6 +41,7 @@ if TYPE_CHECKING:
     from robochoc.observers.objective import Objective
     from robochoc.outcome import Outcome
     from robochoc.problem import Team
+    from robochoc.ros.loop import Loop
     from robochoc.run import Options
 
 
@@ -159,6 +169,9 @@ if TYPE_CHECKING:
     help="Have a no-solution or a least cost confirmed by the central judge, on all files merged: two ways must agree.",
 )
 @local_options
+@ros_options
+@situation_options
+@flight_options
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a team, and nothing else, on standard output.")
 @click.option(
     "--html",
@@ -201,7 +214,9 @@ def solve(
     """
     from robochoc.run import OnLoss, Options, Runtime, ScheduleName, Withdrawal
 
+    ros = ros_asked(settings)
     check_settings(settings)
+    check_ros(ros, settings)
     if explain and as_json:
         raise click.UsageError("--explain is for people; the JSON result has the tree without it")
     withdraw = settings.pop("withdraw")
@@ -230,9 +245,11 @@ def solve(
         raise click.UsageError("--count gives a number: there is nothing for --html, --journal, --serve or --sniff")
     if serve and products.watching:
         raise click.UsageError("--serve and --sniff both stay until Ctrl-C; the page of --sniff shows the scene, too")
+    if ros and len(folders) > 1:
+        raise click.UsageError(f"--ros and --situation are for one team; {len(folders)} were found")
     if products and len(folders) > 1:
         raise click.UsageError(f"--html, --journal, --serve and --sniff are for one team; {len(folders)} were found")
-    wanted = Wanted(protocol, order, as_json=as_json, explain=explain)
+    wanted = Wanted(protocol, order, as_json=as_json, explain=explain, ros=ros)
     for folder in folders:
         statuses.append(_solve_one(folder, options, products, wanted))
     context.exit(worst(statuses))
@@ -271,12 +288,21 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
             protocol = wanted.protocol or suits(team.kind)
             options = replace(options, protocol=protocol, order=order_for(team, wanted.order))
             header = partial(_header, team, options)
-            with recording(products.journal, header, _objective(team, options), watch.begun()) as recorder:
-                outcome = _run(team, options, recorder)
+            objective = None if wanted.ros.situation else _objective(team, options)
+            with (
+                looped(wanted.ros, team, options.seed) as loop,
+                recording(products.journal, header, objective, watch.begun()) as recorder,
+            ):
+                outcome = _run(team, options, recorder, loop)
+                team = loop.team if loop else team
                 _tell(team, outcome, wanted)
+                if loop and loop.mission is None:  # the run knew nothing of it
+                    loop.publish(outcome)
     except Failure as failure:
         failure.show()
         return failure.exit_code
+    for line in told_of(loop) if loop and not wanted.as_json else ():
+        click.echo(line, err=True)
     _show(team, outcome, products, quiet=wanted.as_json)
     if outcome.verdict != "unknown":
         return 0
@@ -285,13 +311,18 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     return LIMIT
 
 
-def _run(team: Team, options: Options, recorder: Recorder | None) -> Outcome:
-    """Run with whatever watches: a journal, a line on the terminal."""
-    from robochoc.cli.progress import progress_line
+def _run(team: Team, options: Options, recorder: Recorder | None, loop: Loop | None) -> Outcome:
+    """Run with whatever watches, a journal, a line on the terminal, and where decisions go."""
+    from robochoc.cli.progress import progress_line, waiting
+    from robochoc.run import CENTRAL
     from robochoc.run import solve as run
 
+    told = loop and (loop.senses or (team.dynamic and options.protocol != CENTRAL))
     with progress_line(team.name) as progress:
-        outcome = run(team, options, observer=recorder, progress=shown_and_flushed(recorder, progress))
+        show = shown_and_flushed(recorder, progress)
+        if loop and loop.senses and show:
+            loop.senses.idle = waiting(show)
+        outcome = run(team, options, observer=recorder, progress=show, field=loop if told else None)
     if recorder:
         recorder.outcome = outcome
         recorder.close()  # before anything else goes to where it may be written

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from robochoc.cli.order import GIVEN
+from robochoc.cli.ros import Ros
 from robochoc.cli.watching import Watching
 
 WITHDRAWALS = ("fewest", "maximal")
@@ -52,12 +53,13 @@ class Products:
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is asked for of each team: by which protocol (None: by its kind), in which order, and how it is told."""
+    """What is asked for of each team: the protocol (None: by its kind), the order, how it is told, and where."""
 
     protocol: str | None
     order: str | Path
     as_json: bool
     explain: bool
+    ros: Ros
 
 
 def protocol_settings(given: Iterable[str]) -> dict[str, str]:

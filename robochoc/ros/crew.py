@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product, zip_longest
 from math import prod
 
-from robochoc.expression import Expression, Undefined, evaluate
+from robochoc.expression import Expression, Undefined, evaluate, names
 from robochoc.outcome import Outcome, Verdict
 from robochoc.problem import Assignment, Robot, Team, Topic, natural
 
@@ -38,6 +38,8 @@ class Craft:
     """Who decides about it; empty where only a variable is known."""
     topic: Topic | None = None
     """Where its decisions are published, if its file says so."""
+    decided_by: tuple[str, ...] = field(default=(), compare=False)
+    """The variables on which its place depends."""
 
 
 def crew_of(outcome: Outcome, team: Team | None = None) -> tuple[Craft, ...]:
@@ -101,7 +103,17 @@ def _craft(
     if known and not withdrew:
         height = _value(topic.z, values) if topic else None
         level = known[0] if height is None else height
-    return Craft(name, next(filter(None, cells), None), level, withdrew, topic=topic)
+    decided_by = _decided_by(topic, variables)
+    return Craft(name, next(filter(None, cells), None), level, withdrew, topic=topic, decided_by=decided_by)
+
+
+def _decided_by(topic: Topic | None, variables: Sequence[str]) -> tuple[str, ...]:
+    """The variables in the coordinates that `topic` gives, and the one that is the level where it gives none."""
+    across = [topic.x, topic.y] if topic else []
+    height = topic.z if topic else None
+    given = [*(across if None not in across else []), height]
+    found = [name for expression in given if expression is not None for name in names(expression)]
+    return tuple(dict.fromkeys([*found, *(variables[:1] if height is None else [])]))
 
 
 def _sent(topic: Topic, values: Assignment) -> Cell | None:

@@ -8,7 +8,7 @@ What may happen on the way:
 - An obstacle, a point, is where nobody expected it: nearer than `KEEP_M` to somebody's goal (or than the planned
   distance, if that is more). Of these the planner knows nothing before one is seen; all others it avoids. Whoever is
   about to come so near to one sees it from `SIGHT_M` away at the latest: what is to be kept, the way on which the
-  common clock stops (`course.py`), and `_LOOK_M` for tracking and for looking only at samples.
+  common clock stops (`quadrotor/course.py`), and `_LOOK_M` for tracking and for looking only at samples.
 - Somebody cannot follow: no leg waits for it longer than `SETTLING_S` after its plan is over.
 """
 
@@ -20,19 +20,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from robochoc.ros.airframe import Array
-from robochoc.ros.conditions import Conditions, Failure
-from robochoc.ros.course import STOP_S, Course
-from robochoc.ros.flown import SAMPLES_A_SECOND, Flown, Happening, Stage
 from robochoc.ros.mission import Goal, Mission
-from robochoc.ros.motion import Limits
-from robochoc.ros.nearest import Nearest
-from robochoc.ros.obstacles import Threat, threats
+from robochoc.ros.quadrotor.airframe import Array
+from robochoc.ros.quadrotor.conditions import Conditions, Failure
+from robochoc.ros.quadrotor.course import STOP_S, Course
+from robochoc.ros.quadrotor.flown import SAMPLES_A_SECOND, Flown, Happening, Stage
+from robochoc.ros.quadrotor.nearest import Nearest
+from robochoc.ros.quadrotor.obstacles import Threat, threats
+from robochoc.ros.quadrotor.simulation import DT, Simulation
+from robochoc.ros.quadrotor.spots import gaps, nearest_two
+from robochoc.ros.quadrotor.targets import Hazards, Targets, check_apart, waits
 from robochoc.ros.reports import Blocked, OutOfOrder, Report
-from robochoc.ros.simulation import DT, Simulation
-from robochoc.ros.spots import gaps, nearest_two
-from robochoc.ros.targets import Hazards, Targets, check_apart, waits
-from robochoc.ros.timetable import plan
+from robochoc.ros.routes.motion import Limits
+from robochoc.ros.routes.timetable import plan
 
 __all__ = ["Conditions", "Failure", "Flight", "Flown", "Happening", "Nearest", "Stage", "fly"]
 

@@ -22,6 +22,9 @@ class Sink(ABC):
     `place` is what stands behind its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SinkFailed`.
     """
 
+    live: bool = True
+    """Whether robots may hear what is published. A recording only keeps it."""
+
     def __init__(self, place: str) -> None:
         self.place = place
 

@@ -29,6 +29,9 @@ class Source(ABC):
     `place` is what stands behind its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SourceFailed`.
     """
 
+    live: bool = True
+    """Whether messages come as time goes by. A recording has them all: there is nothing to wait for."""
+
     def __init__(self, place: str) -> None:
         self.place = place
 

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from robochoc.outcome import Verdict
-from robochoc.ros.flown import Flown, Happening
 from robochoc.ros.layout import Axis, Point
 from robochoc.ros.mission import Leg, Mission
+from robochoc.ros.quadrotor.flown import Flown, Happening
 
 _HIT = "hits the ground"
 """What the flight says in the end of one that falls."""

@@ -13,9 +13,9 @@ import numpy as np
 from robochoc.outcome import Outcome, Verdict
 from robochoc.problem import Team
 from robochoc.ros.flight import fly
-from robochoc.ros.flown import Flown
 from robochoc.ros.layout import Axis, Point
 from robochoc.ros.mission import Goal, Mission, mission_of
+from robochoc.ros.quadrotor.flown import Flown
 from robochoc.view.film import Film, fell, film_of, in_cells, roomy
 
 _NO_FLIGHT = (ValueError, ArithmeticError, MemoryError)

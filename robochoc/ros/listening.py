@@ -1,0 +1,85 @@
+"""Senses that listen to a source: robots that report over a ROS, or a recording of what they have reported."""
+
+from __future__ import annotations
+
+import time
+
+from robochoc.ros.loop import TOGETHER_S, Senses
+from robochoc.ros.mission import Cast, Leg
+from robochoc.ros.reading import Reading
+from robochoc.ros.reports import Report
+from robochoc.ros.source import Source
+
+PATIENCE_S = 10.0
+"""How long a live source is listened to after a decision, where nobody says otherwise."""
+_SLICE_S = 0.2
+"""How often somebody who watches is told that we wait."""
+
+
+class Listening(Senses):
+    """What `source` gives, read by `reading`.
+
+    After each decision a live source has `patience_s` seconds for a report that changes something; then the run is
+    over. A recording is read to its end, as fast as it goes: its messages' times are the clock.
+    """
+
+    def __init__(self, source: Source, reading: Reading, patience_s: float = PATIENCE_S) -> None:
+        self._source = source
+        self._reading = reading
+        self._patience_s = patience_s
+        self._deadline: float | None = None
+        self._held: Report | None = None
+        self._now_ns: int | None = None
+        source.listen(reading.topics)
+        if not source.live:
+            self._held = self._pulled(None)
+
+    @property
+    def notes(self) -> list[str]:
+        """See `Senses.notes`: places in a frame that is not ours."""
+        return [
+            f"places on {topic} are in the frame {frame!r}, and were passed over (--frame says which is ours)"
+            for topic, frame in self._reading.strange.items()
+        ]
+
+    def now_ns(self) -> int:
+        """See `Senses.now_ns`: the wall clock's, or that of the recording."""
+        return time.time_ns() if self._source.live or self._now_ns is None else self._now_ns
+
+    def decided(self, cast: Cast, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - the robots were told
+        """See `Senses.decided`."""
+        limits = [left_s, self._patience_s if self._source.live else None]
+        wait_s = min((limit for limit in limits if limit is not None), default=None)
+        self._deadline = None if wait_s is None else time.monotonic() + wait_s
+
+    def next(self, until_s: float | None) -> Report | None:
+        """See `Senses.next`."""
+        deadline = self._deadline
+        if until_s is not None and self._source.live:
+            soon = time.monotonic() + min(max(until_s - time.time(), 0), TOGETHER_S)
+            deadline = soon if deadline is None else min(soon, deadline)
+        report, self._held = self._held or self._pulled(deadline), None
+        if report is not None and until_s is not None and report.at_s > until_s:
+            self._held = report
+            return None
+        if report is not None:
+            for outlet in self.outlets:
+                outlet.report(report)
+        return report
+
+    def _pulled(self, deadline: float | None) -> Report | None:
+        """The next report that the source gives before the deadline."""
+        while True:
+            left_s = _SLICE_S if deadline is None else min(_SLICE_S, deadline - time.monotonic())
+            if left_s <= 0:
+                return None
+            heard = self._source.next(left_s)
+            if heard is None:
+                if not self._source.live:
+                    return None
+                self.idle()
+                continue
+            self._now_ns = heard.at_ns
+            report = self._reading.report(heard)
+            if report is not None:
+                return report

@@ -1,0 +1,1 @@
+"""A ROS that runs: by rosbridge, or by rospy where that is installed."""

@@ -1,0 +1,1 @@
+"""Recordings of ROS messages, written and read: MCAP files, and bags of ROS 1."""

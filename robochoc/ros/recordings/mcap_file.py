@@ -1,0 +1,257 @@
+"""MCAP files: the container that ROS 2 records into, and that Foxglove opens (mcap.dev/spec).
+
+What is written has the profile `ros2`: messages in CDR, their definitions with them, in chunks packed by zstd. Files of
+the profile `ros1` are read too.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from io import BytesIO
+from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple, TypeVar
+
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel as ChannelRecord
+from mcap.records import Schema
+from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
+
+from robochoc.formats.diagnostics import on_one_line
+from robochoc.ros.mappings import short_kind
+from robochoc.ros.recordings.recorder import Recorder
+from robochoc.ros.recordings.recording import BLOCK_AT_MOST, Block, Channel, Damaged, Recording, as_it_is, from_lz4
+from robochoc.ros.recordings.types import Version, types_of
+from robochoc.ros.sink import Fields, SinkFailed
+from robochoc.ros.source import SourceFailed
+
+NAMES = "robochoc:names"
+"""The metadata record that says what topics are called in the team's files."""
+
+_CHUNK_BYTES = 1 << 20
+_RECORD = struct.Struct("<BQ")
+_MESSAGE = struct.Struct("<HIQQ")
+_CHUNK = struct.Struct("<QQQII")
+_SIZE = struct.Struct("<Q")
+_FOOTER_SIZE = 20
+_CHANNELS_AT_MOST = 0xFFFF
+_DEFINITIONS_AT_MOST = 64
+"""Recordings define a type in one way; each costs time."""
+_ENCODINGS: dict[tuple[str, str], Version] = {("ros2msg", "cdr"): 2, ("ros1msg", "ros1"): 1}
+"""How definitions and messages may be written."""
+
+
+T = TypeVar("T")
+
+
+class McapSink(Recorder):
+    """Writes an MCAP file. The same messages make the same bytes."""
+
+    ending = "mcap:run.mcap"
+    version = 2
+
+    def __init__(self, place: str) -> None:
+        super().__init__(place)
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[tuple[str, str], int] = {}
+        self._sequence: dict[int, int] = {}
+        with self.told():
+            self._writer = Writer(self.file.stream, _CHUNK_BYTES, CompressionType.ZSTD, enable_data_crcs=True)
+            self._writer.start("ros2")
+
+    def explain(self, original: Mapping[str, str]) -> None:
+        """Keep the table in the file, and each name at its topic."""
+        super().explain(original)
+        with self.told():
+            self._writer.add_metadata(NAMES, dict(original))
+
+    def write(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
+        """Append a message."""
+        content = types_of(2).encode(kind, fields)
+        channel = self._channels.get((topic, kind)) or self._channel(topic, kind)
+        self._sequence[channel] = sequence = self._sequence.get(channel, 0) + 1
+        self._writer.add_message(channel, at_ns, content, at_ns, sequence)
+
+    def finish(self) -> None:
+        """Write the index."""
+        self._writer.finish()  # type: ignore[no-untyped-call]
+
+    def _channel(self, topic: str, kind: str) -> int:
+        if len(self._channels) == _CHANNELS_AT_MOST:
+            raise SinkFailed(f"{self.place}: an MCAP file has at most {_CHANNELS_AT_MOST} topics")
+        short = short_kind(kind)
+        if short not in self._schemas:
+            text = types_of(2).definition(short).text
+            name = short.replace("/", "/msg/", 1)
+            self._schemas[short] = self._writer.register_schema(name, "ros2msg", text.encode())
+        metadata = {"original": self.original[topic]} if topic in self.original else {}
+        found = self._writer.register_channel(topic, "cdr", self._schemas[short], metadata)
+        self._channels[topic, kind] = found
+        return found
+
+
+class _Known(NamedTuple):
+    """What is kept of a schema whose type somebody listens to: its encoding, and what is wrong with it."""
+
+    kind: str
+    encoding: str
+    fault: str
+
+
+def _from_zstd(packed: bytes, most: int) -> bytes:
+    """By a stream: what a frame says of its size is not believed."""
+    return zstandard.ZstdDecompressor(max_window_size=BLOCK_AT_MOST).stream_reader(packed).read(most)
+
+
+class McapSource(Recording):
+    """Reads an MCAP file of ROS 2, or of ROS 1, or the one in a folder that ROS 2 has recorded."""
+
+    packings = MappingProxyType({"": as_it_is, "lz4": from_lz4, "zstd": _from_zstd})
+
+    def __init__(self, place: str) -> None:
+        super().__init__(_inside(place))
+
+    def _blocks(self) -> Iterator[Block]:
+        self._schemas: dict[int, _Known | None] = {}
+        self._channels: dict[int, Channel | None] = {}
+        self._faults: dict[tuple[str, str, bytes], str] = {}
+        source = self._input
+        if source.size < len(MCAP0_MAGIC) or source.take(len(MCAP0_MAGIC), "its beginning") != MCAP0_MAGIC:
+            raise Damaged("is no MCAP file")
+        opcode = 0
+        while opcode != Opcode.DATA_END:
+            begin, before = source.at, source.sum
+            opcode, size = _RECORD.unpack(source.take(_RECORD.size, "a record"))
+            match opcode:
+                case Opcode.CHUNK:
+                    yield from self._chunk(begin, source.take(size, "a chunk"))
+                case Opcode.SCHEMA | Opcode.CHANNEL | Opcode.MESSAGE:
+                    body = _RECORD.pack(opcode, size) + source.take(size, "a record")
+                    yield from self._block(body, begin, len(body), "")
+                case Opcode.DATA_END:
+                    (expected,) = _read("<I", source.take(size, "a record"))
+                    if expected not in {0, before}:
+                        raise Damaged("it is damaged: its checksum is another one")
+                case _:
+                    source.skip(size, "a record")
+        self._check_end()
+
+    def _check_end(self) -> None:
+        """An MCAP file ends with a footer and the same bytes as it begins with."""
+        size = _RECORD.size + _FOOTER_SIZE + len(MCAP0_MAGIC)
+        tail = self._input.part(max(0, self._input.size - size), size)
+        if not tail.startswith(_RECORD.pack(Opcode.FOOTER, _FOOTER_SIZE)) or not tail.endswith(MCAP0_MAGIC):
+            raise Damaged("it has no footer: it was not written to its end")
+
+    def _chunk(self, begin: int, content: bytes) -> Iterator[Block]:
+        _, _, size, expected, length = _read(_CHUNK.format, content)
+        place = _CHUNK.size + length + _SIZE.size
+        packing = content[_CHUNK.size : _CHUNK.size + length].decode("ascii", "replace")
+        (packed,) = _read(_SIZE.format, content[_CHUNK.size + length :])
+        if place + packed != len(content):
+            raise Damaged(f"the chunk at byte {begin} has another size than it says")
+        body = self._body(content[place:], packing, size)
+        if expected and zlib.crc32(body) != expected:
+            raise Damaged(f"the chunk at byte {begin} is damaged: its checksum is another one")
+        yield from self._block(body, begin + _RECORD.size + place, packed, packing)
+
+    def _block(self, body: bytes, at: int, size: int, packing: str) -> Iterator[Block]:
+        starts = min((time for _, time, _ in self._messages(body)), default=None)
+        if starts is not None:
+            yield Block(starts, at, size, packing, len(body))
+
+    def _messages(self, body: bytes) -> Iterator[tuple[Channel, int, bytes]]:
+        at = 0
+        while at < len(body):
+            opcode, size = _read(_RECORD.format, body[at : at + _RECORD.size])
+            at += _RECORD.size
+            if size > len(body) - at:
+                raise Damaged("a record does not end where its chunk does")
+            if opcode == Opcode.MESSAGE:
+                number, _, time, _ = _read(_MESSAGE.format, body[at : at + min(size, _MESSAGE.size)])
+                channel = self._channels.get(number)
+                if channel is not None:
+                    if channel.fault:
+                        raise Damaged(f"what stands on {channel.topic} cannot be read: {channel.fault}")
+                    yield channel, time, body[at + _MESSAGE.size : at + size]
+                elif number not in self._channels:
+                    raise Damaged(f"a message belongs to channel {number}, which is not described before it")
+            elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
+                self._describe(opcode, body[at : at + size])
+            at += size
+
+    def _describe(self, opcode: int, content: bytes) -> None:
+        """Keep what is needed of a schema or a channel: whatever they say, no more than a few names."""
+        stream = ReadDataStream(BytesIO(content))
+        try:
+            if opcode == Opcode.SCHEMA:
+                schema = Schema.read(stream)
+                _keep(self._schemas, schema.id, self._known(schema))
+            else:
+                channel = ChannelRecord.read(stream)
+                _keep(self._channels, channel.id, self._heard(channel))
+        except (McapError, struct.error, ValueError) as error:
+            what = "schema" if opcode == Opcode.SCHEMA else "channel"
+            raise Damaged(f"a {what} cannot be read: {type(error).__name__} {error}") from error
+
+    def _known(self, schema: Schema) -> _Known | None:
+        kind = short_kind(schema.name)
+        if kind not in map(short_kind, self._kinds.values()):
+            return None
+        defined = kind, schema.encoding, schema.data
+        if defined not in self._faults:
+            if len(self._faults) == _DEFINITIONS_AT_MOST:
+                raise Damaged(f"it defines what is listened to in more than {_DEFINITIONS_AT_MOST} ways")
+            self._faults[defined] = _fault(*defined)
+        return _Known(kind, schema.encoding, self._faults[defined])
+
+    def _heard(self, channel: ChannelRecord) -> Channel | None:
+        schema = self._schemas.get(channel.schema_id)
+        if schema is None or not self._wanted(channel.topic, schema.kind):
+            return None
+        version = _ENCODINGS.get((schema.encoding, channel.message_encoding))
+        if version is None and not schema.fault:
+            fault = f"its messages are written as {channel.message_encoding[:40]!r}"
+            return Channel(channel.topic, 2, fault)
+        return Channel(channel.topic, version or 2, schema.fault)
+
+
+def _inside(place: str) -> str:
+    """The recording in the folder `place`, or `place`. Raises `SourceFailed`."""
+    if not place or not Path(place).is_dir():
+        return place
+    files = sorted(Path(place).glob("*.mcap"))
+    if not files:
+        hint = "`ros2 bag convert` makes one of what ROS 2 has recorded otherwise"
+        raise SourceFailed(on_one_line(f"{place}: is a folder without an MCAP file: {hint}"))
+    if len(files) > 1:
+        raise SourceFailed(on_one_line(f"{place}: holds several recordings: name one, such as mcap:{files[0]}"))
+    return str(files[0])
+
+
+def _fault(kind: str, encoding: str, text: bytes) -> str:
+    """Why messages of a definition cannot be read; empty if they can."""
+    versions = [version for (known, _), version in _ENCODINGS.items() if known == encoding]
+    if not versions:
+        return f"its definition is written as {encoding[:40]!r}, and only ros2msg and ros1msg are known"
+    if not types_of(versions[0]).is_the_same(kind, text.decode("utf-8", "replace")):
+        return f"its definition of {kind} is not that of ROS {versions[0]}"
+    return ""
+
+
+def _keep(table: dict[int, T], number: int, described: T) -> None:
+    if table.setdefault(number, described) != described:
+        raise Damaged(f"a schema or channel {number} is described twice, and not the same way")
+
+
+def _read(layout: str, content: bytes) -> tuple[int, ...]:
+    """The numbers that `content` begins with."""
+    try:
+        return struct.unpack_from(layout, content)
+    except struct.error:
+        raise Damaged("a record is shorter than its kind allows") from None

@@ -1,0 +1,238 @@
+"""Recordings as sources: what MCAP files and ROS 1 bags have in common when they are read.
+
+A recording may be anybody's. It is read twice: first all of it, so that nothing is acted upon that comes from a damaged
+file, then block by block, in the order of time. Sizes are checked before anything is allocated or unpacked.
+"""
+
+from __future__ import annotations
+
+import heapq
+import os
+import stat
+import zlib
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO, ClassVar, NamedTuple
+
+import lz4.frame  # type: ignore[import-untyped]
+
+from robochoc.formats.diagnostics import on_one_line
+from robochoc.ros.mappings import short_kind
+from robochoc.ros.recordings.types import BadFields, UnknownType, Version, types_of
+from robochoc.ros.source import Heard, Source, SourceFailed
+
+BLOCK_AT_MOST = 1 << 26
+"""Bytes of a record, and of what a chunk unpacks to. Recorders make chunks of some megabytes."""
+WAITING_AT_MOST = 1 << 28
+"""Bytes of messages that wait for their turn. Only where blocks overlap in time do many."""
+UNPACKED_AT_MOST = 1 << 28
+"""Bytes that a file unpacks to, if that is more than `_RATIO` times its size."""
+_RATIO = 100
+_ENTRY = 200
+"""About what a message takes in memory besides its bytes."""
+_STEP = 1 << 20
+
+
+Unpack = Callable[[bytes, int], bytes]
+"""Unpacks all that is given, or so many bytes if there are more. May raise anything."""
+
+
+class Damaged(Exception):  # noqa: N818 - named for what was found
+    """The recording is not what it should be: what is wrong."""
+
+
+class Channel(NamedTuple):
+    """A topic that is listened to, as a recording has it; `fault` is why its messages cannot be read."""
+
+    topic: str
+    version: Version
+    fault: str = ""
+
+
+class Block(NamedTuple):
+    """Part of a file that holds messages: where, how it is packed, and the time of the first one that is wanted."""
+
+    starts: int
+    at: int
+    size: int
+    packing: str
+    unpacked: int
+
+
+class Entry(NamedTuple):
+    """A message, with what puts it in order."""
+
+    at_ns: int
+    block: int
+    number: int
+    channel: Channel
+    content: bytes
+
+
+class Input:
+    """A file that is read from its beginning to its end. Raises `Damaged` and `OSError`."""
+
+    def __init__(self, path: Path) -> None:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise Damaged("is a folder" if path.is_dir() else "is no file")
+        self._stream: BinaryIO = path.open("rb")
+        self.size = os.fstat(self._stream.fileno()).st_size
+        self.at = 0
+        self.sum = 0
+        """CRC-32 of all that has been read."""
+
+    def rewind(self) -> None:
+        """Begin once more."""
+        self.at = self.sum = self._stream.seek(0)
+
+    def take(self, size: int, what: str) -> bytes:
+        """The next `size` bytes."""
+        self._check(size, what)
+        if size > BLOCK_AT_MOST:
+            raise Damaged(f"{what} of {size} bytes before byte {self.at}: more than {BLOCK_AT_MOST} are not read")
+        content = self._stream.read(size)
+        self.at += len(content)
+        self.sum = zlib.crc32(content, self.sum)
+        return content
+
+    def skip(self, size: int, what: str) -> None:
+        """Pass over the next `size` bytes."""
+        self._check(size, what)
+        for begin in range(0, size, _STEP):
+            self.take(min(_STEP, size - begin), what)
+
+    def part(self, at: int, size: int) -> bytes:
+        """What stands somewhere else; where to go on stays as it is."""
+        self._stream.seek(at)
+        content = self._stream.read(size)
+        self._stream.seek(self.at)
+        return content
+
+    def close(self) -> None:
+        """Nothing more is wanted."""
+        self._stream.close()
+
+    def _check(self, size: int, what: str) -> None:
+        if size > self.size - self.at:
+            raise Damaged(f"it ends in the middle of {what}, at byte {self.size}: it was not written to its end")
+
+
+class Recording(Source):
+    """A file that gives its messages in the order of the times at which they were received."""
+
+    packings: ClassVar[Mapping[str, Unpack]]
+    """How chunks may be packed, by the format's names."""
+
+    live = False
+
+    def __init__(self, place: str) -> None:
+        super().__init__(place)
+        if not place:
+            raise SourceFailed("a recording needs the name of its file, as in mcap:run.mcap or rosbag:run.bag")
+        with self._told():
+            self._input = Input(Path(place))
+        self._kinds: Mapping[str, str] = {}
+        self._unpacked = 0
+        self._entries: Iterator[Entry] = iter(())
+
+    def listen(self, topics: Mapping[str, str]) -> None:
+        """Read all of the file once; then give what stands on these topics, from its beginning."""
+        self._kinds = topics
+        self._unpacked = 0
+        with self._told():
+            self._input.rewind()
+            blocks = sorted(self._blocks())
+        self._entries = self._in_order(blocks)
+
+    def next(self, wait_s: float) -> Heard | None:  # noqa: ARG002 - all has been recorded
+        """The next message; None at the end."""
+        with self._told():
+            entry = next(self._entries, None)
+            if entry is None:
+                return None
+            channel = entry.channel
+            kind = self._kinds[channel.topic]
+            try:
+                fields = types_of(channel.version).decode(kind, entry.content)
+            except BadFields as error:
+                raise Damaged(f"a message on {channel.topic} cannot be read: {error}") from error
+            return Heard(channel.topic, kind, fields, entry.at_ns)
+
+    def close(self) -> None:
+        """Leave the file."""
+        self._entries = iter(())
+        self._input.close()
+
+    @abstractmethod
+    def _blocks(self) -> Iterable[Block]:
+        """Read all of the file, and find what holds messages that are wanted. Raises `Damaged`."""
+
+    @abstractmethod
+    def _messages(self, body: bytes) -> Iterator[tuple[Channel, int, bytes]]:
+        """The messages of a block that are wanted: channel, time in nanoseconds, and content. Raises `Damaged`."""
+
+    def _wanted(self, topic: str, kind: str) -> bool:
+        """Whether somebody listens to messages of that type on that topic."""
+        return topic in self._kinds and short_kind(self._kinds[topic]) == short_kind(kind)
+
+    def _body(self, packed: bytes, packing: str, size: int) -> bytes:
+        """What a chunk holds, which should be `size` bytes."""
+        self._unpacked += size
+        if self._unpacked > max(UNPACKED_AT_MOST, _RATIO * self._input.size):
+            raise Damaged(f"its {self._input.size} bytes unpack to {self._unpacked} and more, which are not read")
+        return unpacked(packed, packing, size, self.packings)
+
+    def _in_order(self, blocks: Iterable[Block]) -> Iterator[Entry]:
+        """All messages of `blocks`, which come in the order of their first ones."""
+        waiting: list[Entry] = []
+        size = 0
+        for number, block in enumerate(blocks):
+            while waiting and waiting[0].at_ns < block.starts:
+                entry = heapq.heappop(waiting)
+                size -= _ENTRY + len(entry.content)
+                yield entry
+            body = unpacked(self._input.part(block.at, block.size), block.packing, block.unpacked, self.packings)
+            for place, (channel, at_ns, content) in enumerate(self._messages(body)):
+                heapq.heappush(waiting, Entry(at_ns, block.at, place, channel, content))
+                size += _ENTRY + len(content)
+                if size > WAITING_AT_MOST:
+                    raise Damaged(f"its messages are out of order: at chunk {number}, too many wait for their turn")
+        while waiting:
+            yield heapq.heappop(waiting)
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """Whatever is wrong with the file is told with its name."""
+        try:
+            yield
+        except (Damaged, UnknownType) as error:
+            raise SourceFailed(on_one_line(f"{self.place}: {error}")) from error
+        except OSError as error:
+            raise SourceFailed(on_one_line(f"{self.place}: {error.strerror or error}")) from error
+
+
+def unpacked(packed: bytes, packing: str, size: int, packings: Mapping[str, Unpack]) -> bytes:
+    """The `size` bytes that `packed` holds; never more are unpacked than these and one. Raises `Damaged`."""
+    if size > BLOCK_AT_MOST:
+        raise Damaged(f"a chunk says that it unpacks to {size} bytes; more than {BLOCK_AT_MOST} are not read")
+    if packing not in packings:
+        raise Damaged(f"a chunk is packed by {packing[:40]!r}; known are {', '.join(filter(None, packings))}")
+    try:
+        body = packings[packing](packed, size + 1)
+    except Exception as error:  # whatever the library raises: RuntimeError, OSError, its own
+        raise Damaged(f"a chunk cannot be unpacked ({packing}): {error}") from error
+    if len(body) != size:
+        raise Damaged(f"a chunk does not unpack to the {size} bytes that it says")
+    return body
+
+
+def as_it_is(packed: bytes, _most: int) -> bytes:
+    """For chunks that are not packed."""
+    return packed
+
+
+def from_lz4(packed: bytes, most: int) -> bytes:
+    """Up to `most` bytes of an LZ4 frame."""
+    return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=most))

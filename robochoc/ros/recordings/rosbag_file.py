@@ -1,0 +1,233 @@
+"""Bags of ROS 1, version 2.0 (wiki.ros.org/Bags/Format/2.0): what `rosbag play` plays.
+
+They are written without compression, as `rosbag record` does.
+"""
+
+from __future__ import annotations
+
+import bz2
+import os
+import struct
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from types import MappingProxyType
+from typing import BinaryIO, NamedTuple, cast
+
+from rosbags.interfaces import Connection
+from rosbags.rosbag1 import Writer
+
+from robochoc.ros.mappings import short_kind
+from robochoc.ros.recordings.recorder import Recorder
+from robochoc.ros.recordings.recording import Block, Channel, Damaged, Recording, as_it_is, from_lz4
+from robochoc.ros.recordings.types import types_of
+from robochoc.ros.sink import Fields
+
+_CALLER = "/robochoc"
+_MAGIC = b"#ROSBAG V2.0\n"
+_HEADER_AT_MOST = 1 << 20
+_MESSAGE, _BAG, _INDEX, _CHUNK, _CHUNK_INFO, _CONNECTION = 2, 3, 4, 5, 6, 7
+_SIZE = struct.Struct("<I")
+_LAYOUTS = {b"op": "<B", b"conn": "<I", b"size": "<I", b"time": "<II", b"index_pos": "<Q"}
+_LAYOUTS |= {b"conn_count": "<I", b"chunk_count": "<I"}
+
+
+class RosbagSink(Recorder):
+    """Writes a bag of ROS 1. The same messages make the same bytes."""
+
+    ending = "rosbag:run.bag"
+    version = 1
+
+    def __init__(self, place: str) -> None:
+        super().__init__(place)
+        self._connections: dict[tuple[str, str], Connection] = {}
+        self._sequence: dict[int, int] = {}
+        with self.told():
+            self._writer = Writer(Path(place) / "bag")  # what the library opens must not exist
+            self._writer.path = cast("Path", _Opened(self.file.stream))
+            self._writer.open()
+
+    def write(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
+        """Append a message. Those of a topic are numbered in their headers, as ROS 1 does."""
+        found = self._connections.get((topic, kind)) or self._connection(topic, kind)
+        self._sequence[found.id] = sequence = self._sequence.get(found.id, 0) + 1
+        header = fields.get("header")
+        if isinstance(header, dict):
+            fields = {**fields, "header": {"seq": sequence, **header}}
+        self._writer.write(found, at_ns, types_of(1).encode(kind, fields))
+
+    def finish(self) -> None:
+        """Write the index."""
+        self._writer.close()
+
+    def discard(self) -> None:
+        """Leave nothing behind."""
+        with suppress(OSError):
+            self._writer.abort()
+        super().discard()
+
+    def _connection(self, topic: str, kind: str) -> Connection:
+        text, md5 = types_of(1).definition(kind)
+        name = short_kind(kind).replace("/", "/msg/", 1)
+        found = self._writer.add_connection(topic, name, msgdef=text, md5sum=md5, callerid=_CALLER, latching=0)
+        self._connections[topic, kind] = found
+        return found
+
+
+class _Opened(NamedTuple):
+    """In the place of a path: what the library opens there is the file that has been opened already."""
+
+    stream: BinaryIO
+
+    def open(self, _mode: str) -> BinaryIO:
+        """The same file, for the library to close."""
+        return os.fdopen(os.dup(self.stream.fileno()), "wb")
+
+
+class _Record(NamedTuple):
+    """The fields of a record's header, and where in a chunk its data begin and end."""
+
+    header: dict[bytes, bytes]
+    begin: int
+    end: int
+
+    @property
+    def kind(self) -> int:
+        """Its operation code; 0 if it has none."""
+        return self.number(b"op") if b"op" in self.header else 0
+
+    def number(self, name: bytes) -> int:
+        """The number that a field holds; a time is in nanoseconds."""
+        content = self.header.get(name, b"")
+        layout = _LAYOUTS[name]
+        if len(content) != struct.calcsize(layout):
+            raise Damaged(f"a record has no right {name.decode()!r} in its header")
+        first, *more = struct.unpack(layout, content)
+        return int(first) * 10**9 + int(more[0]) if more else int(first)
+
+    def text(self, name: bytes) -> str:
+        """The text that a field holds; empty if there is none."""
+        return self.header.get(name, b"").decode("utf-8", "replace")
+
+
+def _from_bz2(packed: bytes, most: int) -> bytes:
+    return bz2.BZ2Decompressor().decompress(packed, max_length=most)
+
+
+class RosbagSource(Recording):
+    """Reads a bag of ROS 1."""
+
+    packings = MappingProxyType({"none": as_it_is, "bz2": _from_bz2, "lz4": from_lz4})
+
+    def _blocks(self) -> Iterator[Block]:
+        self._channels: dict[int, Channel | None] = {}
+        source = self._input
+        magic = source.take(min(source.size, len(_MAGIC)), "its beginning")
+        if magic != _MAGIC:
+            known = magic.startswith(b"#ROSBAG V")
+            raise Damaged("is a bag of another version than 2.0" if known else "is no bag of ROS 1")
+        expected = self._first()
+        found = {_CHUNK: 0, _CHUNK_INFO: 0, _CONNECTION: 0}
+        while source.at < source.size:
+            record, size = self._header()
+            kind = record.kind
+            found[kind] = found.get(kind, 0) + 1
+            if kind == _CHUNK:
+                yield from self._chunk(record, size)
+            else:
+                source.skip(size, "a record")
+        if any(found[kind] != number for kind, number in expected.items()):
+            raise Damaged("it has less in its index than it says: it was not written to its end")
+
+    def _first(self) -> dict[int, int]:
+        """How many records of some kinds the bag says that it has."""
+        record, size = self._header()
+        if record.kind != _BAG:
+            raise Damaged("it does not begin with a bag's header")
+        self._input.skip(size, "its beginning")
+        if not record.number(b"index_pos"):
+            raise Damaged("it has no index, so its recording was not finished: `rosbag reindex` mends that")
+        if record.text(b"encryptor"):
+            raise Damaged("it is encrypted")
+        chunks = record.number(b"chunk_count")
+        return {_CHUNK: chunks, _CHUNK_INFO: chunks, _CONNECTION: record.number(b"conn_count")}
+
+    def _header(self) -> tuple[_Record, int]:
+        """The next record's header, and the size of its data, which come next."""
+        source = self._input
+        size = self._size()
+        if size > _HEADER_AT_MOST:
+            raise Damaged(f"a record before byte {source.at} has a header of {size} bytes")
+        header = _fields(source.take(size, "a record"))
+        return _Record(header, 0, 0), self._size()
+
+    def _size(self) -> int:
+        (size,) = _SIZE.unpack(self._input.take(_SIZE.size, "a record"))
+        return int(size)
+
+    def _chunk(self, record: _Record, size: int) -> Iterator[Block]:
+        packing, whole, at = record.text(b"compression"), record.number(b"size"), self._input.at
+        body = self._body(self._input.take(size, "a chunk"), packing, whole)
+        starts = min((time for _, time, _ in self._messages(body)), default=None)
+        if starts is not None:
+            yield Block(starts, at, size, packing, whole)
+
+    def _messages(self, body: bytes) -> Iterator[tuple[Channel, int, bytes]]:
+        for record in _records(body):
+            kind = record.kind
+            if kind == _CONNECTION:
+                number, described = record.number(b"conn"), self._heard(record, body)
+                if self._channels.setdefault(number, described) != described:
+                    raise Damaged(f"connection {number} is described twice, and not the same way")
+            elif kind == _MESSAGE:
+                number = record.number(b"conn")
+                if number not in self._channels:
+                    raise Damaged(f"a message belongs to connection {number}, which is not described before it")
+                channel = self._channels[number]
+                if channel is not None:
+                    if channel.fault:
+                        raise Damaged(f"what stands on {channel.topic} cannot be read: {channel.fault}")
+                    yield channel, record.number(b"time"), body[record.begin : record.end]
+
+    def _heard(self, record: _Record, body: bytes) -> Channel | None:
+        topic = "/" + record.text(b"topic").lstrip("/")
+        more = _Record(_fields(body[record.begin : record.end]), 0, 0)
+        kind, md5 = more.text(b"type"), more.text(b"md5sum")
+        if not self._wanted(topic, kind):
+            return None
+        ours = types_of(1).definition(kind).md5
+        fault = (
+            f"its {short_kind(kind)} has the MD5 sum {md5[:40]!r}, and that of ROS 1 is {ours}" if md5 != ours else ""
+        )
+        return Channel(topic, 1, fault)
+
+
+def _records(body: bytes) -> Iterator[_Record]:
+    """The records of a chunk."""
+    at = 0
+    while at < len(body):
+        begin, end = _span(body, at)
+        header = _fields(body[begin:end])
+        begin, at = _span(body, end)
+        yield _Record(header, begin, at)
+
+
+def _span(body: bytes, at: int) -> tuple[int, int]:
+    """Where what is led by its size begins and ends."""
+    begin = at + _SIZE.size
+    end = begin + int.from_bytes(body[at:begin], "little")
+    if end > len(body) or begin > len(body):
+        raise Damaged("a record does not end where its chunk does")
+    return begin, end
+
+
+def _fields(content: bytes) -> dict[bytes, bytes]:
+    """The fields of a header: sizes, then `name=value`."""
+    found, at = {}, 0
+    while at < len(content):
+        begin, at = _span(content, at)
+        name, equals, value = content[begin:at].partition(b"=")
+        if not equals:
+            raise Damaged("a record's header has a field without a value")
+        found[name] = value
+    return found

@@ -1,0 +1,231 @@
+"""What robots report, and what it means for the problem: the paper's "read the robot situation" (Section 4.2).
+
+An obstacle takes values away, a drone that cannot fly any more takes its robot out of the team, and what is clear again
+gives values back. Pure: a team and a report go in, changes of that team come out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import assert_never
+
+from robochoc.expression import Expression, Name, Undefined, evaluate, names
+from robochoc.problem import AddValue, Change, Domain, RemoveAgent, RemoveValue, Robot, Team
+from robochoc.ros.crew import Craft, crafts_of
+from robochoc.ros.layout import Point
+from robochoc.ros.mission import Drone
+from robochoc.ros.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
+
+BATTERY = 0.2
+"""A drone whose battery holds less is out of order, where nobody says otherwise."""
+WITHIN = 0.5
+"""An obstacle takes what lies within so many units of it."""
+MOST_VALUES = 10_000
+"""A variable with more values is not looked through one by one."""
+MOST_PLACES = 10_000
+"""So many obstacles are kept in mind."""
+MOST_NOTES = 20
+"""So many reports that change nothing are told of."""
+FLIES, LIES = 0.5, 0.25
+"""A drone flies that is so many units above where it stood; one that is less than the other lies on the ground."""
+LIES_S, LIES_TIMES = 1.0, 3
+"""A drone that has flown, and is seen so often on the ground, over so many seconds, is out of order."""
+_HAIR = 1e-6
+
+
+@dataclass
+class _Seen:
+    """What a drone's poses have shown."""
+
+    flew: bool = False
+    lies_since: float = 0.0
+    times: int = 0
+
+
+class Situation:
+    """What is known of the robots' surroundings and of themselves.
+
+    `drones` are all that ever fly, `scale` is in metres a unit of the problem, `battery` the level (0 to 1) below
+    which a drone is out of order.
+
+    A drone is also out of order when its poses say so: it was seen in the air (`FLIES`), and now lies on the ground
+    (`LIES`) for at least `LIES_TIMES` reports over at least `LIES_S` seconds, though its robot is in the team and so
+    is not to land. How far it is from its goal says nothing: it may be on its way, wait for others to pass, or hover
+    while the team decides.
+    """
+
+    notes: list[str]
+    """What was reported and could not be heeded, in clear sentences."""
+
+    def __init__(self, drones: Sequence[Drone], scale: float, battery: float = BATTERY) -> None:
+        namesakes = Counter(drone.name for drone in drones)
+        self._drones = {drone.name: drone for drone in drones if namesakes[drone.name] == 1}
+        self._homes = {(drone.robot, drone.name): _in_units(drone.home, scale) for drone in drones}
+        self._scale = scale
+        self._battery = battery
+        self._seen: dict[str, _Seen] = {}
+        self._obstacles: list[Point] = []
+        self._taken: dict[tuple[str, int], set[Point]] = {}
+        self.notes = []
+
+    def heed(self, team: Team, report: Report) -> tuple[Change, ...]:
+        """What `report` changes in `team`, which can take these changes; nothing if its robot is not there."""
+        drone = self._drones.get(report.drone)
+        if drone is None or drone.robot not in team:
+            return ()
+        match report:
+            case Blocked(place=place):
+                return self._blocked(team, _in_units(place, self._scale))
+            case Cleared(place=place):
+                return self._cleared(team, _in_units(place, self._scale))
+            case OutOfOrder():
+                return (RemoveAgent(drone.robot),)
+            case Battery(level=level):
+                return (RemoveAgent(drone.robot),) if 0 <= level < self._battery else ()
+            case Pose():
+                return (RemoveAgent(drone.robot),) if self._is_down(drone, report) else ()
+            case never:
+                assert_never(never)
+
+    # Obstacles
+
+    def _blocked(self, team: Team, place: Point) -> tuple[Change, ...]:
+        if any(math.dist(place, other) <= _HAIR for other in self._obstacles):
+            return ()
+        if len(self._obstacles) >= MOST_PLACES:
+            self._note(f"more than {MOST_PLACES:,} places are blocked: further ones are passed over")
+            return ()
+        self._obstacles.append(place)
+        told = len(self.notes)
+        found = tuple(self._taking(team, place))
+        if not found and len(self.notes) == told:
+            self._note(f"nobody is ever sent to the obstacle at {_shown(place)}: it changes nothing")
+        return found
+
+    def _cleared(self, team: Team, place: Point) -> tuple[Change, ...]:
+        """Give back what no other obstacle is in the way of."""
+        self._obstacles = [other for other in self._obstacles if not _is_near(place, other)]
+        free = [
+            value
+            for value, places in self._taken.items()
+            if not any(_is_near(one, other) for one in places for other in self._obstacles)
+        ]
+        for value in free:
+            del self._taken[value]
+        return tuple(
+            AddValue(variable, value)
+            for variable, value in free
+            if variable in team.owner and value not in team.variables[variable].domain
+        )
+
+    def _taking(self, team: Team, place: Point) -> Iterator[RemoveValue]:
+        """The values by which a drone of `team` would be at `place`; they are kept in mind."""
+        for robot in team.robots:
+            gone = set()
+            for number, craft in enumerate(crafts_of(robot, {})):
+                for variable, value, there in self._values_at(robot, number, craft, place):
+                    self._taken.setdefault((variable, value), set()).add(there)
+                    gone.add((variable, value))
+            yield from (RemoveValue(variable, value) for variable, value in sorted(gone))
+
+    def _values_at(self, robot: Robot, number: int, craft: Craft, place: Point) -> Iterator[tuple[str, int, Point]]:
+        """The variable and the values that would send a drone to `place`, and where exactly that is."""
+        if not _may_reach(craft, self._homes.get((robot.name, craft.name)), place):
+            return
+        if len(craft.decided_by) != 1:
+            by = " and ".join(craft.decided_by) or "no variable"
+            self._regret(craft, place, f"its place depends on {by}, so no value alone can be taken away")
+            return
+        variable = craft.decided_by[0]
+        domain = next((own.domain for own in robot.variables if own.name == variable), None)
+        values = _candidates(craft, variable, domain, place) if domain else ()
+        if values is None:
+            self._regret(craft, place, f"{variable} has too many values to look through (more than {MOST_VALUES:,})")
+            return
+        for value in values:
+            there = self._place_of(crafts_of(robot, {variable: value})[number])
+            if there is not None and _is_near(there, place):
+                yield variable, value, there
+
+    def _place_of(self, craft: Craft) -> Point | None:
+        """Where a craft flies, in units; one without a cell flies above where it stood."""
+        home = self._homes.get((craft.robot, craft.name))
+        across = craft.cell or (home[:2] if home else None)
+        return None if craft.level is None or across is None else (*across, craft.level)
+
+    def _regret(self, craft: Craft, place: Point, why: str) -> None:
+        self._note(f"the obstacle at {_shown(place)} may be in the way of {craft.name}, and changes nothing: {why}")
+
+    def _note(self, text: str) -> None:
+        if text not in self.notes and len(self.notes) < MOST_NOTES:
+            self.notes.append(text)
+
+    # Poses
+
+    def _is_down(self, drone: Drone, pose: Pose) -> bool:
+        """Whether the drone has fallen, see `Situation`."""
+        seen = self._seen.setdefault(drone.name, _Seen())
+        height = (pose.place[2] - drone.home[2]) / self._scale
+        if height >= FLIES:
+            seen.flew = True
+        if height >= LIES or not seen.flew:
+            seen.times = 0
+            return False
+        if not seen.times:
+            seen.lies_since = pose.at_s
+        seen.times += 1
+        down = seen.times >= LIES_TIMES and pose.at_s - seen.lies_since >= LIES_S
+        if down:
+            self._seen[drone.name] = _Seen()
+        return down
+
+
+def _may_reach(craft: Craft, home: Point | None, place: Point) -> bool:
+    """Whether what is fixed of a craft's place, whatever is decided, lies near `place`."""
+    topic = craft.topic
+    across: list[float | None] = [None, None]
+    if topic and topic.x is not None and topic.y is not None:
+        across = [_fixed(topic.x), _fixed(topic.y)]
+    elif craft.cell or home:
+        across = [*(craft.cell or (home or ())[:2])]
+    fixed = [*across, _fixed(topic.z) if topic else None]
+    return all(at is None or abs(at - there) <= WITHIN + _HAIR for at, there in zip(fixed, place, strict=True))
+
+
+def _candidates(craft: Craft, variable: str, domain: Domain, place: Point) -> Iterable[int] | None:
+    """The values of `domain` that might send the craft near `place`; None if there are too many to look at."""
+    topic = craft.topic
+    given: list[Expression | None] = [topic.x, topic.y, topic.z] if topic else [None, None, None]
+    if given[2] is None:
+        given[2] = Name(variable)
+    for expression, at in zip(given, place, strict=True):
+        if expression == Name(variable):
+            around = range(math.ceil(at - WITHIN - _HAIR), math.floor(at + WITHIN + _HAIR) + 1)
+            return [value for value in around if value in domain]
+    return domain if sum(len(part) for part in domain.ranges) <= MOST_VALUES else None
+
+
+def _fixed(expression: Expression | None) -> int | None:
+    """What `expression` is, if no variable is in it."""
+    if expression is None or names(expression):
+        return None
+    try:
+        return evaluate(expression, {})
+    except Undefined:
+        return None
+
+
+def _in_units(place: Point, scale: float) -> Point:
+    x, y, z = place
+    return x / scale, y / scale, z / scale
+
+
+def _is_near(one: Point, other: Point) -> bool:
+    return math.dist(one, other) <= WITHIN + _HAIR
+
+
+def _shown(place: Point) -> str:
+    return ", ".join(f"{at:g}" for at in place)
