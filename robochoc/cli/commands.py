@@ -13,6 +13,7 @@ from robochoc.cli.cache import cache
 from robochoc.cli.compile import compile_team
 from robochoc.cli.directory import directory
 from robochoc.cli.export import export
+from robochoc.cli.fly import fly
 from robochoc.cli.generate import generate
 from robochoc.cli.journal import journal
 from robochoc.cli.master import master
@@ -56,6 +57,7 @@ for command in (
     validate,
     generate,
     animate,
+    fly,
     sniff,
     compile_team,
     export,

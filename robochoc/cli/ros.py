@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from robochoc.cli.failure import INVALID, Failure
+from robochoc.cli.failure import INVALID, USAGE, Failure
 
 if TYPE_CHECKING:
     from robochoc.problem import Assignment, Robot, Team
-    from robochoc.ros.flight import Flown
+    from robochoc.ros.flight import Conditions, Flown
     from robochoc.ros.loop import Loop, Senses
     from robochoc.ros.mission import Drone, Mission
     from robochoc.ros.simulated import Surroundings
@@ -44,6 +44,17 @@ class PointType(click.ParamType["tuple[float, ...]"]):
         if len(point) != AXES or not all(map(math.isfinite, point)):
             self.fail(f"{value!r} is not three numbers such as 1,2,3", param, ctx)
         return point
+
+
+class WindType(PointType):
+    """A wind's velocity; one number is its speed along x."""
+
+    name = "wind"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:  # noqa: ANN401 - click's signature
+        """`3` as `3,0,0`."""
+        alone = isinstance(value, str) and "," not in value
+        return super().convert(f"{value},0,0" if alone else value, param, ctx)
 
 
 class FailureType(click.ParamType["tuple[str, float]"]):
@@ -123,7 +134,7 @@ flight_options = _optional(
         metavar="METRES",
         help="No two drones of the simulated flight come nearer.  [default: 0.5, or less where places are nearer]",
     ),
-    click.option("--wind", type=PointType(), metavar="X,Y,Z", help="Wind in the simulated flight, in m/s."),
+    click.option("--wind", type=WindType(), metavar="X[,Y,Z]", help="Wind in the simulated flight, in m/s."),
     click.option("--gusts", type=Finite(0), metavar="M/S", help="Gusts in the simulated flight."),
 )
 """`--fail`, `--distance`, `--wind`, `--gusts`."""
@@ -194,7 +205,7 @@ def ros_asked(settings: dict[str, Any]) -> Ros:
         _refuse(_HEARD, asked, "is for robots that are listened to: add --situation mcap:FILE, or another source")
     if not (sinks or situation):
         _refuse(_PLACED, asked, _NOT_PUBLISHED)
-    _refuse_twice([*sinks, *filter(None, [situation])])
+    _refuse_twice(sinks)
     surroundings = {name: given[name] for name in _FLOWN_HERE if name in asked}
     frame = given["frame"] or FRAME
     return Ros(sinks, situation, frame, given["scale"], given["patience"], given["battery"], surroundings)
@@ -209,7 +220,7 @@ def _refuse(options: Mapping[str, str], asked: set[str], why: str) -> None:
 def _refuse_twice(places: Sequence[str]) -> None:
     for place in places:
         if places.count(place) > 1:
-            raise click.UsageError(f"--ros and --situation are different places; {place} is given twice")
+            raise click.UsageError(f"--ros {place} is given twice")
 
 
 def check_ros(ros: Ros, settings: Mapping[str, Any]) -> None:
@@ -236,10 +247,13 @@ def ros_failures_told() -> Iterator[None]:
     from robochoc.ros.names import NameClash
     from robochoc.ros.publisher import NothingToPublish
     from robochoc.ros.sink import SinkFailed
+    from robochoc.ros.sinks import NoSuchSink, NoSuchSource
     from robochoc.ros.source import SourceFailed
 
     try:
         yield
+    except (NoSuchSink, NoSuchSource) as wrong:
+        raise Failure(USAGE, str(wrong)) from wrong
     except (NameClash, NoMapping, NothingToPublish, SinkFailed, SourceFailed) as wrong:
         raise Failure(INVALID, str(wrong)) from wrong
 
@@ -262,11 +276,22 @@ def open_sinks(texts: Sequence[str], stack: ExitStack) -> list[Sink]:
     return [stack.enter_context(open_sink(text)) for text in texts]
 
 
-def surroundings_of(given: Mapping[str, Any], seed: int = 0) -> Surroundings:
-    """What the options of a simulated flight ask for."""
+def surroundings_of(given: Mapping[str, Any], seed: int) -> Surroundings:
+    """What the options of a simulated flight ask for; those that are not given are left out."""
     from robochoc.ros.simulated import Surroundings
 
     return Surroundings(seed=seed, **given)
+
+
+def conditions_of(given: Mapping[str, Any], mission: Mission) -> Conditions:
+    """What the options of `robochoc fly` ask for. Raises `click.UsageError` for a drone that is not there."""
+    from robochoc.ros.simulated import NoSuchDrone
+
+    asked = {name: given[name] for name in _FLOWN if given[name] not in (None, ())}
+    try:
+        return surroundings_of(asked, given["seed"]).conditions(mission.drones, mission.scale)
+    except NoSuchDrone as wrong:
+        raise click.UsageError(f"--fail: {wrong}") from wrong
 
 
 @contextmanager
@@ -304,6 +329,8 @@ def _senses(ros: Ros, drones: Sequence[Drone], seed: int, stack: ExitStack) -> S
     from robochoc.ros.sinks import open_source
 
     source = stack.enter_context(open_source(ros.situation or ""))
+    if ros.situation in ros.sinks and not source.live:
+        raise click.UsageError(f"--ros would write {ros.situation}, from which --situation reads")
     if ros.patience is not None and not source.live:
         raise click.UsageError(f"--patience is for robots that report while we wait; {ros.situation} is a recording")
     return Listening(source, Reading(drones, ros.frame), ros.patience or PATIENCE_S)

@@ -1,18 +1,32 @@
-"""Files that robochoc has written itself, and that are given back to it: journals and results."""
+"""What robochoc has written itself, and is given back: journals and results, and the team that they are of."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import click
+
 from robochoc.cli.failure import INVALID, Failure
+from robochoc.cli.paths import InputPath
 
 if TYPE_CHECKING:
     from robochoc.observers.journal import Journal
+    from robochoc.outcome import Outcome
+    from robochoc.problem import Team
 
 LARGEST_FILE = 1 << 30
 """1 GiB: a journal of hundreds of millions of messages, or one of millions as text."""
 JOURNAL_STEP = "give what 'robochoc solve --journal' wrote"
+_OUTCOME_STEP = "give what 'robochoc solve --json' or '--journal' wrote"
+
+team_option = click.option(
+    "--team",
+    "folder",
+    type=InputPath(),
+    metavar="DIR",
+    help="The team's folder: it has the robots' names and topics.  [default: instances/TEAM, if it is there]",
+)
 
 
 def saved_content(file: Path, next_step: str) -> bytes:
@@ -36,6 +50,62 @@ def saved_journal(file: Path) -> Journal:
         return read_journal(content)
     except BadJournal as wrong:
         raise _refused(file, str(wrong), JOURNAL_STEP) from wrong
+
+
+def saved_outcome(saved: Path) -> Outcome:
+    """What the file, a JSON result or a journal, tells of the end of a run. Raises `Failure`."""
+    from robochoc.formats.result import BadResult, read_result
+    from robochoc.observers.journal import BadJournal, is_journal, read_journal
+
+    content = saved_content(saved, _OUTCOME_STEP)
+    try:
+        if not is_journal(content):
+            return read_result(content)
+        journal = read_journal(content)
+    except (BadJournal, BadResult) as wrong:
+        raise Failure(INVALID, f"{saved}: {wrong} ({_OUTCOME_STEP})") from wrong
+    if journal.outcome is None:
+        why = journal.damage or "the run broke off"
+        raise Failure(INVALID, f"{saved}: {why}, so there is no outcome to show ({_OUTCOME_STEP})")
+    return journal.outcome
+
+
+def team_of(outcome: Outcome, saved: Path, folder: Path | None) -> Team | None:
+    """The team in `folder`, or where teams of that name usually are; None, which is told, if it is not there.
+
+    Raises `InvalidInput`, and `Failure` for another team than that of `outcome`, which is from the file `saved`.
+    """
+    from robochoc.formats import read_team
+
+    folder = folder or _usual_folder(outcome)
+    team = read_team(folder) if folder else None
+    if team and not _is_team_of(outcome, team):
+        why = f"this is not the team of {saved}, {outcome.team} (give its folder with --team)"
+        raise Failure(INVALID, f"{folder}: {why}")
+    return team
+
+
+def _is_team_of(outcome: Outcome, team: Team) -> bool:
+    """Whether all who took part, and all that they decided, are known to `team` or come with its scenario."""
+    from robochoc.ros.mission import everybody
+
+    robots = everybody(team)
+    names = {robot.name for robot in robots}
+    variables = {variable.name for robot in robots for variable in robot.variables}
+    epochs = outcome.epochs
+    there = {*outcome.withdrawn, *(name for epoch in epochs for name in epoch.robots)}
+    decided = {*outcome.assignment, *(name for epoch in epochs for name in epoch.assignment)}
+    return there <= names and decided <= variables
+
+
+def _usual_folder(outcome: Outcome) -> Path | None:
+    """Where `generate` puts teams of that name, if it is there."""
+    name = Path(outcome.team).name
+    folder = Path("instances") / name
+    if name not in {"", ".."} and folder.is_dir():
+        return folder
+    click.echo(f"{folder} is not there: drones are named for variables, without topics (give --team DIR)", err=True)
+    return None
 
 
 def _refused(file: Path, why: str, next_step: str) -> Failure:

@@ -19,6 +19,7 @@ from robochoc.cli.recording import recording, shown_and_flushed
 from robochoc.cli.ros import (
     check_ros,
     flight_options,
+    flown_by,
     looped,
     ros_asked,
     ros_options,
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from robochoc.problem import Team
     from robochoc.ros.loop import Loop
     from robochoc.run import Options
+    from robochoc.view.scene import Scene
 
 
 @click.command(cls=SolveCommand, short_help="Solve teams, each robot in its own process.")
@@ -298,12 +300,17 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
                 _tell(team, outcome, wanted)
                 if loop and loop.mission is None:  # the run knew nothing of it
                     loop.publish(outcome)
+                flight = flown_by(loop) if products.html or products.serve else None
     except Failure as failure:
         failure.show()
         return failure.exit_code
     for line in told_of(loop) if loop and not wanted.as_json else ():
         click.echo(line, err=True)
-    _show(team, outcome, products, quiet=wanted.as_json)
+    if products.html or products.serve:
+        from robochoc.view.scene import scene_of
+
+        mission, flown = flight or (None, None)
+        _show(scene_of(outcome, team, mission=mission, flown=flown), products, quiet=wanted.as_json)
     if outcome.verdict != "unknown":
         return 0
     if outcome.reason and wanted.as_json:
@@ -371,14 +378,10 @@ def _tell(team: Team, outcome: Outcome, wanted: Wanted) -> None:
             click.echo(explained(outcome))
 
 
-def _show(team: Team, outcome: Outcome, products: Products, *, quiet: bool) -> None:
+def _show(scene: Scene, products: Products, *, quiet: bool) -> None:
     """Write the page and serve the scene, as asked."""
-    if not (products.html or products.serve):
-        return
     from robochoc.cli.scene import serve_scene, write_page
-    from robochoc.view.scene import scene_of
 
-    scene = scene_of(outcome, team)
     if products.html:
         write_page(scene, products.html, quiet=quiet)
     if products.serve:

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.ros.mission import Drone, Leg
+from robochoc.ros.mission import Drone, Leg, Mission
 from robochoc.ros.publisher import Publisher
-from robochoc.ros.reports import Report
+from robochoc.ros.quadrotor.flown import Flown
+from robochoc.ros.reports import OutOfOrder, Report
 from robochoc.ros.sink import Sink
 from robochoc.ros.waypoint import waypoints
 
 SECOND_NS = 1_000_000_000
+POSES_HZ = 20
 
 
 class Outlet:
@@ -51,6 +55,46 @@ class Outlet:
             f"{count:,} {name}{'s' * (count != 1)}" for name, count in self._counts.items() if count or name in first
         ]
         return ", ".join(words)
+
+
+class Broadcast:
+    """Tells outlets of a flight as its time goes by: what is reported, and where everybody is, `POSES_HZ` a second."""
+
+    def __init__(self) -> None:
+        self._ticks = 0
+
+    def tell(self, outlets: Sequence[Outlet], flown: Flown, reports: Sequence[Report], until_s: float) -> None:
+        """Publish what was not yet told of `flown` up to `until_s`, and `reports` among it. Raises `SinkFailed`."""
+        untold = deque(reports)
+        while (at_s := self._ticks / POSES_HZ) <= until_s:
+            while untold and untold[0].at_s <= at_s:
+                _report(outlets, untold.popleft())
+            after = min(int(np.searchsorted(flown.times, at_s)), len(flown.times) - 1)
+            for outlet in outlets:
+                outlet.poses(flown.positions[after], flown.attitudes[after], at_s)
+            self._ticks += 1
+        for report in untold:
+            _report(outlets, report)
+
+
+def publish_flight(mission: Mission, flown: Flown, outlets: Sequence[Outlet]) -> None:
+    """Publish a whole flight: each leg's waypoints as it begins, poses, and who falls. Raises `SinkFailed`."""
+    if not outlets:
+        return
+    fallen = {number for number, error in enumerate(flown.errors_m) if np.isnan(error)}
+    falls = {one.drone: one for one in reversed(flown.happenings) if one.drone in fallen}
+    reports = sorted((OutOfOrder(flown.names[n], one.what, one.at_s) for n, one in falls.items()), key=lambda r: r.at_s)
+    broadcast = Broadcast()
+    begins_s = [0.0, *(stage.begins_s for stage in flown.stages[1:]), flown.simulated_s]
+    for leg, (begin_s, end_s) in zip(mission.legs, pairwise(begins_s), strict=True):
+        for outlet in outlets:
+            outlet.decide(leg, nanoseconds(begin_s))
+        broadcast.tell(outlets, flown, [one for one in reports if begin_s < one.at_s <= end_s], end_s)
+
+
+def _report(outlets: Sequence[Outlet], report: Report) -> None:
+    for outlet in outlets:
+        outlet.report(report)
 
 
 def nanoseconds(at_s: float) -> int:

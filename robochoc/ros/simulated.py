@@ -14,10 +14,9 @@ from robochoc.ros.flight import Conditions, Failure, Flight, Flown
 from robochoc.ros.layout import Point
 from robochoc.ros.loop import TOGETHER_S, Senses
 from robochoc.ros.mission import Cast, Drone, Goal, Leg
-from robochoc.ros.outlet import nanoseconds
+from robochoc.ros.outlet import Broadcast, nanoseconds
 from robochoc.ros.reports import OutOfOrder, Report
 
-POSES_HZ = 20
 MOST_NAMES = 12
 """So many drones stand in a message."""
 FAILS_S = 2.0
@@ -95,7 +94,7 @@ class Flying(Senses):
     _waiting: deque[Report] = field(default_factory=deque)
     _known: set[Report] = field(default_factory=set)
     _now_s: float = 0.0
-    _ticks: int = 0
+    _broadcast: Broadcast = field(default_factory=Broadcast)
 
     def now_ns(self) -> int:
         """See `Senses.now_ns`: the flight's own time."""
@@ -175,22 +174,8 @@ class Flying(Senses):
     def _tell(self, flown: Flown, reports: Sequence[Report]) -> None:
         """Publish what was flown since the last time, and what was reported meanwhile, as time goes by."""
         self._now_s = float(flown.times[-1]) if len(flown.times) else self._now_s
-        if not self.outlets:
-            return
-        untold = deque(reports)
-        while (at_s := self._ticks / POSES_HZ) <= self._now_s:
-            while untold and untold[0].at_s <= at_s:
-                self._publish(untold.popleft())
-            after = min(int(np.searchsorted(flown.times, at_s)), len(flown.times) - 1)
-            for outlet in self.outlets:
-                outlet.poses(flown.positions[after], flown.attitudes[after], at_s)
-            self._ticks += 1
-        for report in untold:
-            self._publish(report)
-
-    def _publish(self, report: Report) -> None:
-        for outlet in self.outlets:
-            outlet.report(report)
+        if self.outlets:
+            self._broadcast.tell(self.outlets, flown, reports, self._now_s)
 
 
 def _what(report: Report) -> Report:
