@@ -12,8 +12,8 @@ from robochoc.formats.diagnostics import shortened
 from robochoc.ros.flight import Flown, Nearest
 from robochoc.ros.mission import Leg, Mission
 
-ARRIVED_M = 0.01
-"""So near to its place a drone has arrived."""
+ARRIVED_M = 0.1
+"""So near to its place a drone has arrived: in calm air it ends within a millimetre, in gusts within centimetres."""
 _NAMES = 6
 
 
@@ -35,10 +35,11 @@ def report(mission: Mission, flown: Flown) -> str:
 
 
 def _verdict(mission: Mission, flown: Flown) -> str:
-    last = mission.legs[-1].goals.values() if mission.legs else ()
-    landing = sum(goal.lands for goal in last)
-    fallen = sum(not isfinite(error) for error in flown.errors_m)
-    counts = {"at their places": len(last) - landing, "at the edge": landing, "fallen": fallen}
+    last = mission.legs[-1].goals if mission.legs else {}
+    fallen = [number for number, error in enumerate(flown.errors_m) if not isfinite(error)]
+    landing = sum(goal.lands for number, goal in last.items() if number not in fallen)
+    flying = sum(not goal.lands for number, goal in last.items() if number not in fallen)
+    counts = {"at their places": flying, "at the edge": landing, "fallen": len(fallen)}
     told = ", ".join(f"{number} {words}" for words, number in counts.items() if number)
     return f"{len(flown.names)} drones: {told or 'nobody has anywhere to go'}"
 
