@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 
 import pytest
@@ -24,6 +25,7 @@ from robochoc.problem import (
     Variable,
 )
 from robochoc.ros.loop import drones_of
+from robochoc.ros.places import Places
 from robochoc.ros.reading import Reading
 from robochoc.ros.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.ros.situation import LIES_TIMES, Situation
@@ -186,6 +188,39 @@ def test_rows_of_drones_with_a_variable_each() -> None:
     row = Robot("Row", (Variable("v1", LEVELS), Variable("v2", LEVELS)), topics=topics)
     assert after(Team("row", (row,)), Blocked("d1", (1, 2, 4))) == (RemoveValue("v2", 4),)
     assert after(Team("row", (row,)), OutOfOrder("d2")) == (RemoveAgent("Row"),)
+
+
+def test_thousands_of_obstacles_cost_no_more_each_than_a_few() -> None:
+    """A hundred million comparisons of places would take half a minute."""
+    team, sees = pair(), situation(pair())
+    for number in range(9_000):
+        assert sees.heed(team, Blocked("A", (1.0, 50.0 + number, 1.0))) == ()
+    for number in range(9_000):
+        assert sees.heed(team, Cleared("A", (1.0, 50.0 + number, 5.0))) == ()
+    began = time.process_time()
+    for _ in range(300):
+        assert sees.heed(team, Blocked("A", (1.0, 9_049.0, 1.0))) == ()
+        assert sees.heed(team, Cleared("A", (9.0, 9_049.0, 1.0))) == ()
+    assert time.process_time() - began < 0.3
+
+
+somewhere = st.tuples(*[st.floats(-2, 2) | st.sampled_from([-0.5, 0.0, 0.5, 1.0])] * 3)
+
+
+@given(st.lists(somewhere, max_size=12), st.lists(st.tuples(somewhere, st.booleans()), max_size=6))
+def test_what_is_near_is_found_as_if_all_were_looked_at(
+    kept: list[tuple[float, float, float]], asked: list[tuple[tuple[float, float, float], bool]]
+) -> None:
+    places = Places()
+    for place in kept:
+        places.add(place)
+    for there, gone in asked:
+        near = [place for place in kept if math.dist(place, there) <= 0.5]
+        assert places.any_near(there, 0.5) == bool(near)
+        if gone:
+            assert places.remove_near(there, 0.5) == bool(near)
+            kept = [place for place in kept if place not in near]
+        assert len(places) == len(kept)
 
 
 coordinates = st.floats(-1, 6) | st.sampled_from([1.0, 2.0, 1.5, 2.5])

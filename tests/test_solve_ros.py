@@ -176,7 +176,7 @@ def test_what_cannot_be_published_at_last_is_told_all_the_same(tmp_path: Path, m
 
 def test_a_sink_that_nobody_has(tmp_path: Path) -> None:
     result = solved(HANGAR, "--ros", f"cassette:{tmp_path}/a")
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     assert "no sink 'cassette' is installed" in result.stderr
     assert "no source 'cassette' is installed" in solved(HANGAR, "--situation", "cassette:a").stderr
 
@@ -207,8 +207,15 @@ def test_a_team_without_topics_has_nothing_to_publish(tmp_path: Path) -> None:
         (("--battery", "0.1", "--situation", "flight"), "--battery is for robots that are listened to"),
         (("--frame", "hall"), "--frame is for what is published"),
         (("--scale", "2"), "--scale is for what is published"),
-        (("--ros", "mcap:a", "--situation", "mcap:a"), "mcap:a is given twice"),
+        (("--ros", "mcap:a", "--situation", "mcap:a"), "--situation mcap:a and --ros mcap:a are one place"),
         (("--ros", "mcap:a", "--ros", "mcap:a"), "mcap:a is given twice"),
+        (("--ros", "mcap:a.mcap", "--ros", "./a.mcap"), "--ros mcap:a.mcap and --ros ./a.mcap are one place"),
+        (("--ros", "a.mcap", "--ros", "rosbag:a.mcap"), "--ros a.mcap and --ros rosbag:a.mcap are one place"),
+        (("--ros", "mcap:a", "--journal", "a"), "--journal a and --ros mcap:a are one place"),
+        (("--ros", "mcap:a", "--html", "a"), "--html a and --ros mcap:a are one place"),
+        (("--situation", "flight", "--wind", "1e9"), "is faster than 200 m/s"),
+        (("--situation", "flight", "--gusts", "1e9"), "gusts have to be a number from 0 to 200 m/s"),
+        (("--scale", "1e300", "--ros", "mcap:a"), "--scale"),
         (("--situation", "flight", "--fail", "Wing"), "no drone 'Wing' that could fail"),
         (("--situation", "flight", "--fail", "Fin@soon"), "is not ROBOT or ROBOT@SECONDS"),
         (("--situation", "flight", "--obstacle", "1,2"), "is not three numbers"),
@@ -235,6 +242,23 @@ def test_patience_with_a_recording(run: tuple[Path, Result]) -> None:
     result = solved(HANGAR, "--situation", f"mcap:{folder / 'run.mcap'}", "--patience", "3")
     assert result.exit_code == 2
     assert "run.mcap is a recording" in result.stderr
+
+
+def test_a_recording_that_is_read_is_not_written(run: tuple[Path, Result], monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, _ = run
+    monkeypatch.chdir(folder)
+    before = (folder / "run.mcap").read_bytes()
+    result = solved(HANGAR, "--situation", "mcap:run.mcap", "--ros", f"mcap:{folder / 'run.mcap'}")
+    assert result.exit_code == 2
+    assert "--situation mcap:run.mcap and --ros mcap:" in result.stderr
+    assert (folder / "run.mcap").read_bytes() == before
+
+
+def test_a_flight_that_would_never_end_is_not_begun(tmp_path: Path) -> None:
+    result = solved(HANGAR, "--situation", "flight", "--scale", "1e6", "--ros", f"mcap:{tmp_path / 'run.mcap'}")
+    assert (result.exit_code, len(result.stderr.splitlines())) == (1, 1)
+    assert "ask for a smaller scale" in result.stderr
+    assert not list(tmp_path.iterdir())
 
 
 # One robot, on its own machine
@@ -264,3 +288,15 @@ def test_what_one_robot_knows_of_its_goal() -> None:
         assert leg_alone(robot, why, values).goals == {}
         assert leg_alone(robot, why, values).verdict is Verdict.UNKNOWN
     assert [drone.name for drone in crew_alone(robot)] == ["Robot3.2"]
+
+
+def test_a_result_that_is_flown_is_not_written_over(tmp_path: Path) -> None:
+    result = tmp_path / "result.json"
+    result.write_text(solved(HANGAR, "--json").stdout)
+    before = result.read_text()
+    flown = ran("fly", result, "--team", HANGAR, "--ros", f"mcap:{result}")
+    assert (flown.exit_code, result.read_text()) == (2, before)
+    assert "are one place" in " ".join(flown.stderr.split())
+    windy = ran("fly", result, "--wind", "1e9")
+    assert windy.exit_code == 2
+    assert "is faster than 200 m/s" in windy.stderr

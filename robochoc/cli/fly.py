@@ -10,7 +10,15 @@ import click
 
 from robochoc.cli.failure import INVALID, LOST, Failure, invalid_input_fails
 from robochoc.cli.paths import InputPath, OutputFile
-from robochoc.cli.ros import FRAME, conditions_of, flight_options, open_sinks, ros_failures_told, ros_options
+from robochoc.cli.ros import (
+    FRAME,
+    conditions_of,
+    flight_options,
+    open_sinks,
+    refuse_same_places,
+    ros_failures_told,
+    ros_options,
+)
 from robochoc.cli.saved import saved_outcome, team_of, team_option
 
 if TYPE_CHECKING:
@@ -41,6 +49,7 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
     team = team_of(outcome, saved, folder)
     if given["sinks"] and team is None:
         raise click.UsageError("--ros publishes on the topics that robots' files name: give their folder with --team")
+    refuse_same_places(given["sinks"], {"--html": html, "the result": saved})
     from robochoc.ros.mission import mission_of
 
     mission = mission_of(outcome, team, given["scale"])

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -112,7 +113,7 @@ ros_options = _optional(
     click.option("--frame", metavar="NAME", help=f"The frame of all places.  [default: {FRAME}]"),
     click.option(
         "--scale",
-        type=Finite(0, min_open=True),
+        type=Finite(1e-6, 1e6),
         metavar="METRES",
         help="So long is a unit of the topics' x, y and z.  [default: 1, or less for a vast field]",
     ),
@@ -205,7 +206,6 @@ def ros_asked(settings: dict[str, Any]) -> Ros:
         _refuse(_HEARD, asked, "is for robots that are listened to: add --situation mcap:FILE, or another source")
     if not (sinks or situation):
         _refuse(_PLACED, asked, _NOT_PUBLISHED)
-    _refuse_twice(sinks)
     surroundings = {name: given[name] for name in _FLOWN_HERE if name in asked}
     frame = given["frame"] or FRAME
     return Ros(sinks, situation, frame, given["scale"], given["patience"], given["battery"], surroundings)
@@ -217,10 +217,20 @@ def _refuse(options: Mapping[str, str], asked: set[str], why: str) -> None:
             raise click.UsageError(f"{option} {why}")
 
 
-def _refuse_twice(places: Sequence[str]) -> None:
-    for place in places:
-        if places.count(place) > 1:
-            raise click.UsageError(f"--ros {place} is given twice")
+def refuse_same_places(sinks: Sequence[str], files: Mapping[str, Path | None], situation: str | None = None) -> None:
+    """What is published goes to places of its own: not to the command's other `files`, nor where `situation` is."""
+    if not sinks:
+        return
+    from robochoc.ros.sinks import place_of
+
+    taken: dict[Path | str, str] = {path.resolve(): f"{what} {path}" for what, path in files.items() if path}
+    if isinstance(heard := place_of(situation or ""), Path):
+        taken[heard] = f"--situation {situation}"
+    for text in sinks:
+        other = taken.setdefault(place_of(text), option := f"--ros {text}")
+        if other is not option:
+            told = f"{option} is given twice" if other == option else f"{other} and {option} are one place"
+            raise click.UsageError(told)
 
 
 def check_ros(ros: Ros, settings: Mapping[str, Any]) -> None:
@@ -283,15 +293,24 @@ def surroundings_of(given: Mapping[str, Any], seed: int) -> Surroundings:
     return Surroundings(seed=seed, **given)
 
 
-def conditions_of(given: Mapping[str, Any], mission: Mission) -> Conditions:
-    """What the options of `robochoc fly` ask for. Raises `click.UsageError` for a drone that is not there."""
+@contextmanager
+def _surroundings_told() -> Iterator[None]:
+    """A drone that is not there, or weather in which nothing flies, is wrong usage."""
     from robochoc.ros.simulated import NoSuchDrone
 
-    asked = {name: given[name] for name in _FLOWN if given[name] not in (None, ())}
     try:
-        return surroundings_of(asked, given["seed"]).conditions(mission.drones, mission.scale)
+        yield
     except NoSuchDrone as wrong:
         raise click.UsageError(f"--fail: {wrong}") from wrong
+    except ValueError as wrong:
+        raise click.UsageError(str(wrong)) from wrong
+
+
+def conditions_of(given: Mapping[str, Any], mission: Mission) -> Conditions:
+    """What the options of `robochoc fly` ask for. Raises `click.UsageError` for a drone that is not there."""
+    asked = {name: given[name] for name in _FLOWN if given[name] not in (None, ())}
+    with _surroundings_told():
+        return surroundings_of(asked, given["seed"]).conditions(mission.drones, mission.scale)
 
 
 @contextmanager
@@ -316,21 +335,17 @@ def looped(ros: Ros, team: Team, seed: int) -> Iterator[Loop | None]:
 def _senses(ros: Ros, drones: Sequence[Drone], seed: int, stack: ExitStack) -> Senses:
     """What `--situation` asks for."""
     if ros.situation == FLIGHT:
-        from robochoc.ros.simulated import Flying, NoSuchDrone
+        from robochoc.ros.simulated import Flying
 
         surroundings = surroundings_of(ros.surroundings, seed)
-        try:
+        with _surroundings_told():
             surroundings.check(drones)
-        except NoSuchDrone as wrong:
-            raise click.UsageError(f"--fail: {wrong}") from wrong
         return Flying(surroundings)
     from robochoc.ros.listening import PATIENCE_S, Listening
     from robochoc.ros.reading import Reading
     from robochoc.ros.sinks import open_source
 
     source = stack.enter_context(open_source(ros.situation or ""))
-    if ros.situation in ros.sinks and not source.live:
-        raise click.UsageError(f"--ros would write {ros.situation}, from which --situation reads")
     if ros.patience is not None and not source.live:
         raise click.UsageError(f"--patience is for robots that report while we wait; {ros.situation} is a recording")
     return Listening(source, Reading(drones, ros.frame), ros.patience or PATIENCE_S)
@@ -353,7 +368,7 @@ def outlets(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assi
     from robochoc.ros.alone import crew_alone, leg_alone
     from robochoc.ros.outlet import Outlet
 
-    _refuse_twice(texts)
+    refuse_same_places(texts, {})
     with ros_failures_told(), ExitStack() as stack:
         opened = open_sinks(texts, stack)
         found = [Outlet(robot.name, crew_alone(robot), sink, frame or FRAME) for sink in opened]

@@ -21,6 +21,7 @@ from robochoc.cli.ros import (
     flight_options,
     flown_by,
     looped,
+    refuse_same_places,
     ros_asked,
     ros_options,
     situation_options,
@@ -219,6 +220,7 @@ def solve(
     ros = ros_asked(settings)
     check_settings(settings)
     check_ros(ros, settings)
+    refuse_same_places(ros.sinks, {"--html": html, "--journal": journal}, ros.situation)
     if explain and as_json:
         raise click.UsageError("--explain is for people; the JSON result has the tree without it")
     withdraw = settings.pop("withdraw")

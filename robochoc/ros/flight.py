@@ -41,6 +41,8 @@ DISTANCE_M = 0.5
 _SHARE = 0.8
 """Of the nearest two homes or goals, where these are nearer."""
 LIMITS = Limits()
+LONGEST_S = 3600.0
+"""A leg that takes longer is not flown: every sample of it would be kept."""
 KEEP_M = 0.5
 SIGHT_M = 1.5
 _LOOK_M = 0.2
@@ -83,7 +85,8 @@ class Flight:
         """One leg, from where everybody is, to these goals by drones' numbers; who has none stays.
 
         With `heed` everybody stops and hovers as soon as somebody has something to report; this is returned, and the
-        goals are not reached. Raises `ValueError` where two goals are nearer to each other than the distance to keep.
+        goals are not reached. Raises `ValueError` where two goals are nearer to each other than the distance to keep,
+        and where the way takes more than `LONGEST_S`.
         """
         began = time.perf_counter()
         with np.errstate(all="ignore"):  # the simulation looks for numbers that are none
@@ -179,6 +182,7 @@ class Flight:
             simulation.tell(drone, what)
         planned = targets.planned(starts, hazards)
         who = targets.who
+        _check_length(starts[who], targets.places[who])
         way = plan(
             starts[who],
             targets.places[who],
@@ -240,6 +244,14 @@ class Flight:
         worst = int(apart.argmax())
         if apart[worst] > _FAR_M:
             self._simulation.tell(worst, f"is {apart[worst]:.2f} m from where it is wanted as the leg ends")
+
+
+def _check_length(starts: Array, ends: Array) -> None:
+    """That no straight way from start (N, 3) to end takes longer than `LONGEST_S`. Raises `ValueError`."""
+    longest_s = float(LIMITS.durations(np.linalg.norm(ends - starts, axis=1)).max(initial=0.0))
+    if not longest_s <= LONGEST_S:
+        told = f"a leg takes {longest_s / 3600:,.1f} hours at {LIMITS.speed:g} m/s, and more than one is not flown"
+        raise ValueError(f"{told}: ask for a smaller scale")
 
 
 def fly(mission: Mission, conditions: Conditions | None = None) -> Flown:

@@ -38,7 +38,7 @@ class Listening(Senses):
     def notes(self) -> list[str]:
         """See `Senses.notes`: places in a frame that is not ours."""
         return [
-            f"places on {topic} are in the frame {frame!r}, and were passed over (--frame says which is ours)"
+            f"places on {topic} are in the frame '{frame}', and were passed over (--frame says which is ours)"
             for topic, frame in self._reading.strange.items()
         ]
 

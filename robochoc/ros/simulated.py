@@ -47,12 +47,11 @@ class Surroundings:
     obstacles: tuple[Point, ...] = ()
 
     def check(self, drones: Sequence[Drone]) -> None:
-        """Raise `NoSuchDrone` unless all that are to fail are there."""
-        for name, _ in self.failures:
-            _named(drones, name)
+        """Raise `NoSuchDrone` unless all that are to fail are there, and `ValueError` for what no flight can meet."""
+        self.conditions(drones, 1.0)
 
     def conditions(self, drones: Sequence[Drone], scale: float) -> Conditions:
-        """The same for a flight of `drones`, in metres. Raises `NoSuchDrone`."""
+        """The same for a flight of `drones`, in metres. Raises `NoSuchDrone` and `ValueError`."""
         return Conditions(
             distance=self.distance,
             wind=self.wind,

@@ -7,6 +7,7 @@ the name. Whoever opens one closes it.
 from __future__ import annotations
 
 from importlib.metadata import EntryPoint
+from pathlib import Path
 from typing import cast
 
 from robochoc.formats.diagnostics import on_one_line
@@ -38,6 +39,12 @@ def open_source(text: str) -> Source:
     """The source that `text` names. Raises `NoSuchSource`, and `SourceFailed` where it cannot be opened."""
     name, place = _parts(text)
     return cast("type[Source]", _offered(SOURCES, "source", name, Source, NoSuchSource))(place)
+
+
+def place_of(text: str) -> Path | str:
+    """What `text` names, the same however it is spelled: the file of a recording, else `text` itself."""
+    name, place = _parts(text)
+    return Path(place).resolve() if place and name in _ENDINGS.values() else text
 
 
 def _parts(text: str) -> tuple[str, str]:

@@ -17,6 +17,7 @@ from robochoc.problem import AddValue, Change, Domain, RemoveAgent, RemoveValue,
 from robochoc.ros.crew import Craft, crafts_of
 from robochoc.ros.layout import Point
 from robochoc.ros.mission import Drone
+from robochoc.ros.places import Places
 from robochoc.ros.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 
 BATTERY = 0.2
@@ -67,7 +68,7 @@ class Situation:
         self._scale = scale
         self._battery = battery
         self._seen: dict[str, _Seen] = {}
-        self._obstacles: list[Point] = []
+        self._obstacles = Places()
         self._taken: dict[tuple[str, int], set[Point]] = {}
         self.notes = []
 
@@ -93,12 +94,12 @@ class Situation:
     # Obstacles
 
     def _blocked(self, team: Team, place: Point) -> tuple[Change, ...]:
-        if any(math.dist(place, other) <= _HAIR for other in self._obstacles):
+        if self._obstacles.any_near(place, _HAIR):
             return ()
         if len(self._obstacles) >= MOST_PLACES:
             self._note(f"more than {MOST_PLACES:,} places are blocked: further ones are passed over")
             return ()
-        self._obstacles.append(place)
+        self._obstacles.add(place)
         told = len(self.notes)
         found = tuple(self._taking(team, place))
         if not found and len(self.notes) == told:
@@ -107,11 +108,12 @@ class Situation:
 
     def _cleared(self, team: Team, place: Point) -> tuple[Change, ...]:
         """Give back what no other obstacle is in the way of."""
-        self._obstacles = [other for other in self._obstacles if not _is_near(place, other)]
+        if not self._obstacles.remove_near(place, WITHIN + _HAIR):
+            return ()
         free = [
             value
             for value, places in self._taken.items()
-            if not any(_is_near(one, other) for one in places for other in self._obstacles)
+            if not any(self._obstacles.any_near(one, WITHIN + _HAIR) for one in places)
         ]
         for value in free:
             del self._taken[value]
