@@ -15,8 +15,10 @@ from robochoc.ros.flight import Conditions, Failure, Flight, Flown, fly
 from robochoc.ros.layout import Point
 from robochoc.ros.mission import Goal, Mission, mission_of
 from robochoc.ros.quadrotor.airframe import GRAVITY
+from robochoc.ros.quadrotor.bounds import check_length
 from robochoc.ros.quadrotor.simulation import DT, Simulation
 from robochoc.ros.reports import Blocked, OutOfOrder
+from robochoc.ros.routes.timetable import NoWay, TooClose
 
 IN_THE_WIND = (3.0, 4.0, 0.0)
 PAIR = np.array([[0.0, 0, 0], [2, 0, 0]])
@@ -303,11 +305,67 @@ def test_goals_that_are_too_near_are_refused() -> None:
         Flight(["a", "b"], PAIR, Conditions(failures=(Failure("c", 1.0),)))
 
 
+def test_who_has_no_goal_gives_way_to_goals_that_leave_no_room() -> None:
+    flight = Flight(["a", "b"], np.array([[0.0, 0, 0], [2, 0, 0]]), Conditions())
+    flight.fly("up", {0: Goal((0.0, 0.0, 2.0))})
+    flight.fly("beside", {1: Goal((0.5, 0.0, 2.0))})
+    flown = flight.flown()
+    assert [what.split()[0] for _, what in whats(flown)] == ["hovers"]
+    assert least(flown) >= flown.distance == 0.5
+
+
+def test_who_is_wanted_along_the_ground_keeps_away_from_who_is_above() -> None:
+    simulation = Simulation(["a"], np.zeros((1, 3)), 0.0, Conditions())
+    heights = []
+    for spare in (0.1, 0.05, 0.0):
+        simulation.leave(spare)
+        heights.append(simulation.hop_m)
+    assert heights == pytest.approx([0.08, 0.04, 0.01])
+
+
+def test_refusals_of_the_plan_name_drones() -> None:
+    flight = Flight(["a", "b"], PAIR, Conditions())
+    everybody = np.arange(2)
+    assert flight._told(TooClose(1, 2, 0.1234, "goal"), everybody) == (  # noqa: SLF001 - places are checked before
+        "b and something that is in the way are to end only 0.123 m from each other"
+    )
+    assert flight._told(NoWay([0, 1]), everybody).startswith("there is no way for a, b: ")  # noqa: SLF001
+
+
+def test_what_is_too_much_is_refused_before_it_takes_minutes() -> None:
+    with pytest.raises(ValueError, match=r"1,001 drones are more than can be flown at a time \(1,000\)"):
+        Flight(["a"] * 1001, np.zeros((1001, 3)), Conditions())
+    with pytest.raises(ValueError, match=r"the homes of a and b are 1e-11 m apart, and 0\.01 m .* a larger scale$"):
+        Flight(["a", "b"], PAIR * 5e-12, Conditions())
+    with pytest.raises(ValueError, match=r"b: the place \(inf, 0, 0\) m is more than"):
+        Flight(["a", "b"], np.array([[0.0, 0, 0], [math.inf, 0, 0]]), Conditions())
+    with pytest.raises(ValueError, match="an obstacle: the place"):
+        Flight(["a", "b"], PAIR, Conditions(obstacles=((0.0, 0.0, 1e200),)))
+    flight = Flight(["a", "b"], PAIR, Conditions())
+    with pytest.raises(ValueError, match=r"b would have 5,000 m to fly, and 2,000 m is the most"):
+        flight.fly("up", {1: Goal((2.0, 0.0, 5000.0))})
+    with pytest.raises(ValueError, match=r"of 1,000 drones 100 s are the most"):
+        check_length(1000, 101.0)
+    flight.fly("up", UP)
+    assert flight.flown().errors_m.max() < 0.01
+
+
+def test_far_from_the_origin_drones_fly_as_near_it() -> None:
+    away = np.array([4e5, 5.5e6, 100.0])
+    near, far = (Flight(["a", "b"], PAIR + shift, Conditions()) for shift in (0 * away, away))
+    near.fly("up", UP)
+    places = [(number, goal.at) for number, goal in UP.items()]
+    far.fly("up", {number: Goal((x + 4e5, y + 5.5e6, z + 100)) for number, (x, y, z) in places})
+    assert far.flown().positions - away == pytest.approx(near.flown().positions, abs=1e-6)
+    assert far.flown().errors_m == pytest.approx(near.flown().errors_m, abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("wrong", "why"),
     [
         ({"distance": 0.0}, "positive"),
         ({"distance": math.nan}, "positive"),
+        ({"distance": 1e-9}, "0.01 at least"),
         ({"gusts": -1.0}, "gusts"),
         ({"gusts": math.inf}, "gusts"),
         ({"wind": (0.0, math.nan, 0.0)}, "finite"),

@@ -256,6 +256,23 @@ def test_obstacles_are_boxes_in_their_cells() -> None:
     assert any(path.endswith("obstacles/2/edges") for path in drawn)
 
 
+def test_obstacles_appear_when_they_are_seen() -> None:
+    mission = mission_of(epochs_of_three(), five())
+    flight = straight(mission, obstacles=((2.0, 3.0, 4.0), (1.0, 1.0, 1.0)))
+    html = page(scene_of(epochs_of_three(), mission=mission, flown=replace(flight, seen_s=(0.0, 1.5))))
+    (animation,) = (command for command in commands_of(html) if command["type"] == "set_animation")
+    appearing = {
+        clip["path"]: track["keys"]
+        for clip in animation["animations"]
+        for track in clip["clip"]["tracks"]
+        if track["name"] == ".material.opacity"
+    }
+    assert [path.rpartition("obstacles/")[2] for path in appearing] == ["2/body/<object>", "2/edges/<object>"]
+    for keys in appearing.values():
+        assert [(key["time"], key["value"]) for key in keys[:2]] == [(0, [0]), (1.5 * FPS, [0])]
+        assert keys[2]["value"][0] > 0.3
+
+
 def test_what_happened_is_told_in_its_order() -> None:
     outcome = epochs_of_three()
     mission = mission_of(outcome)

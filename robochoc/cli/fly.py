@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 @click.option("--serve", is_flag=True, help="Show the 3D scene live on this machine until Ctrl-C.")
 @click.option("--json", "as_json", is_flag=True, help="Print how it went as one JSON object.")
 @invalid_input_fails
-def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_json: bool, **given: Any) -> int:  # noqa: ANN401 - how it is flown and published
+def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_json: bool, **given: Any) -> None:  # noqa: ANN401 - how it is flown and published
     """Fly what `robochoc solve --json` printed, or the journal that `--journal` wrote.
 
     Epoch by epoch the drones fly to their places, or land at the edge if they have withdrawn, and keep their distance.
@@ -67,7 +67,7 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
             write_page(scene, html, quiet=as_json)
         if serve:
             serve_scene(scene)
-    return 0 if as_planned(flown) else LOST
+    click.get_current_context().exit(0 if as_planned(flown) else LOST)
 
 
 def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[Flown, list[str]]:

@@ -41,7 +41,8 @@ def _verdict(mission: Mission, flown: Flown) -> str:
     flying = sum(not goal.lands for number, goal in last.items() if number not in fallen)
     counts = {"at their places": flying, "at the edge": landing, "fallen": len(fallen)}
     told = ", ".join(f"{number} {words}" for words, number in counts.items() if number)
-    return f"{len(flown.names)} drones: {told or 'nobody has anywhere to go'}"
+    plural = "s" * (len(flown.names) != 1)
+    return f"{len(flown.names)} drone{plural}: {told or 'nobody has anywhere to go'}"
 
 
 def _legs(mission: Mission, flown: Flown) -> Iterator[str]:
@@ -76,7 +77,9 @@ def _arrival(flown: Flown) -> str:
 
 
 def _apart(flown: Flown) -> str:
-    told = [f"nearest: {_pair(flown, flown.nearest)}" if flown.nearest else "nobody met anybody"]
+    near = flown.nearest
+    word = "nearer than set" if near and near.distance_m < flown.distance else "nearest"
+    told = [f"{word}: {_pair(flown, near)}" if near else "nobody met anybody"]
     told.append(f"set: {_length(flown.distance)}")
     if flown.nearest_fallen:
         told.append(f"with one that fell: {_pair(flown, flown.nearest_fallen)}")
@@ -127,10 +130,10 @@ def flight_json(mission: Mission, flown: Flown) -> bytes:
         "distance_m": flown.distance,
         "nearest": pair(flown.nearest),
         "nearest_fallen": pair(flown.nearest_fallen),
-        "drones": {
-            name: {"at": [float(part) for part in end], "error_m": float(error) if isfinite(error) else None}
+        "drones": [
+            {"name": name, "at": [float(part) for part in end], "error_m": float(error) if isfinite(error) else None}
             for name, end, error in zip(flown.names, ends, flown.errors_m, strict=True)
-        },
+        ],
         "legs": [
             {"opened_by": leg.opened_by, "verdict": leg.verdict, "begins_s": stage.begins_s, "ends_s": stage.ends_s}
             for leg, stage in stages

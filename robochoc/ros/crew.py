@@ -22,6 +22,8 @@ Cell = tuple[int, int]
 # Longer numbers are dates or serial numbers, not rows.
 _ROW_AND_COLUMN = re.compile(r"(?<![0-9])([0-9]{1,4})[._,:;-]([0-9]{1,4})$")
 
+_FARTHEST = 10**300
+"""Numbers beyond it, which no floating point can hold, are drawn there."""
 _MOST_DECISIONS = 1_000
 """Of a robot whose places are all looked at before it decides."""
 
@@ -102,7 +104,7 @@ def _craft(
     level = None
     if known and not withdrew:
         height = _value(topic.z, values) if topic else None
-        level = known[0] if height is None else height
+        level = _bounded(known[0]) if height is None else height
     decided_by = _decided_by(topic, variables)
     return Craft(name, next(filter(None, cells), None), level, withdrew, topic=topic, decided_by=decided_by)
 
@@ -126,9 +128,13 @@ def _value(expression: Expression | None, values: Assignment) -> int | None:
     if expression is None:
         return None
     try:
-        return evaluate(expression, values)
+        return _bounded(evaluate(expression, values))
     except (Undefined, KeyError):
         return None
+
+
+def _bounded(value: int) -> int:
+    return max(-_FARTHEST, min(value, _FARTHEST))
 
 
 def _short_names(topics: Sequence[Topic]) -> list[str]:

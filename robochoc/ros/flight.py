@@ -19,10 +19,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from robochoc.ros.mission import Goal, Mission
 from robochoc.ros.quadrotor.airframe import Array
-from robochoc.ros.quadrotor.conditions import Conditions, Failure
+from robochoc.ros.quadrotor.bounds import check_homes, check_length, check_near, check_ways, origin_of
+from robochoc.ros.quadrotor.conditions import LEAST_M, Conditions, Failure
 from robochoc.ros.quadrotor.course import STOP_S, Course
 from robochoc.ros.quadrotor.flown import SAMPLES_A_SECOND, Flown, Happening, Stage
 from robochoc.ros.quadrotor.nearest import Nearest
@@ -32,7 +34,7 @@ from robochoc.ros.quadrotor.spots import gaps, nearest_two
 from robochoc.ros.quadrotor.targets import Hazards, Targets, check_apart, waits
 from robochoc.ros.reports import Blocked, OutOfOrder, Report
 from robochoc.ros.routes.motion import Limits
-from robochoc.ros.routes.timetable import plan
+from robochoc.ros.routes.timetable import NoWay, TooClose, plan
 
 __all__ = ["Conditions", "Failure", "Flight", "Flown", "Happening", "Nearest", "Stage", "fly"]
 
@@ -41,8 +43,6 @@ DISTANCE_M = 0.5
 _SHARE = 0.8
 """Of the nearest two homes or goals, where these are nearer."""
 LIMITS = Limits()
-LONGEST_S = 3600.0
-"""A leg that takes longer is not flown: every sample of it would be kept."""
 KEEP_M = 0.5
 SIGHT_M = 1.5
 _LOOK_M = 0.2
@@ -60,21 +60,27 @@ _FAR_M = 0.05
 class Flight:
     """Drones with these names that stand at `homes` (N, 3). Legs are flown as they are asked for.
 
-    Raises `ValueError` where there are no drones, the conditions name others, or homes are too near for them.
+    They are flown around an origin of their own where homes are far away: floating point is fine there, too.
+
+    Raises `ValueError` where there are no drones or too many (`quadrotor/bounds.py`), the conditions name others, or
+    homes are too near for them.
     """
 
     def __init__(self, names: Sequence[str], homes: Array, conditions: Conditions) -> None:
-        if not names:
-            raise ValueError("there are no drones to fly: the run has decided about none")
+        homes = np.array(homes, dtype=np.float64).reshape(-1, 3)
+        check_homes(names, homes)
         conditions.check(names)
         self.names = tuple(names)
         self.conditions = conditions
-        self._homes = np.array(homes, dtype=np.float64)
+        self._origin = origin_of(homes)
+        self._homes = homes - self._origin
         self._ground = float(self._homes[:, 2].min())
-        self._distance = conditions.distance or min(DISTANCE_M, _SHARE * nearest_two(self._homes))
+        self._distance = conditions.distance or _distance([self._homes])
         check_apart("homes", self.names, {number: (x, y, z) for number, (x, y, z) in enumerate(homes)}, self._distance)
-        self._obstacles = np.array(conditions.obstacles, dtype=np.float64).reshape(-1, 3)
+        check_near(["an obstacle"] * len(conditions.obstacles), conditions.obstacles)
+        self._obstacles = np.array(conditions.obstacles, dtype=np.float64).reshape(-1, 3) - self._origin
         self._known = np.zeros(len(self._obstacles), dtype=np.bool_)
+        self._seen_s = [0.0] * len(self._obstacles)
         self._asked: dict[int, Goal] = {}
         self._stages: list[Stage] = []
         self._wall_s = 0.0
@@ -86,7 +92,7 @@ class Flight:
 
         With `heed` everybody stops and hovers as soon as somebody has something to report; this is returned, and the
         goals are not reached. Raises `ValueError` where two goals are nearer to each other than the distance to keep,
-        and where the way takes more than `LONGEST_S`.
+        somebody has too far to fly, or what lies there leaves no way.
         """
         began = time.perf_counter()
         with np.errstate(all="ignore"):  # the simulation looks for numbers that are none
@@ -113,7 +119,7 @@ class Flight:
         return Flown(
             names=self.names,
             times=times,
-            positions=positions,
+            positions=positions + self._origin if self._origin.any() else positions,
             attitudes=attitudes,
             stages=tuple(self._stages),
             happenings=tuple(simulation.happenings),
@@ -122,6 +128,7 @@ class Flight:
             nearest_fallen=simulation.watch.nearest_fallen,
             distance=self._distance,
             obstacles=self.conditions.obstacles,
+            seen_s=tuple(self._seen_s),
             wall_s=self._wall_s,
         )
 
@@ -140,9 +147,12 @@ class Flight:
         if strange := [number for number in goals if not 0 <= number < len(self.names)]:
             raise ValueError(f"there are {len(self.names)} drones, from number 0 on, and no number {strange[0]}")
         simulation = self._simulation
+        places = np.array([goal.at for goal in goals.values()]).reshape(-1, 3)
+        check_near([self.names[number] for number in goals], places)
         if self.conditions.distance is None:
-            apart = nearest_two(np.array([goal.at for goal in goals.values()]).reshape(-1, 3))
-            self._distance = min(self._distance, _SHARE * apart)
+            self._distance = min(self._distance, _distance([places]))
+        moved = [(x, y, z) for x, y, z in (places - self._origin).tolist()]
+        goals = {number: replace(goal, at=at) for (number, goal), at in zip(goals.items(), moved, strict=True)}
         targets = Targets(self.names, goals, simulation.reference[:3].T, simulation.lost, self._distance)
         self._asked.update(goals)
         return targets
@@ -171,6 +181,7 @@ class Flight:
         """The plan from where everybody is wanted now, and whom it brings near to obstacles that nobody knows of."""
         simulation = self._simulation
         starts = simulation.reference[:3].T.copy()
+        check_ways(self.names, starts, targets.places)
         keep = self._keep(targets.planned(starts))
         ends = np.array([goal.at for goal in targets.goals.values()]).reshape(-1, 3)
         known = self._known | (gaps(self._obstacles, ends) >= keep)
@@ -181,20 +192,33 @@ class Flight:
         for drone, what in targets.give_way(hazards, wishes, self._ground):
             simulation.tell(drone, what)
         planned = targets.planned(starts, hazards)
+        simulation.leave(planned - self._distance)
         who = targets.who
-        _check_length(starts[who], targets.places[who])
-        way = plan(
-            starts[who],
-            targets.places[who],
-            distance=planned,
-            standing=targets.standing(hazards, starts, planned),
-            waits=delays[who],
-            limits=LIMITS,
-            ground=self._ground,
-        )
+        try:
+            way = plan(
+                starts[who],
+                targets.places[who],
+                distance=planned,
+                standing=targets.standing(hazards, starts, planned),
+                waits=delays[who],
+                limits=LIMITS,
+                ground=self._ground,
+            )
+        except (TooClose, NoWay) as refused:
+            raise ValueError(self._told(refused, who)) from refused
+        check_length(len(self.names), simulation.now_s + way.duration_s)
         course = Course(way, who, simulation.reference)
         unknown = {int(number): self._obstacles[number] for number in np.flatnonzero(~known)}
         return course, threats(course, unknown, keep)
+
+    def _told(self, refused: TooClose | NoWay, who: npt.NDArray[np.intp]) -> str:
+        """The same with the names of those that it is about: the plan knows only their places in `who`."""
+        numbers = refused.drones if isinstance(refused, NoWay) else (refused.first, refused.second)
+        named = [self.names[who[number]] if number < len(who) else "something that is in the way" for number in numbers]
+        if isinstance(refused, NoWay):
+            return f"there is no way for {', '.join(named)}: what is in the way encloses where they start or end"
+        ends = "start" if refused.where == "start" else "are to end"
+        return f"{' and '.join(named)} {ends} only {refused.distance_m:.3g} m from each other"
 
     def _keep(self, planned: float) -> float:
         """How far to stay from obstacles."""
@@ -234,6 +258,7 @@ class Flight:
             gap = float(np.sqrt(np.square(simulation.places[drone] - self._obstacles[number]).sum()))
             if gap <= max(SIGHT_M, keep + LIMITS.speed * STOP_S / 2 + _LOOK_M):
                 self._known[number] = True
+                self._seen_s[number] = simulation.now_s
                 place = self.conditions.obstacles[number]
                 simulation.tell(drone, f"sees an obstacle at ({', '.join(f'{x:g}' for x in place)})")
                 reports.append(Blocked(self.names[drone], place, simulation.now_s))
@@ -246,25 +271,26 @@ class Flight:
             self._simulation.tell(worst, f"is {apart[worst]:.2f} m from where it is wanted as the leg ends")
 
 
-def _check_length(starts: Array, ends: Array) -> None:
-    """That no straight way from start (N, 3) to end takes longer than `LONGEST_S`. Raises `ValueError`."""
-    longest_s = float(LIMITS.durations(np.linalg.norm(ends - starts, axis=1)).max(initial=0.0))
-    if not longest_s <= LONGEST_S:
-        told = f"a leg takes {longest_s / 3600:,.1f} hours at {LIMITS.speed:g} m/s, and more than one is not flown"
-        raise ValueError(f"{told}: ask for a smaller scale")
-
-
 def fly(mission: Mission, conditions: Conditions | None = None) -> Flown:
     """Fly all legs of `mission`, one after the other, in `conditions` (None: calm, and nothing happens).
 
     Raises `ValueError` where there is nobody to fly, the conditions do not fit the mission, or its places are too near.
     """
     conditions = conditions or Conditions()
-    homes = np.array([drone.home for drone in mission.drones])
-    if conditions.distance is None and mission.drones:
-        places = [homes, *(np.array([goal.at for goal in leg.goals.values()]).reshape(-1, 3) for leg in mission.legs)]
-        conditions = replace(conditions, distance=min(DISTANCE_M, _SHARE * min(map(nearest_two, places))))
-    flight = Flight([drone.name for drone in mission.drones], homes, conditions)
+    names = [drone.name for drone in mission.drones]
+    homes = np.array([drone.home for drone in mission.drones], dtype=np.float64).reshape(-1, 3)
+    check_homes(names, homes)
+    if conditions.distance is None:
+        goals = [np.array([goal.at for goal in leg.goals.values()]).reshape(-1, 3) for leg in mission.legs]
+        for leg, places in zip(mission.legs, goals, strict=True):
+            check_near([names[number] for number in leg.goals], places)
+        conditions = replace(conditions, distance=_distance([homes, *goals]))
+    flight = Flight(names, homes, conditions)
     for leg in mission.legs:
         flight.fly(leg.opened_by, leg.goals)
     return flight.flown()
+
+
+def _distance(places: Sequence[Array]) -> float:
+    """What is kept where nobody says: `DISTANCE_M`, or less where two of the same (K, 3) are nearer to each other."""
+    return max(LEAST_M, min(DISTANCE_M, *(_SHARE * nearest_two(points) for points in places)))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import count
+from itertools import count, product
 
 from robochoc.ros.crew import Cell, Craft, numbers
 
@@ -102,7 +102,7 @@ class Field:
 
     def places(self, crew: Sequence[Craft]) -> list[Point | None]:
         """Where each of `crew`, as many as have homes, flies to; nowhere without a level. No two meet."""
-        taken: list[Point] = []
+        taken = _Taken()
         around: dict[Point, Iterator[Point]] = {}
         found: list[Point | None] = []
         rows, columns, levels = self.axes
@@ -112,8 +112,8 @@ class Field:
                 here = (rows.at(craft.cell[0]), columns.at(craft.cell[1])) if craft.cell else (x, y)
                 middle = (*here, levels.at(craft.level))
                 spots = around.setdefault(middle, _spiral(middle))
-                place = next(spot for spot in spots if not _is_near(spot, taken))
-                taken.append(place)
+                place = next(spot for spot in spots if not taken.is_near(spot))
+                taken.add(place)
             found.append(place)
         return found
 
@@ -133,9 +133,11 @@ def field_of(crew: Sequence[Craft], others: Iterable[Craft] = ()) -> Field:
     rows, columns, levels = axes
     beside = _lines(rows.low, rows.cells, columns.high + _GAP, 1)
     homes: list[Point] = []
+    taken = _Taken()
     for x, y in cells:
         home = (rows.at(x), columns.at(y), levels.ground)
-        homes.append((*next(beside), levels.ground) if _is_near(home, homes) else home)
+        homes.append((*next(beside), levels.ground) if taken.is_near(home) else home)
+        taken.add(homes[-1])
     return Field(axes, tuple(homes))
 
 
@@ -174,9 +176,24 @@ def _lines(x: float, across: int, y: int, step: int) -> Iterator[tuple[float, fl
         yield float(x + number % across), float(y + number // across * step)
 
 
-def _is_near(point: Point, others: Sequence[Point]) -> bool:
-    """Whether one of `others` is too close to `point`."""
-    return any(math.dist(point, other) < _TOO_CLOSE for other in others)
+class _Taken:
+    """Points, sorted into boxes: who looks for those that are too close does not look at all."""
+
+    def __init__(self) -> None:
+        self._boxes: dict[tuple[int, ...], list[Point]] = {}
+
+    def add(self, point: Point) -> None:
+        """One more."""
+        self._boxes.setdefault(self._box(point), []).append(point)
+
+    def is_near(self, point: Point) -> bool:
+        """Whether one of them is too close to `point`."""
+        boxes = product(*((number - 1, number, number + 1) for number in self._box(point)))
+        return any(math.dist(point, other) < _TOO_CLOSE for box in boxes for other in self._boxes.get(box, ()))
+
+    @staticmethod
+    def _box(point: Point) -> tuple[int, ...]:
+        return tuple(math.floor(part / _TOO_CLOSE) for part in point)
 
 
 def _spiral(point: Point) -> Iterator[Point]:

@@ -19,6 +19,9 @@ UNIT_M = 1.0
 """A unit of coordinates, where nobody says otherwise: drones are a little narrower."""
 VAST_M = 40.0
 """A field is no longer than that, where nobody says how long."""
+_DENSE_M = 0.025
+"""A unit is no shorter, as long as a field that is `_FLOWN_M` long is not left: neighbours need some room."""
+_FLOWN_M = 1_000.0
 _FAR_BELOW = 40
 """Levels."""
 
@@ -195,5 +198,6 @@ def _owner(craft: Craft) -> str:
 
 
 def _scale(axes: Sequence[Axis]) -> float:
-    longest = max(axis.last - axis.first for axis in axes)
-    return min(UNIT_M, VAST_M / max(longest, 1))
+    longest = max(1, *(axis.last - axis.first for axis in axes))
+    dense = _DENSE_M if longest * _DENSE_M <= _FLOWN_M else 0.0
+    return min(UNIT_M, max(VAST_M / longest, dense))

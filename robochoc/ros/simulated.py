@@ -103,8 +103,8 @@ class Flying(Senses):
         """See `Senses.decided`."""
         if self._flight is None:
             homes = np.array([drone.home for drone in cast.drones], dtype=float).reshape(-1, 3)
-            conditions = self.surroundings.conditions(cast.drones, cast.scale)
             try:
+                conditions = self.surroundings.conditions(cast.drones, cast.scale)
                 self._flight = Flight([drone.name for drone in cast.drones], homes, conditions)
             except ValueError as refused:
                 raise CannotFly(on_one_line(str(refused))) from refused

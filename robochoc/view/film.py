@@ -20,8 +20,10 @@ from robochoc.ros.quadrotor.flown import Flown, Happening
 _HIT = "hits the ground"
 """What the flight says in the end of one that falls."""
 
-_LEAST_CELL_M = 0.25
-"""Of a cell's sides: a drone is larger."""
+_CELLS_M = (0.25, 4.0)
+"""How long a cell's sides may be: a drone is larger, or has minutes to fly."""
+_FAR_M = 1e6
+"""Who belongs further away than that is shown, and flown, near the origin."""
 
 _Array = npt.NDArray[np.float64]
 
@@ -67,7 +69,8 @@ class Film:
     looks: tuple[tuple[tuple[float, Look], ...], ...]
     chapters: tuple[Chapter, ...] = ()
     marks: tuple[Mark, ...] = ()
-    obstacles: tuple[Point, ...] = ()
+    obstacles: tuple[tuple[float, Point], ...] = ()
+    """Since when each is seen, and where it is."""
 
     @property
     def duration_s(self) -> float:
@@ -86,17 +89,21 @@ def film_of(mission: Mission, flown: Flown) -> Film:
         tuple(tuple(_looks(number, mission, flown)) for number in range(len(mission.drones))),
         tuple(_chapters(mission, flown)),
         tuple(sorted(marks, key=lambda mark: mark.at_s)),
-        tuple((float(x), float(y), float(z)) for x, y, z in obstacles),
+        tuple(
+            (seen_s, (float(x), float(y), float(z)))
+            for seen_s, (x, y, z) in zip(flown.seen_s or [0.0] * len(obstacles), obstacles, strict=True)
+        ),
     )
 
 
 def roomy(mission: Mission) -> Mission:
-    """`mission`; where its cells are smaller than drones, the same in a box whose cells are metres.
+    """`mission`; where its cells are smaller than drones, or vast, the same in a box whose cells are metres.
 
     Problems with vast numbers are no fields to scale: they are flown as they are drawn.
     """
     cells_m = [_cell_m(axis) * mission.scale for axis in mission.axes]
-    if min(cells_m) >= _LEAST_CELL_M:
+    ends_m = [abs(end) * mission.scale for axis in mission.axes for end in (axis.first, axis.last)]
+    if _CELLS_M[0] <= min(cells_m) <= max(cells_m) <= _CELLS_M[1] and max(ends_m) <= _FAR_M:
         return mission
 
     def moved(point: Point) -> Point:

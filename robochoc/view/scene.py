@@ -25,6 +25,8 @@ _MOST_DRONES = 500
 """More than that are not flown here: to find their ways takes minutes."""
 _MOST_FLIGHTS = 2_000
 """Of all drones, in all epochs, likewise."""
+_MOST_LEGS = 60
+"""However few drones: each takes a fifth of a second."""
 
 
 @dataclass(frozen=True)
@@ -76,16 +78,17 @@ def scene_of(
     for want of a way: then the drones are where they are to be, and the caption says why.
     """
     mission = mission or mission_of(outcome, team)
-    axes, why_not = mission.axes, ""
+    axes, why_not, is_to_scale = mission.axes, "", True
     if flown is None:
-        mission = roomy(mission)
+        asked, mission = mission, roomy(mission)
+        is_to_scale = mission is asked
         flown, why_not = _flown(mission)
     drones = tuple(_drones(mission))
     withdrawn = {*outcome.withdrawn}
     aside = sum(drone.robot in withdrawn or drone.name in withdrawn for drone in mission.drones)
     flying = sum(drone.place is not None for drone in drones)
     title = f"{outcome.team}: {_ending(outcome, flying, aside)}"
-    facts = (*_facts(outcome, flying, aside), *_flight_facts(flown, why_not))
+    facts = (*_facts(outcome, flying, aside), *_flight_facts(flown, why_not, is_to_scale=is_to_scale))
     return Scene(title, facts, drones, axes, film_of(mission, flown) if flown else None)
 
 
@@ -94,12 +97,16 @@ def _flown(mission: Mission) -> tuple[Flown | None, str]:
     drones, legs = len(mission.drones), len(mission.legs)
     if not any(leg.goals for leg in mission.legs):
         return None, ""
-    if drones > _MOST_DRONES or drones * legs > _MOST_FLIGHTS:
-        return None, f"{drones} drones in {legs} epochs are more than are flown for a picture"
+    if drones > _MOST_DRONES or drones * legs > _MOST_FLIGHTS or legs > _MOST_LEGS:
+        return None, f"{_counted(drones, 'drone')} in {_counted(legs, 'epoch')} are more than are flown for a picture"
     try:
         return fly(mission), ""
     except _NO_FLIGHT as error:
         return None, str(error) or type(error).__name__
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number:,} {noun}{'s' * (number != 1)}"
 
 
 def _drones(mission: Mission) -> Iterator[Drone]:
@@ -122,15 +129,15 @@ def _cell(mission: Mission, metres: Point) -> Point:
     return x, y, z
 
 
-def _flight_facts(flown: Flown | None, why_not: str) -> Iterator[tuple[str, str]]:
-    """How the flight went; or why there was none."""
+def _flight_facts(flown: Flown | None, why_not: str, *, is_to_scale: bool) -> Iterator[tuple[str, str]]:
+    """How the flight went, distances only where they are to scale; or why there was none."""
     if flown is None:
         if why_not:
             yield "flight", f"none: {why_not}"
         return
-    yield "flown", f"{flown.times[-1]:.1f} s"
+    yield "flown", f"{flown.times[-1]:.1f} s{'' if is_to_scale else ', not to scale'}"
     for label, nearest in (("nearest", flown.nearest), ("near fallen", flown.nearest_fallen)):
-        if nearest:
+        if nearest and is_to_scale:
             yield label, f"{nearest.distance_m:.2f} m (set: {flown.distance:.2g} m)"
     for number, happening in fell(flown).items():
         yield "fallen", f"{flown.names[number]} ({happening.what})"

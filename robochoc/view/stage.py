@@ -51,6 +51,8 @@ _ALIKE = math.radians(0.5)
 """So much may it be turned."""
 _IN_THE_WAY = 0.9
 """Of a cell, that an obstacle takes up."""
+_OPACITIES = {"body": 0.35, "edges": 0.9}
+"""Of an obstacle's parts."""
 
 
 def commands(scene: Scene) -> list[bytes]:
@@ -58,7 +60,7 @@ def commands(scene: Scene) -> list[bytes]:
     if scene.film is None:
         return _drawn(scene, [drone.end for drone in scene.drones]).commands
     recorder = _drawn(scene, [drone.home for drone in scene.drones])
-    _draw_obstacles(recorder, scene.film.obstacles)
+    _draw_obstacles(recorder, [place for _, place in scene.film.obstacles])
     _animate(recorder, scene.drones, scene.film)
     return recorder.commands
 
@@ -220,9 +222,9 @@ def _draw_drones(recorder: Recorder, drones: Sequence[Drone], points: Sequence[P
 
 def _draw_obstacles(recorder: Recorder, obstacles: Sequence[Point]) -> None:
     for number, place in enumerate(obstacles, 1):
-        recorder.mesh(f"obstacles/{number}/body", box(place, _IN_THE_WAY), RED, opacity=0.35)
+        recorder.mesh(f"obstacles/{number}/body", box(place, _IN_THE_WAY), RED, opacity=_OPACITIES["body"])
         sides = [np.array([at - _IN_THE_WAY / 2, at + _IN_THE_WAY / 2]) for at in place]
-        recorder.segments(f"obstacles/{number}/edges", _lattice(sides), RED, 0.9)
+        recorder.segments(f"obstacles/{number}/edges", _lattice(sides), RED, _OPACITIES["edges"])
 
 
 def _animate(recorder: Recorder, drones: Sequence[Drone], film: Film) -> None:
@@ -233,6 +235,12 @@ def _animate(recorder: Recorder, drones: Sequence[Drone], film: Film) -> None:
         tracks += _moves(path, film, number)
         if film.looks[number]:
             tracks.append(_painting(f"{path}/body/<object>", film.looks[number], colour))
+    for number, (seen_s, _) in enumerate(film.obstacles, 1):
+        if seen_s > 0:
+            tracks += [
+                _appearing(f"obstacles/{number}/{part}/<object>", seen_s, opacity)
+                for part, opacity in _OPACITIES.items()
+            ]
     if tracks:
         recorder.animate(tracks, FPS)
 
@@ -259,6 +267,12 @@ def _painting(path: str, looks: Sequence[tuple[float, Look]], colour: Colour) ->
         begin, now = max(FPS * at_s, keys[-1][0]), keys[-1][1]
         keys += [(begin, now), (begin + _FADE, tint(look, colour))]
     return Track(path, "material.color", "color", keys)
+
+
+def _appearing(path: str, at_s: float, opacity: float) -> Track:
+    """How something comes into sight."""
+    begin = FPS * at_s
+    return Track(path, "material.opacity", "number", [(0, [0.0]), (begin, [0.0]), (begin + _FADE, [opacity])])
 
 
 def _texts(names: Sequence[str], readable: float) -> list[str]:

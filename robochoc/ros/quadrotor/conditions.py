@@ -11,6 +11,8 @@ from robochoc.ros.quadrotor.airframe import ROTORS
 
 FASTEST_M_S = 200.0
 """No wind on the ground is faster."""
+LEAST_M = 0.01
+"""No distance between drones is less: plans look at steps of time that are short enough for it."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +41,14 @@ class Conditions:
     obstacles: tuple[Point, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.distance is not None and not 0 < self.distance < math.inf:
-            raise ValueError(f"the distance between drones has to be a positive number of metres, not {self.distance}")
+        if self.distance is not None and not LEAST_M <= self.distance < math.inf:
+            told = f"a positive number of metres, {LEAST_M:g} at least, not {self.distance}"
+            raise ValueError(f"the distance between drones has to be {told}")
         if not 0 <= self.gusts <= FASTEST_M_S:
             raise ValueError(f"gusts have to be a number from 0 to {FASTEST_M_S:g} m/s, not {self.gusts}")
         if max(map(abs, self.wind), default=0) > FASTEST_M_S:
-            raise ValueError(f"a wind of {self.wind} is faster than {FASTEST_M_S:g} m/s")
+            told = ", ".join(f"{part:g}" for part in self.wind)
+            raise ValueError(f"a wind of ({told}) is faster than {FASTEST_M_S:g} m/s")
         if self.seed < 0:
             raise ValueError(f"a seed has to be a number from 0 on, not {self.seed}")
         for what, point in (("wind", self.wind), *(("obstacle", place) for place in self.obstacles)):

@@ -39,7 +39,8 @@ class Flown:
     everybody was in the end from the goal that was asked for: 0 for who had none, nan for who has fallen. `nearest` is
     the nearest that two drones came, flying or standing, at any step of the simulation; pairs with one that falls or
     has fallen are counted in `nearest_fallen`. `distance` is the one that was to be kept. `wall_s` is how long the
-    simulation took, its planning included.
+    simulation took, its planning included. `seen_s` says since when each of the `obstacles` is seen: 0 for those that
+    surprise nobody.
     """
 
     names: tuple[str, ...]
@@ -54,6 +55,7 @@ class Flown:
     distance: float
     obstacles: tuple[Point, ...]
     wall_s: float
+    seen_s: tuple[float, ...] = ()
 
     @property
     def simulated_s(self) -> float:

@@ -28,8 +28,10 @@ _CUT_OFF = math.cos(math.radians(60))
 _PRESS_M = 0.05
 """Who is to land is wanted so far below the ground, once it is right above its spot, so that it touches it."""
 _ABOVE_M = 0.003
-_HOP_M = 0.1
-"""Who is wanted along the ground flies so far above it."""
+_HOP_M = (0.01, 0.08)
+"""Who is wanted along the ground flies so far above it, at least and at most."""
+_HOP = 0.8
+"""Of what a plan keeps besides the distance: somebody may be right above."""
 _TOUCH_M = 1e-6
 _BOUNDS = 1e6
 """m and m/s: nobody is further away, or faster."""
@@ -43,6 +45,7 @@ class Simulation:
         self.reference = np.zeros((9, number))
         self.reference[:3] = homes.T
         self.happenings: list[Happening] = []
+        self.hop_m = _HOP_M[1]
         self.broken: list[tuple[int, str, float]] = []
         """Who cannot fly any more: its number, why, since when."""
         self.watch = Watch(number)
@@ -119,6 +122,10 @@ class Simulation:
         if self.is_sampled:
             self._note()
 
+    def leave(self, spare: float) -> None:
+        """From now on plans keep `spare` metres besides the distance."""
+        self.hop_m = min(max(_HOP * spare, _HOP_M[0]), _HOP_M[1])
+
     def tell(self, drone: int, what: str) -> None:
         """Note a happening now."""
         self.happenings.append(Happening(self.now_s, drone, what))
@@ -138,7 +145,7 @@ class Simulation:
         aside = np.square(self.reference[:2] - self._bodies.state[:2]).sum(0)
         lands = low & ~moving & (late | (aside < _ABOVE_M**2))
         wanted = self.reference.copy()
-        wanted[2] += _HOP_M * (low & moving) - _PRESS_M * lands
+        wanted[2] += self.hop_m * (low & moving) - _PRESS_M * lands
         return wanted
 
     def _fail(self, failure: Failure) -> None:

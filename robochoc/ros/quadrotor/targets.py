@@ -13,7 +13,9 @@ from robochoc.ros.layout import Point
 from robochoc.ros.mission import Goal
 from robochoc.ros.quadrotor.airframe import Array
 from robochoc.ros.quadrotor.bodies import Mask
+from robochoc.ros.quadrotor.conditions import LEAST_M
 from robochoc.ros.quadrotor.spots import free_spot, gaps, nearest_two
+from robochoc.ros.routes.spacing import SLACK_M
 
 MARGIN_M = 0.1
 """Plans keep so much more than the distance. Tracking takes 1 cm of it in calm air, and 6 cm where a drone takes off
@@ -70,12 +72,13 @@ class Targets:
         that is nearest to their `wishes` (N, 3).
         """
         told = []
+        going = np.array([number for number in self.who.tolist() if number in self.goals], dtype=np.intp)
         for number in self.who.tolist():
             goal, place = self.goals.get(number), self.places[number].copy()
             others = self.places[self.who[self.who != number]]
             if goal is not None and hazards.meet(place):
                 why = "something is there"
-            elif goal is None and gaps(place[None], others)[0] < self._distance:
+            elif goal is None and gaps(place[None], self.places[going])[0] < needed(self._distance) - SLACK_M:
                 why = "another one flies to where it is"
             else:
                 continue
@@ -95,16 +98,28 @@ class Targets:
         return np.vstack((starts[self.who], self.places[self.who]))
 
 
+def needed(distance: float) -> float:
+    """How far apart places have to be so that drones keep `distance`: nobody is exactly where it is wanted."""
+    return distance + min(MARGIN_M, distance / 4)
+
+
 def check_apart(what: str, names: Sequence[str], places: Mapping[int, Point], distance: float) -> None:
-    """That no two `places`, by drones' numbers, are nearer to each other than `distance`. Raises `ValueError`."""
-    if nearest_two(np.array([*places.values()]).reshape(-1, 3)) >= distance:
+    """That no two `places`, by drones' numbers, are too near to each other to keep `distance`. Raises `ValueError`."""
+    least = needed(distance) - SLACK_M
+    if nearest_two(np.array([*places.values()]).reshape(-1, 3)) >= least:
         return
     for (first, one), (second, other) in combinations(places.items(), 2):
         gap = math.dist(one, other)
-        if gap < distance:
+        if gap < least:
+            told = f"{gap:.2f}" if gap >= LEAST_M else f"{gap:.1g}"
+            asked = f"{distance:g} m are to be kept" + (
+                f", which takes {needed(distance):g} m" if gap >= distance - SLACK_M else ""
+            )
+            step = (
+                "ask for a smaller distance, or for a larger scale" if distance > LEAST_M else "ask for a larger scale"
+            )
             raise ValueError(
-                f"the {what} of {names[first]} and {names[second]} are {gap:.2f} m apart, and {distance:g} m are to be "
-                "kept: ask for a smaller distance, or for a larger scale"
+                f"the {what} of {names[first]} and {names[second]} are {told} m apart, and {asked}: {step}"
             )
 
 
