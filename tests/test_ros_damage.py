@@ -177,7 +177,7 @@ def bombs() -> Iterator[tuple[str, bytes]]:
 
 def test_bombs_are_refused_and_eat_no_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("recording", "mcap_file"):
-        monkeypatch.setattr(f"robochoc.ros.{module}.BLOCK_AT_MOST", 1 << 22)
+        monkeypatch.setattr(f"robochoc.ros.recordings.{module}.BLOCK_AT_MOST", 1 << 22)
     read(write(FILES[0], messages(1)))  # what is imported only once is not counted
     for ending, content in bombs():
         file = Path(f"bomb.{ending}")

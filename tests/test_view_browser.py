@@ -145,7 +145,7 @@ def test_the_slider_is_the_time(player: Page) -> None:
     player.mouse.click(line["x"] + line["width"] / 2, line["y"] + line["height"] / 2)
     assert now(player) == pytest.approx(END_S / 2, abs=0.05)
     assert player.inner_text("#clock") == f"{now(player):.1f} / 6.0 s"
-    assert player.get_attribute("#time", "aria-valuetext").endswith("of 6.0 seconds, epoch 2 of 3")
+    assert player.get_attribute("#time", "aria-valuetext").endswith("of 6.0 seconds, epoch 1 of 0 to 2")
     assert not player.evaluate("Film.player.playing")
 
 
@@ -179,13 +179,13 @@ def test_the_caption_tells_the_epoch(player: Page) -> None:
     said = ["the start: solution, 4 fly", "-R5.1: no solution, 3 hover on", "V2.1 without <2>: solution, 4 fly"]
     for number, words in enumerate(said):
         player.evaluate(f"Film.player.seek({LEG_S * number + 0.5})")
-        assert player.inner_text("#epoch").split("\n") == [f"Epoch {number + 1} of 3", words]
+        assert player.inner_text("#epoch").split("\n") == [f"Epoch {number} of 0 to 2", words]
 
 
 def test_marks_say_what_happened_and_lead_there(player: Page) -> None:
     marks = player.locator("#marks button")
     labels = marks.evaluate_all("all => all.map((one) => one.getAttribute('aria-label'))")
-    assert labels[1] == "Epoch 2: -R5.1, no solution, 3 hover on; at 2.0 s"
+    assert labels[1] == "Epoch 1: -R5.1, no solution, 3 hover on; at 2.0 s"
     assert labels[3] == "R2.1: motor 2 stopped; at 3.0 s"
     marks.nth(3).focus()
     assert player.inner_text("#hint") == "R2.1: motor 2 stopped (3.0 s)"
@@ -194,7 +194,7 @@ def test_marks_say_what_happened_and_lead_there(player: Page) -> None:
     player.evaluate("document.activeElement.blur()")
     assert player.locator("#hint").is_hidden()
     marks.nth(1).hover()
-    assert player.inner_text("#hint").startswith("Epoch 2")
+    assert player.inner_text("#hint").startswith("Epoch 1")
     marks.nth(1).click()
     assert now(player) == LEG_S
 
@@ -297,8 +297,8 @@ def test_with_little_motion_it_begins_at_its_end(small: Page) -> None:
 
 def test_epochs_that_begin_together_are_told_together(small: Page) -> None:
     said = small.inner_text("#epoch")
-    assert "Epoch 2 of 3" in said
-    assert "Epoch 3 of 3" in said
+    assert "Epoch 1 of 0 to 2" in said
+    assert "Epoch 2 of 0 to 2" in said
     boxes = [small.locator("#marks button").nth(number).bounding_box() for number in range(3)]
     assert boxes[1]["x"] + boxes[1]["width"] <= boxes[2]["x"] + 0.5
 
@@ -354,7 +354,7 @@ def test_the_live_page_plays_the_same(browser: Any, one: Page) -> None:  # noqa:
             with opened(browser, server.stdout.readline().strip(), viewport=one.viewport_size) as live:
                 until(lambda: live.evaluate("Boolean(Film.trails.mesh)"), "nothing to play has come")
                 live.evaluate("Film.player.pause(); Film.player.seek(4.5)")
-                assert live.inner_text("#epoch").startswith("Epoch 3 of 3")
+                assert live.inner_text("#epoch").startswith("Epoch 2 of 0 to 2")
                 assert place(live, 0) != pytest.approx(place(live, 1), abs=0.5)
                 assert pressed(live) == "overview"
                 away = "Film.viewer.camera.position.length()"

@@ -43,7 +43,7 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
     With --ros, each epoch's waypoints are published, and where all drones are 20 times a second, by the flight's
     own time, which begins at 0. The exit status is 4 if a drone did not arrive, fell, or came nearer than it may.
     """
-    from robochoc.cli.fly_report import as_planned, flight_json, report
+    from robochoc.cli.fly_report import as_planned, flight_json, report, too_late
 
     outcome = saved_outcome(saved)
     team = team_of(outcome, saved, folder)
@@ -56,7 +56,7 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
     flown, published = _flown(saved, mission, given)
     click.echo(flight_json(mission, flown) if as_json else report(mission, flown))
     if not as_json:
-        for line in published:
+        for line in (*published, *too_late(given["failures"], flown)):
             click.echo(line, err=True)
     if html or serve:
         from robochoc.cli.scene import serve_scene, write_page

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from math import isfinite
+from collections.abc import Iterable, Iterator, Sequence
+from math import isfinite, isnan
 
 import msgspec
 
@@ -17,21 +17,32 @@ ARRIVED_M = 0.1
 _NAMES = 6
 
 
-def as_planned(flown: Flown) -> bool:
-    """Whether everybody has arrived, nobody has fallen, and no two came nearer than the set distance."""
+def as_planned(flown: Flown, *, may_fall: bool = False) -> bool:
+    """Whether everybody has arrived, no two came nearer than the set distance, and nobody has fallen, or may."""
     apart = flown.nearest is None or flown.nearest.distance_m >= flown.distance
-    return apart and all(error <= ARRIVED_M for error in flown.errors_m)
+    return apart and all(error <= ARRIVED_M or (may_fall and isnan(error)) for error in flown.errors_m)
 
 
 def report(mission: Mission, flown: Flown) -> str:
-    """Leg by leg, then who has arrived, how near they came, and how fast it was simulated."""
-    lines = [f"{on_one_line(mission.team)}: {_verdict(mission, flown)}", *_legs(mission, flown)]
-    lines += [
-        f"  {happening.at_s:6.1f} s  {_name(flown, happening.drone)}: {happening.what}"
-        for happening in flown.happenings
+    """Leg by leg what was flown, then how it went."""
+    return "\n".join(
+        [f"{on_one_line(mission.team)}: {_verdict(mission, flown)}", *_legs(mission, flown), how_it_went(flown)]
+    )
+
+
+def how_it_went(flown: Flown) -> str:
+    """What happened, who has arrived, how near they came, and how fast it was simulated."""
+    lines = [f"{one.at_s:6.1f} s  {_name(flown, one.drone)}: {one.what}" for one in flown.happenings]
+    return "\n".join(f"  {line}" for line in (*lines, _arrival(flown), _apart(flown), _speed(flown)))
+
+
+def too_late(failures: Iterable[tuple[str, float]], flown: Flown) -> list[str]:
+    """Which of the `failures` that were asked for could not happen, as the flight was over: a line each."""
+    return [
+        f"--fail {on_one_line(name)}@{at_s:g}: the flight was over after {flown.simulated_s:.1f} s"
+        for name, at_s in failures
+        if at_s > flown.simulated_s
     ]
-    lines += [f"  {line}" for line in (_arrival(flown), _apart(flown), _speed(flown))]
-    return "\n".join(lines)
 
 
 def _verdict(mission: Mission, flown: Flown) -> str:

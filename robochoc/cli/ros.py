@@ -15,7 +15,7 @@ from robochoc.cli.failure import INVALID, USAGE, Failure
 
 if TYPE_CHECKING:
     from robochoc.problem import Assignment, Robot, Team
-    from robochoc.ros.flight import Conditions, Flown
+    from robochoc.ros.flight import Conditions
     from robochoc.ros.loop import Loop, Senses
     from robochoc.ros.mission import Drone, Mission
     from robochoc.ros.simulated import Surroundings
@@ -380,18 +380,3 @@ def outlets(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assi
             return [f"{outlet.place}: {outlet.told}" for outlet in found]
 
         yield publish
-
-
-def told_of(loop: Loop) -> list[str]:
-    """What was published where, and what could not be heeded: a line each."""
-    return [*(f"{outlet.place}: {outlet.told}" for outlet in loop.outlets), *loop.notes]
-
-
-def flown_by(loop: Loop | None) -> tuple[Mission, Flown] | None:
-    """What a simulated flight has flown, for the page; None where nothing was."""
-    if loop is None or loop.mission is None or not loop.senses or not loop.senses.simulated:
-        return None
-    from robochoc.ros.simulated import Flying
-
-    flown = loop.senses.flown() if isinstance(loop.senses, Flying) else None
-    return None if flown is None else (loop.mission, flown)

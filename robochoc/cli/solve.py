@@ -13,19 +13,18 @@ import click
 from robochoc.cli.channel import ChannelName, channel_for
 from robochoc.cli.failure import INVALID, LIMIT, Failure, failures_told, worst
 from robochoc.cli.local import limits, local_options
+from robochoc.cli.looped import flight_told, told_of
 from robochoc.cli.order import GIVEN, OrderName, order_for
 from robochoc.cli.paths import InputPath, OutputFile
 from robochoc.cli.recording import recording, shown_and_flushed
 from robochoc.cli.ros import (
     check_ros,
     flight_options,
-    flown_by,
     looped,
     refuse_same_places,
     ros_asked,
     ros_options,
     situation_options,
-    told_of,
 )
 from robochoc.cli.solve_settings import (
     WITHDRAWALS,
@@ -91,7 +90,7 @@ if TYPE_CHECKING:
     type=click.IntRange(0),
     default=0,
     show_default=True,
-    help="Seed of the simulator, of --order random, and of protocols that draw lots.",
+    help="Seed of the simulator, of --order random, of protocols that draw lots, and of --gusts.",
 )
 @click.option(
     "--schedule",
@@ -302,7 +301,7 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
                 _tell(team, outcome, wanted)
                 if loop and loop.mission is None:  # the run knew nothing of it
                     loop.publish(outcome)
-                flight = flown_by(loop) if products.html or products.serve else None
+                flight = flight_told(loop, wanted.ros, quiet=wanted.as_json)
     except Failure as failure:
         failure.show()
         return failure.exit_code
@@ -311,10 +310,9 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     if products.html or products.serve:
         from robochoc.view.scene import scene_of
 
-        mission, flown = flight or (None, None)
-        _show(scene_of(outcome, team, mission=mission, flown=flown), products, quiet=wanted.as_json)
+        _show(scene_of(outcome, team, mission=flight.mission, flown=flight.flown), products, quiet=wanted.as_json)
     if outcome.verdict != "unknown":
-        return 0
+        return flight.status
     if outcome.reason and wanted.as_json:
         click.echo(on_one_line(f"{folder}: {outcome.reason}"), err=True)
     return LIMIT

@@ -158,7 +158,7 @@ def _axes(crew: Sequence[Craft], others: Sequence[Craft], cells: Sequence[Cell])
     columns = Axis.over(names[1], (y for _, y in cells), most=most, scaled=most)
     side = max(rows.cells, columns.cells)
     values = [craft.level for craft in (*crew, *others) if craft.level is not None]
-    if all(1 <= value <= side for value in values):
+    if names[2] == "level" and all(1 <= value <= side for value in values):
         return rows, columns, Axis(names[2], 1, side, 1, side)
     scaled = min(max(side, _LEVELS[0]), _LEVELS[-1])
     return rows, columns, Axis.over(names[2], values, most=max(_TALL, 2 * side), scaled=scaled)

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import time
+from itertools import starmap
 
+from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.loop import TOGETHER_S, Senses
+from robochoc.ros.mappings import short_kind
 from robochoc.ros.mission import Cast, Leg
+from robochoc.ros.names import REPORTS
 from robochoc.ros.reading import Reading
 from robochoc.ros.reports import Report
 from robochoc.ros.source import Source
 
 PATIENCE_S = 10.0
 """How long a live source is listened to after a decision, where nobody says otherwise."""
+_MOST_NOTES = 12
 _SLICE_S = 0.2
 """How often somebody who watches is told that we wait."""
 
@@ -36,11 +41,23 @@ class Listening(Senses):
 
     @property
     def notes(self) -> list[str]:
-        """See `Senses.notes`: places in a frame that is not ours."""
-        return [
+        """See `Senses.notes`: places in a frame that is not ours, and what of a recording nobody could use."""
+        frames = [
             f"places on {topic} are in the frame '{frame}', and were passed over (--frame says which is ours)"
             for topic, frame in self._reading.strange.items()
         ]
+        others = [*filter(None, starmap(self._unused, self._source.others.items()))]
+        more = [f"and {len(others) - _MOST_NOTES:,} more topics were passed over"] * (len(others) > _MOST_NOTES)
+        return [*frames, *others[:_MOST_NOTES], *more]
+
+    def _unused(self, topic: str, kind: str) -> str:
+        """Why nobody listened to a topic that looks as if somebody should; empty for others."""
+        wanted = self._reading.topics.get(topic)
+        if wanted:
+            return on_one_line(f"{topic} holds {kind}, not {wanted}, and was passed over")
+        if REPORTS.get(topic.rpartition("/")[2]) == short_kind(kind):
+            return on_one_line(f"{topic} is of no drone of this team, and was passed over")
+        return ""
 
     def now_ns(self) -> int:
         """See `Senses.now_ns`: the wall clock's, or that of the recording."""

@@ -34,6 +34,8 @@ class Source(ABC):
 
     def __init__(self, place: str) -> None:
         self.place = place
+        self.others: dict[str, str] = {}
+        """Topics, with their types, that a recording holds and nobody listens to; the first of them."""
 
     @abstractmethod
     def listen(self, topics: Mapping[str, str]) -> None:

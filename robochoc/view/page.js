@@ -125,6 +125,8 @@ try {
     1: () => camera.see("overview"),
     2: () => camera.see("top"),
     3: () => camera.see("front"),
+    "?": () => { element("keys").open = !element("keys").open; },
+    Escape: () => { element("keys").open = false; },
     4: () => drones.length && follow((Number(chosen.value) + (camera.view === "follow" ? 1 : 0)) % drones.length),
   };
   const step = (seconds) => { player.pause(); player.seek(player.time + seconds); };
@@ -151,6 +153,10 @@ try {
     event.preventDefault();
     does(event);
   });
+
+  // Who points does not go by keys: space plays, and does not press the last button again.
+  addEventListener("click", (event) => { if (event.detail) event.target.closest?.("button, summary")?.blur(); });
+  addEventListener("click", (event) => { if (!element("keys").contains(event.target)) element("keys").open = false; });
 
   dark.addEventListener("change", paintSky);
   addEventListener("resize", fit);

@@ -136,7 +136,7 @@ def _flight_facts(flown: Flown | None, why_not: str, *, is_to_scale: bool) -> It
             yield "flight", f"none: {why_not}"
         return
     yield "flown", f"{flown.times[-1]:.1f} s{'' if is_to_scale else ', not to scale'}"
-    for label, nearest in (("nearest", flown.nearest), ("near fallen", flown.nearest_fallen)):
+    for label, nearest in (("nearest", flown.nearest), ("nearest to a fallen one", flown.nearest_fallen)):
         if nearest and is_to_scale:
             yield label, f"{nearest.distance_m:.2f} m (set: {flown.distance:.2g} m)"
     for number, happening in fell(flown).items():
@@ -153,6 +153,8 @@ def _ending(outcome: Outcome, flying: int, aside: int) -> str:
             return f"a solution{left}"
         case Verdict.OPTIMAL:
             return "an optimal solution"
+        case Verdict.NO_SOLUTION if any(epoch.assignment for epoch in outcome.epochs):
+            return f"no solution{left} in the end"
         case Verdict.NO_SOLUTION:
             return f"no solution{left}, everybody stays on the ground"
         case Verdict.UNKNOWN:

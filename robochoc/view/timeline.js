@@ -12,7 +12,7 @@ class Timeline {
     this.slider.addEventListener("input", () => { player.pause(); player.seek(this.slider.valueAsNumber); });
     const dated = film.chapters.length > 1 ? film.chapters : [];
     this.buttons = dated.map((chapter, number) => this.add(
-      chapter.at, String(number + 1), `Epoch ${number + 1}: ${chapter.opened}, ${chapter.says}`, ""));
+      chapter.at, String(number), `Epoch ${number}: ${chapter.opened}, ${chapter.says}`, ""));
     for (const mark of film.marks)
       this.add(mark.at, "", `${film.drones[mark.drone].name}: ${mark.says}`, "happened");
     this.chapter = -1;
@@ -73,7 +73,7 @@ class Timeline {
     this.slider.value = time;
     this.slider.style.setProperty("--done", `${100 * time / duration}%`);
     document.getElementById("clock").textContent = `${time.toFixed(1)} / ${duration.toFixed(1)} s`;
-    const which = chapters.length > 1 ? `, epoch ${chapter + 1} of ${chapters.length}` : "";
+    const which = chapters.length > 1 ? `, epoch ${chapter} of 0 to ${chapters.length - 1}` : "";
     this.slider.setAttribute("aria-valuetext", `${time.toFixed(1)} of ${duration.toFixed(1)} seconds${which}`);
     if (chapter === this.chapter || chapters.length < 2) return;
     this.chapter = chapter;
@@ -82,7 +82,7 @@ class Timeline {
     const line = document.getElementById("epoch");
     line.replaceChildren(...chapters.slice(first, chapter + 1).flatMap((one, number) => {
       const [count, opened] = [document.createElement("b"), document.createElement("span")];
-      count.textContent = `Epoch ${first + number + 1} of ${chapters.length}`;
+      count.textContent = `Epoch ${first + number} of 0 to ${chapters.length - 1}`;
       opened.className = "opened";
       opened.textContent = one.opened;
       return [count, " ", opened, `: ${one.says} `];

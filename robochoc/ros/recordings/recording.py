@@ -119,6 +119,10 @@ class Input:
             raise Damaged(f"it ends in the middle of {what}, at byte {self.size}: it was not written to its end")
 
 
+_MOST_OTHERS = 1_000
+"""Topics that nobody listens to, and that are known by name."""
+
+
 class Recording(Source):
     """A file that gives its messages in the order of the times at which they were received."""
 
@@ -175,7 +179,10 @@ class Recording(Source):
 
     def _wanted(self, topic: str, kind: str) -> bool:
         """Whether somebody listens to messages of that type on that topic."""
-        return topic in self._kinds and short_kind(self._kinds[topic]) == short_kind(kind)
+        wanted = topic in self._kinds and short_kind(self._kinds[topic]) == short_kind(kind)
+        if not wanted and len(self.others) < _MOST_OTHERS:
+            self.others[topic] = kind
+        return wanted
 
     def _body(self, packed: bytes, packing: str, size: int) -> bytes:
         """What a chunk holds, which should be `size` bytes."""
