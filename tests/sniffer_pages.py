@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pages import watched
 from PIL import Image
 from sniffed import journal_of
 
@@ -54,19 +55,10 @@ def chromium() -> Iterator[Any]:
 @contextmanager
 def shown(browser: Any, url: str, whole: str = ALL, **options: Any) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
     """The page at `url` once it says `whole`. No script may complain, and nothing else may be asked for anything."""
-    context = browser.new_context(**{"viewport": {"width": 1400, "height": 900}, **options})
-    page = context.new_page()
-    page.set_default_timeout(15_000)
-    complaints: list[str] = []
-    page.on("console", lambda message: complaints.append(message.text))
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    asked: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
-    page.on("websocket", lambda socket: asked.append(socket.url.replace("ws", "http", 1)))
-    page.goto(url)
-    text_is(page, "#counts", whole)
-    yield page
-    context.close()
+    with watched(browser, **{"viewport": {"width": 1400, "height": 900}, **options}) as (page, complaints, asked):
+        page.goto(url)
+        text_is(page, "#counts", whole)
+        yield page
     assert not [one for one in complaints if REFUSED not in one or whole == ALL]
     origin = "/".join(url.split("#", maxsplit=1)[0].split("/")[:3])
     assert not [one for one in asked if not one.startswith((f"{origin}/", "data:", "blob:"))]

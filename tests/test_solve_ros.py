@@ -300,3 +300,37 @@ def test_a_result_that_is_flown_is_not_written_over(tmp_path: Path) -> None:
     windy = ran("fly", result, "--wind", "1e9")
     assert windy.exit_code == 2
     assert "is faster than 200 m/s" in windy.stderr
+
+
+def test_how_a_flight_went_is_told() -> None:
+    result = solved(HANGAR, *MET)
+    assert result.exit_code == 0
+    for told in ("Port: sees an obstacle at (3, 1, 3)", "Fin: motor 0 has stopped", "Fin fell; all others within"):
+        assert told in result.stdout
+    assert "nearest: " in result.stdout
+
+
+def test_a_flight_that_goes_wrong_is_a_failure() -> None:
+    result = solved(HANGAR, "--situation", "flight", "--wind", "80")
+    assert result.exit_code == 4
+    assert "not at their places: " in result.stdout
+
+
+def test_a_failure_that_comes_too_late_is_told() -> None:
+    result = solved(HANGAR, "--situation", "flight", "--fail", "Fin@99")
+    assert result.exit_code == 0
+    assert "--fail Fin@99: the flight was over after" in result.stderr
+
+
+def test_reports_that_nobody_can_use_are_told(tmp_path: Path) -> None:
+    place = tmp_path / "odd.mcap"
+    with McapSink(str(place)) as sink:
+        sink.publish("/nose/battery", "std_msgs/String", {"data": "full"}, 1)
+        sink.publish("/nobody/out_of_order", "std_msgs/String", {"data": "lost"}, 2)
+        sink.publish("/elsewhere/scan", "std_msgs/String", {"data": "none of ours"}, 3)
+    result = solved(HANGAR, "--situation", f"mcap:{place}")
+    assert result.exit_code == 0
+    assert result.stderr.splitlines() == [
+        "/nose/battery holds std_msgs/String, not sensor_msgs/BatteryState, and was passed over",
+        "/nobody/out_of_order is of no drone of this team, and was passed over",
+    ]

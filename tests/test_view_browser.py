@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from flights import LEG_S, epochs_of_three, five, straight
+from pages import watched
 from PIL import Image
 from sniffer_pages import CONTRAST, NAMELESS, until
 
@@ -48,19 +49,11 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @contextmanager
 def opened(browser: Any, url: str, **options: Any) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
     """The page, once it is drawn. No script may complain, and nothing may be asked for anything."""
-    context = browser.new_context(**{"viewport": {"width": 700, "height": 560}, **options})
-    page = context.new_page()
-    page.set_default_timeout(15_000)
-    complaints: list[str] = []
-    page.on("console", lambda message: complaints.append(message.text))
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    asked: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
-    page.goto(url)
-    until(lambda: page.evaluate("Boolean(globalThis.Film)"), "it does not begin")
-    yield page
-    assert page.locator("#trouble").is_hidden()
-    context.close()
+    with watched(browser, **{"viewport": {"width": 700, "height": 560}, **options}) as (page, complaints, asked):
+        page.goto(url)
+        until(lambda: page.evaluate("Boolean(globalThis.Film)"), "it does not begin")
+        yield page
+        assert page.locator("#trouble").is_hidden()
     assert not [one for one in complaints if "GL Driver Message" not in one]  # it is slow to photograph
     assert not [one for one in asked if not one.startswith((url, "data:", "blob:"))]
 
@@ -361,3 +354,24 @@ def test_the_live_page_plays_the_same(browser: Any, one: Page) -> None:  # noqa:
                 assert live.evaluate(away) > 2, "as the window wants it"
         finally:
             server.kill()
+
+
+def test_its_keys_are_a_key_away(player: Page) -> None:
+    keys = player.locator("#keys dl")
+    assert keys.is_hidden()
+    player.keyboard.press("?")
+    assert keys.is_visible()
+    player.keyboard.press("Escape")
+    assert keys.is_hidden()
+    player.click("#keys summary")
+    assert keys.is_visible()
+    player.mouse.click(350, 250)
+    assert keys.is_hidden()
+
+
+def test_space_plays_after_a_click_on_a_button(player: Page) -> None:
+    player.click("#top")
+    player.keyboard.press(" ")
+    until(lambda: player.evaluate("Film.player.playing"), "it does not play")
+    player.keyboard.press(" ")
+    assert not player.evaluate("Film.player.playing")

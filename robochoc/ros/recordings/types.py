@@ -124,7 +124,8 @@ class Types:
         if name not in self._store.fielddefs:
             text = definition_of(kind)
             if not text:
-                raise UnknownType(f"ROS {self.version} has no type {kind!r}, and no installed package defines it")
+                told = f"ROS {self.version} has no type {kind!r} that is known here"
+                raise UnknownType(f"{told}; its mapping can bring the definition (docs/ros.md)")
             try:
                 new = get_types_from_msg(text, name)
                 self._store.register({each: what for each, what in new.items() if each not in self._store.fielddefs})

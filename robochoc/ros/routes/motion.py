@@ -51,7 +51,7 @@ class Motion:
     acceleration: Array
 
 
-class Flight:
+class Route:
     """One drone's way along a path (K + 1, 3), from rest to rest, counted from when it begins."""
 
     def __init__(self, drone: int, path: Array, limits: Limits) -> None:
@@ -94,7 +94,7 @@ class _Window:
 class Plan:
     """Where everybody is from second 0 to `duration_s`. Made by `robochoc.ros.routes.timetable.plan`."""
 
-    def __init__(self, starts: Array, flights: Sequence[tuple[Flight, float]]) -> None:
+    def __init__(self, starts: Array, flights: Sequence[tuple[Route, float]]) -> None:
         self._starts = starts.copy()
         found = [(flight.drone, flight.pieces(begins)) for flight, begins in flights]
         drones = np.repeat([drone for drone, _ in found], [len(pieces[0]) for _, pieces in found]).astype(np.intp)

@@ -22,7 +22,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.ros.routes.motion import Flight, Limits, Motion, Plan
+from robochoc.ros.routes.motion import Limits, Motion, Plan, Route
 from robochoc.ros.routes.moves import Move, NoWay, moves_between
 from robochoc.ros.routes.paths import Space
 from robochoc.ros.routes.spacing import Array, Flags, TooClose, check_spacing, nearest, norms
@@ -95,7 +95,7 @@ def _points(rows: Array, name: str) -> Array:
 class _Entry:
     """A move in the timetable: where it is at each step (S + 1, 3), from the step at which it begins."""
 
-    flight: Flight
+    flight: Route
     samples: Array
     begins: int
 
@@ -157,7 +157,7 @@ class _Timetable:
 
     def _entry(self, drone: int, path: Array, earliest: int) -> _Entry:
         """A move along `path`, as early as it can."""
-        flight = Flight(drone, path, self._limits)
+        flight = Route(drone, path, self._limits)
         steps = max(1, math.ceil(flight.duration_s / self._step))
         entry = _Entry(flight, flight.sample(self._step * np.arange(steps + 1, dtype=np.float64)), earliest)
         if earliest >= self._latest:
