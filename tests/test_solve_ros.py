@@ -334,3 +334,10 @@ def test_reports_that_nobody_can_use_are_told(tmp_path: Path) -> None:
         "/nose/battery holds std_msgs/String, not sensor_msgs/BatteryState, and was passed over",
         "/nobody/out_of_order is of no drone of this team, and was passed over",
     ]
+
+
+@pytest.mark.parametrize("frame", ["", "two words", "a\nb"])
+def test_a_frame_has_a_name(frame: str, tmp_path: Path) -> None:
+    result = ran("solve", HANGAR, "--ros", f"mcap:{tmp_path / 'run.mcap'}", "--frame", frame)
+    assert result.exit_code == 2
+    assert "is no name of a frame, such as map" in result.stderr

@@ -138,7 +138,7 @@ def test_the_slider_is_the_time(player: Page) -> None:
     player.mouse.click(line["x"] + line["width"] / 2, line["y"] + line["height"] / 2)
     assert now(player) == pytest.approx(END_S / 2, abs=0.05)
     assert player.inner_text("#clock") == f"{now(player):.1f} / 6.0 s"
-    assert player.get_attribute("#time", "aria-valuetext").endswith("of 6.0 seconds, epoch 1 of 0 to 2")
+    assert player.get_attribute("#time", "aria-valuetext").endswith("of 6.0 seconds, epoch 1 (0 to 2)")
     assert not player.evaluate("Film.player.playing")
 
 
@@ -172,7 +172,7 @@ def test_the_caption_tells_the_epoch(player: Page) -> None:
     said = ["the start: solution, 4 fly", "-R5.1: no solution, 3 hover on", "V2.1 without <2>: solution, 4 fly"]
     for number, words in enumerate(said):
         player.evaluate(f"Film.player.seek({LEG_S * number + 0.5})")
-        assert player.inner_text("#epoch").split("\n") == [f"Epoch {number} of 0 to 2", words]
+        assert player.inner_text("#epoch").split("\n") == [f"Epoch {number} (0 to 2)", words]
 
 
 def test_marks_say_what_happened_and_lead_there(player: Page) -> None:
@@ -290,8 +290,8 @@ def test_with_little_motion_it_begins_at_its_end(small: Page) -> None:
 
 def test_epochs_that_begin_together_are_told_together(small: Page) -> None:
     said = small.inner_text("#epoch")
-    assert "Epoch 1 of 0 to 2" in said
-    assert "Epoch 2 of 0 to 2" in said
+    assert "Epoch 1 (0 to 2)" in said
+    assert "Epoch 2 (0 to 2)" in said
     boxes = [small.locator("#marks button").nth(number).bounding_box() for number in range(3)]
     assert boxes[1]["x"] + boxes[1]["width"] <= boxes[2]["x"] + 0.5
 
@@ -347,7 +347,7 @@ def test_the_live_page_plays_the_same(browser: Any, one: Page) -> None:  # noqa:
             with opened(browser, server.stdout.readline().strip(), viewport=one.viewport_size) as live:
                 until(lambda: live.evaluate("Boolean(Film.trails.mesh)"), "nothing to play has come")
                 live.evaluate("Film.player.pause(); Film.player.seek(4.5)")
-                assert live.inner_text("#epoch").startswith("Epoch 2 of 0 to 2")
+                assert live.inner_text("#epoch").startswith("Epoch 2 (0 to 2)")
                 assert place(live, 0) != pytest.approx(place(live, 1), abs=0.5)
                 assert pressed(live) == "overview"
                 away = "Film.viewer.camera.position.length()"

@@ -29,6 +29,18 @@ FRAME = "map"
 AXES = 3
 
 
+class FrameType(click.ParamType[str]):
+    """The name of a frame."""
+
+    name = "frame"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """A name without blanks."""
+        if not value or not value.isprintable() or " " in value:
+            self.fail(f"{value!r} is no name of a frame, such as {FRAME}", param, ctx)
+        return value
+
+
 class PointType(click.ParamType["tuple[float, ...]"]):
     """Three numbers with commas between them."""
 
@@ -110,7 +122,7 @@ ros_options = _optional(
             " what is installed (docs/ros.md). May be given several times."
         ),
     ),
-    click.option("--frame", metavar="NAME", help=f"The frame of all places.  [default: {FRAME}]"),
+    click.option("--frame", type=FrameType(), metavar="NAME", help=f"The frame of all places.  [default: {FRAME}]"),
     click.option(
         "--scale",
         type=Finite(1e-6, 1e6),

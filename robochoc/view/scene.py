@@ -136,11 +136,12 @@ def _flight_facts(flown: Flown | None, why_not: str, *, is_to_scale: bool) -> It
             yield "flight", f"none: {why_not}"
         return
     yield "flown", f"{flown.times[-1]:.1f} s{'' if is_to_scale else ', not to scale'}"
-    for label, nearest in (("nearest", flown.nearest), ("nearest to a fallen one", flown.nearest_fallen)):
-        if nearest and is_to_scale:
-            yield label, f"{nearest.distance_m:.2f} m (set: {flown.distance:.2g} m)"
+    if flown.nearest and is_to_scale:
+        yield "nearest", f"{flown.nearest.distance_m:.2f} m (set: {flown.distance:.2g} m)"
     for number, happening in fell(flown).items():
         yield "fallen", f"{flown.names[number]} ({happening.what})"
+    if flown.nearest_fallen and is_to_scale:
+        yield "to others", f"{flown.nearest_fallen.distance_m:.2f} m at the nearest"
 
 
 def _ending(outcome: Outcome, flying: int, aside: int) -> str:

@@ -73,7 +73,7 @@ class Timeline {
     this.slider.value = time;
     this.slider.style.setProperty("--done", `${100 * time / duration}%`);
     document.getElementById("clock").textContent = `${time.toFixed(1)} / ${duration.toFixed(1)} s`;
-    const which = chapters.length > 1 ? `, epoch ${chapter} of 0 to ${chapters.length - 1}` : "";
+    const which = chapters.length > 1 ? `, epoch ${chapter} (0 to ${chapters.length - 1})` : "";
     this.slider.setAttribute("aria-valuetext", `${time.toFixed(1)} of ${duration.toFixed(1)} seconds${which}`);
     if (chapter === this.chapter || chapters.length < 2) return;
     this.chapter = chapter;
@@ -82,7 +82,7 @@ class Timeline {
     const line = document.getElementById("epoch");
     line.replaceChildren(...chapters.slice(first, chapter + 1).flatMap((one, number) => {
       const [count, opened] = [document.createElement("b"), document.createElement("span")];
-      count.textContent = `Epoch ${first + number} of 0 to ${chapters.length - 1}`;
+      count.textContent = `Epoch ${first + number} (0 to ${chapters.length - 1})`;
       opened.className = "opened";
       opened.textContent = one.opened;
       return [count, " ", opened, `: ${one.says} `];
