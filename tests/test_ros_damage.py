@@ -30,10 +30,7 @@ from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sinks import open_source
 from robochoc.ros.source import SourceFailed
 
-
-@pytest.fixture(autouse=True)
-def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("in_a_folder")
 
 
 def mcap_of(kind: str, encoding: str, text: bytes, message: str, content: bytes) -> Path:

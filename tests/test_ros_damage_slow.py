@@ -19,15 +19,10 @@ from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sinks import open_sink
 from robochoc.ros.source import SourceFailed
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("in_a_folder")]
 
 SIDE, STEPS = 11, 300
 SECONDS = 20.0
-
-
-@pytest.fixture(autouse=True)
-def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def without_checksums(compression: CompressionType) -> Path:

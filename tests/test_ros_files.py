@@ -38,10 +38,7 @@ from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sink import SinkFailed
 from robochoc.ros.sinks import NoSuchSink, NoSuchSource, open_sink, open_source
 
-
-@pytest.fixture(autouse=True)
-def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("in_a_folder")
 
 
 def attributes(message: Any) -> Any:  # noqa: ANN401 - whatever a reference makes of it

@@ -13,8 +13,7 @@ from itertools import product, zip_longest
 from math import prod
 
 from robochoc.expression import Expression, Undefined, evaluate, names
-from robochoc.outcome import Outcome, Verdict
-from robochoc.problem import Assignment, Robot, Team, Topic, natural
+from robochoc.problem import Assignment, Robot, Topic
 
 Cell = tuple[int, int]
 """Row and column, or the x and y that a topic gives."""
@@ -35,28 +34,12 @@ class Craft:
     name: str
     cell: Cell | None = None
     level: int | None = None
-    withdrew: bool = False
     robot: str = ""
     """Who decides about it; empty where only a variable is known."""
     topic: Topic | None = None
     """Where its decisions are published, if its file says so."""
     decided_by: tuple[str, ...] = field(default=(), compare=False)
     """The variables on which its place depends."""
-
-
-def crew_of(outcome: Outcome, team: Team | None = None) -> tuple[Craft, ...]:
-    """Every craft of `outcome`, in natural order of their names.
-
-    Without `team`, all that is known are the variables assigned and the names of the robots that withdrew.
-    """
-    withdrawn = frozenset(outcome.withdrawn)
-    values: Assignment = {} if outcome.verdict is Verdict.NO_SOLUTION else outcome.assignment
-    if team is None:
-        crew = [lone_craft(name, values) for name in values]
-        crew += [Craft(name, numbers(name), withdrew=True) for name in withdrawn]
-    else:
-        crew = [craft for robot in team.robots for craft in crafts_of(robot, values, withdrew=robot.name in withdrawn)]
-    return tuple(sorted(crew, key=lambda craft: (natural(craft.name), craft.name)))
 
 
 def numbers(name: str) -> Cell | None:
@@ -70,20 +53,20 @@ def lone_craft(variable: str, values: Assignment) -> Craft:
     return _craft(variable, [variable], None, values)
 
 
-def crafts_of(robot: Robot, values: Assignment, *, withdrew: bool = False) -> list[Craft]:
+def crafts_of(robot: Robot, values: Assignment) -> list[Craft]:
     """One craft per topic that has coordinates, or per variable that names a cell, or one for the robot."""
     own = [variable.name for variable in robot.variables]
     topics = [topic for topic in robot.topics if topic.x is not None and topic.y is not None]
     if len(topics) > 1:
         named = zip(_short_names(topics), topics, strict=True)
-        crew = [_craft(name, own, topic, values, withdrew=withdrew) for name, topic in named]
+        crew = [_craft(name, own, topic, values) for name, topic in named]
     elif not topics and len(own) > 1 and all(numbers(name) for name in own):
         topics = [topic for topic in robot.topics[: len(own)] if len(robot.topics) == len(own)]
         named_topics = zip_longest(own, topics)
-        crew = [_craft(name, [name], topic, values, withdrew=withdrew) for name, topic in named_topics]
+        crew = [_craft(name, [name], topic, values) for name, topic in named_topics]
     else:
         topics = topics or [*robot.topics[:1]]
-        crew = [_craft(robot.name, own, topics[0] if topics else None, values, withdrew=withdrew)]
+        crew = [_craft(robot.name, own, topics[0] if topics else None, values)]
     return [replace(craft, robot=robot.name) for craft in crew]
 
 
@@ -95,18 +78,16 @@ def possible_crafts(robot: Robot) -> Iterator[Craft]:
             yield from crafts_of(robot, dict(zip(names, decided, strict=True)))
 
 
-def _craft(
-    name: str, variables: Sequence[str], topic: Topic | None, values: Assignment, *, withdrew: bool = False
-) -> Craft:
+def _craft(name: str, variables: Sequence[str], topic: Topic | None, values: Assignment) -> Craft:
     """The craft `name`, whose cell is its topic's, or else the one that its own or its first variable's name says."""
     cells = [_sent(topic, values) if topic else None, numbers(name), *(numbers(first) for first in variables[:1])]
     known = [values[own] for own in variables if own in values]
     level = None
-    if known and not withdrew:
+    if known:
         height = _value(topic.z, values) if topic else None
         level = _bounded(known[0]) if height is None else height
     decided_by = _decided_by(topic, variables)
-    return Craft(name, next(filter(None, cells), None), level, withdrew, topic=topic, decided_by=decided_by)
+    return Craft(name, next(filter(None, cells), None), level, topic=topic, decided_by=decided_by)
 
 
 def _decided_by(topic: Topic | None, variables: Sequence[str]) -> tuple[str, ...]:
