@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import os
+import sys
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import NamedTuple
 
@@ -18,20 +21,41 @@ class Loaded(NamedTuple):
     broken: str
 
 
+def entries(group: str) -> Sequence[EntryPoint]:
+    """All that is offered under `group`, in no order.
+
+    What every installed package offers takes as long to read as a small run takes. It is read anew where a package may
+    have come or gone, which changes the folder that holds it.
+    """
+    return _read(group, tuple((place, _changed_ns(place)) for place in sys.path))
+
+
+@lru_cache(maxsize=8)
+def _read(group: str, _path: tuple[tuple[str, int], ...]) -> tuple[EntryPoint, ...]:
+    return tuple(entry_points(group=group))
+
+
+def _changed_ns(place: str) -> int:
+    try:
+        return os.stat(place or os.curdir).st_mtime_ns  # noqa: PTH116 - a name of sys.path, as often as anybody asks
+    except OSError:
+        return 0
+
+
 def names_in(group: str) -> tuple[str, ...]:
     """The names of all that is installed, ours and others', sorted."""
-    return tuple(sorted({entry.name for entry in entry_points(group=group)}))
+    return tuple(sorted({entry.name for entry in entries(group)}))
 
 
 def all_in(group: str) -> list[tuple[EntryPoint, list[EntryPoint]]]:
     """Every entry, by name, with those of its name (itself among them)."""
-    found = sorted(entry_points(group=group), key=lambda entry: entry.name)
+    found = sorted(entries(group), key=lambda entry: entry.name)
     return [(entry, [other for other in found if other.name == entry.name]) for entry in found]
 
 
 def named(group: str, name: str) -> list[EntryPoint]:
     """All entries of that name; more than one where packages do not agree whose it is."""
-    return list(entry_points(group=group, name=name))
+    return [entry for entry in entries(group) if entry.name == name]
 
 
 def missing(group: str, kind: str, name: str) -> str:

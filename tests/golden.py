@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 from problems import team_of
@@ -32,6 +33,7 @@ def odd_team(*, n_ary: bool = True) -> Team:
     return team_of(dict.fromkeys("ABCD", (1, 2, 3)), constraints, "odd")
 
 
+@cache
 def fixed_teams(protocol: str) -> dict[str, Team]:
     """Three small teams, by name; without the ternary constraint for a protocol that cannot take it.
 
@@ -59,6 +61,7 @@ def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
     return b"".join(lines_of(read_journal(recorder.content())))
 
 
+@cache
 def files() -> dict[str, tuple[str, str, ScheduleName]]:
     """All golden journals of our own protocols: the protocol, the team and the schedule, by file name."""
     return {

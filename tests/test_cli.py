@@ -9,13 +9,14 @@ import pty
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from broken import CASES
 from broken_case import Broken
 from problems import team_of
-from program import PROGRAM, ROOT, robochoc
+from program import PROGRAM, ROOT, robochoc, robochoc_within
 
 from robochoc.cli.commands import cli
 from robochoc.formats import read_team, write_team
@@ -113,13 +114,16 @@ def test_an_empty_place_says_what_to_do(tmp_path: Path) -> None:
         assert "robochoc generate queens3d --n 4" in done.stdout + done.stderr
 
 
+@pytest.mark.parametrize("program", [robochoc_within, pytest.param(robochoc, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("command", ["validate", "solve"])
 @pytest.mark.parametrize("case", CASES, ids=str)
-def test_broken_input_is_status_1_and_one_clear_message(case: Broken, command: str, tmp_path: Path) -> None:
+def test_broken_input_is_status_1_and_one_clear_message(
+    case: Broken, command: str, program: Callable[..., subprocess.CompletedProcess[str]], tmp_path: Path
+) -> None:
     if (case.name, command) == ("a file for a folder", "validate"):
         return  # a single robot's file may be validated
     case.write(tmp_path)
-    done = robochoc(command, tmp_path / case.target)
+    done = program(command, tmp_path / case.target)
     assert done.returncode == 1
     told = done.stdout.splitlines()[1:] if command == "validate" else done.stderr.splitlines()
     assert len(told) == len(case.expected(tmp_path))
@@ -220,7 +224,7 @@ def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
     ],
 )
 def test_wrong_usage_is_status_2(four: Path, words: list[str], said: str) -> None:
-    done = robochoc("solve", four, *words)
+    done = robochoc_within("solve", four, *words)
     assert done.returncode == 2
     assert said in done.stderr
 

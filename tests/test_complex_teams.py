@@ -68,7 +68,7 @@ def solved_by_hand(team: Team, chance: Random) -> Verdict:
     return result.verdict
 
 
-@pytest.mark.parametrize("batch", [*range(3), *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(3, 8))])
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 8))])
 def test_domains_and_abt_agree_with_brute_force(batch: int) -> None:
     """Without Java: local problems are solved by hand."""
     chance = Random(f"complex {batch}")
@@ -88,7 +88,7 @@ def test_ace_abt_the_judge_and_brute_force_agree(batch: int) -> None:
     chance = Random(f"judged {batch}")
     seen = Counter[Verdict]()
     with AceProcess() as solver, Compiler(solver=solver) as compiler:
-        for _ in range(100):
+        for _ in range(100 if batch else 50):
             team = random_complex_team(chance)
             for robot in team.robots:
                 check_domain(robot, compiler.compile(robot).domain)
@@ -99,7 +99,7 @@ def test_ace_abt_the_judge_and_brute_force_agree(batch: int) -> None:
             options = replace(random_schedule(chance), cache=False)
             assert solve(team, options, solver=solver).verdict is expected
             seen[expected] += 1
-    assert min(seen.values()) > 15, seen
+    assert min(seen.values()) > 7, seen
 
 
 def test_processes_agree_with_brute_force() -> None:

@@ -8,7 +8,6 @@ import pickle
 import runpy
 import tomllib
 from collections.abc import Sequence
-from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import msgspec
@@ -18,6 +17,7 @@ from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec
 from hypothesis import given
 from hypothesis import strategies as st
+from offered import offered
 from program import ROOT
 
 from robochoc.authority.authority import Authority
@@ -319,23 +319,9 @@ def test_the_filter_in_the_docs_works(three: dict[str, KeyRing], tmp_path: Path)
             opening.open("A", bad, CONTEXT)
 
 
-def installed(monkeypatch: pytest.MonkeyPatch, **places: str | list[str]) -> None:
-    """As if packages offered these."""
-    found = [
-        EntryPoint(name, place, filters.GROUP)
-        for name, some in places.items()
-        for place in ([some] if isinstance(some, str) else some)
-    ]
-
-    def offered(group: str, name: str | None = None) -> list[EntryPoint]:
-        return [entry for entry in found if entry.group == group and name in (None, entry.name)]
-
-    monkeypatch.setattr("robochoc.installed.entry_points", offered)
-
-
 def test_the_package_offers_the_two(monkeypatch: pytest.MonkeyPatch) -> None:
-    offered = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"][filters.GROUP]
-    installed(monkeypatch, **offered)
+    ours = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"][filters.GROUP]
+    offered(monkeypatch, filters.GROUP, **ours)
     assert [(offer.name, offer.filter) for offer in filter_offers()] == [("sealed", Sealed), ("signed", Signed)]
     assert filter_named("sealed") is Sealed
     with pytest.raises(UnknownFilter, match="only: sealed, signed; did you mean 'signed'"):
@@ -343,12 +329,13 @@ def test_the_package_offers_the_two(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_what_others_offer_may_be_broken(monkeypatch: pytest.MonkeyPatch) -> None:
-    installed(
+    offered(
         monkeypatch,
+        filters.GROUP,
         backwards="test_filters:Backwards",
         half="test_filters:Half",
         gone="nowhere.to:Find",
-        function="test_filters:installed",
+        function="offered:offered",
         twice=["test_filters:Backwards", "test_filters:Half"],
     )
     assert filter_named("backwards").__name__ == "Backwards"

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from importlib.metadata import EntryPoint
 
 import numpy as np
 import pytest
+from offered import offered
 
 from robochoc.outcome import Verdict
 from robochoc.problem import Topic
@@ -63,12 +63,7 @@ class Heap(Sink):
 
 def installed(monkeypatch: pytest.MonkeyPatch, **places: str) -> None:
     """As if a package offered these mappings: types are written with a double underscore here."""
-    found = [EntryPoint(name.replace("__", "/"), place, mappings.GROUP) for name, place in places.items()]
-
-    def offered(group: str, name: str | None = None) -> list[EntryPoint]:
-        return [entry for entry in found if entry.group == group and name in (None, entry.name)]
-
-    monkeypatch.setattr("robochoc.installed.entry_points", offered)
+    offered(monkeypatch, mappings.GROUP, **{name.replace("__", "/"): place for name, place in places.items()})
     mapping_for.cache_clear()
     monkeypatch.setattr(mappings, "mapping_for", mapping_for.__wrapped__)
 

@@ -107,6 +107,8 @@ def test_a_run_is_shown_until_ctrl_c_and_its_result_is_told_before(teams: Path, 
         url = url_of(run)
         wait_until(lambda: "stays" in run.errors(), "it does not stay")
         verdict = json.loads(run.output())["verdict"]
+        # The viewer reads what was written when somebody asks, a part at a time.
+        wait_until(lambda: bool(about(url)["over"]), "the page does not know how it ended")
         assert about(url)["outcome"]["verdict"] == verdict  # type: ignore[index]
         run.strike(signal.SIGINT, group=True)
         all_is_gone(run)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+import math
 import os
 import socket
 import time
@@ -31,6 +32,12 @@ from robochoc.view.sniffer.trace import Trace
 EVENTS, OUTCOME = told()
 WHOLE = journal_of(EVENTS, OUTCOME)
 TRACE = Trace.of(read_journal(WHOLE))
+
+
+@pytest.fixture(autouse=True)
+def whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A journal is shown when it has been read to its end, however slow the machine is at the moment."""
+    monkeypatch.setattr(following, "_AT_ONCE_S", math.inf)
 
 
 @pytest.fixture

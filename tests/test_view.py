@@ -37,7 +37,7 @@ HOSTILE = "</script><img src=x onerror=alert(1)>/../__proto__"
 @pytest.fixture(autouse=True)
 def flown_straight(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where drones are placed, no simulation has to tell."""
-    monkeypatch.setattr(scenes, "fly", straight)
+    monkeypatch.setattr(scenes, "fly", lambda mission, progress: straight(mission))  # noqa: ARG005
 
 
 def outcome(assignment: Mapping[str, int], verdict: Verdict = Verdict.SOLUTION, *withdrawn: str) -> Outcome:

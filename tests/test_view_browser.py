@@ -108,6 +108,27 @@ def test_the_drones_move(player: Page) -> None:
     assert (np.abs(begin - end).max(axis=2) > 40).mean() > 0.005
 
 
+def test_of_names_that_would_cover_each_other_one_is_written(player: Page) -> None:
+    """That of the drone which is nearest, or which is followed."""
+
+    def named() -> list[bool]:
+        written: list[bool] = player.evaluate("Film.names.choose(), Film.names.names.map((name) => name.visible)")
+        return written
+
+    assert all(named())
+    player.evaluate("Film.drones[1].position.copy(Film.drones[0].position)")
+    assert sorted(named()[:2]) == [False, True]
+    assert all(named()[2:])
+    hidden = named().index(False)
+    player.select_option("#drone", str(hidden))
+    until(lambda: player.evaluate("!Film.camera.turning"), "it does not turn there")
+    assert named()[:2] == [hidden == 0, hidden == 1]
+    player.click("#overview")
+    player.evaluate("Film.player.seek(1), Film.player.seek(0)")
+    until(lambda: player.evaluate("!Film.camera.turning"), "it does not turn back")
+    assert all(named())
+
+
 def test_it_plays_to_its_end_and_again(player: Page) -> None:
     player.select_option("#speed", "4")
     assert player.get_attribute("#play", "aria-label") == "Play"

@@ -24,7 +24,7 @@ from robochoc.formats import write_team
 from robochoc.formats.result import result_json
 from robochoc.outcome import Outcome, Verdict
 from robochoc.ros.flight import fly
-from robochoc.ros.mission import Mission, mission_of
+from robochoc.ros.mission import mission_of
 from robochoc.ros.quadrotor.conditions import Conditions, Failure
 from robochoc.ros.quadrotor.flown import Happening
 from robochoc.view import scene as scenes
@@ -293,8 +293,7 @@ def test_the_caption_tells_of_the_flight() -> None:
 
 @pytest.mark.parametrize("error", [MemoryError("no room"), FloatingPointError(), ValueError("nonsense")])
 def test_drones_that_cannot_fly_are_where_they_would_be(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(mission: Mission) -> None:
-        del mission
+    def fails(*_: object, **__: object) -> None:
         raise error
 
     monkeypatch.setattr(scenes, "fly", fails)

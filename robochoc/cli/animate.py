@@ -20,6 +20,7 @@ from robochoc.cli.saved import saved_outcome, team_of, team_option
 @invalid_input_fails
 def animate(saved: Path, output: Path | None, folder: Path | None, port: int, *, serve: bool) -> None:
     """Make the 3D scene of what `robochoc solve --json` printed, or of the journal that `--journal` wrote."""
+    from robochoc.cli.progress import stages
     from robochoc.cli.scene import serve_scene, write_page
     from robochoc.view.scene import scene_of
 
@@ -28,7 +29,9 @@ def animate(saved: Path, output: Path | None, folder: Path | None, port: int, *,
     if port and not serve:
         raise click.UsageError("--port is for --serve")
     outcome = saved_outcome(saved)
-    scene = scene_of(outcome, team_of(outcome, saved, folder))
+    team = team_of(outcome, saved, folder)
+    with stages(outcome.team) as progress:
+        scene = scene_of(outcome, team, progress=progress)
     if output:
         write_page(scene, output)
     if serve:

@@ -72,6 +72,7 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
 
 def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[Flown, list[str]]:
     """What was flown, and what of it was published where."""
+    from robochoc.cli.progress import stages
     from robochoc.formats import on_one_line
     from robochoc.ros.flight import fly as flight
     from robochoc.ros.outlet import Outlet, publish_flight
@@ -82,7 +83,8 @@ def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[Flown,
         frame = given["frame"] or FRAME
         outlets = [Outlet(mission.team, mission.drones, sink, frame) for sink in sinks]
         try:
-            flown = flight(mission, conditions)
+            with stages(mission.team) as progress:
+                flown = flight(mission, conditions, progress)
         except ValueError as refused:
             raise Failure(INVALID, on_one_line(f"{saved}: it cannot be flown: {refused}")) from refused
         publish_flight(mission, flown, outlets)

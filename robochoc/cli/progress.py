@@ -48,3 +48,13 @@ def progress_line(team: str) -> Iterator[Callable[[Progress], None] | None]:
             live.update(Text(line, style="dim"), refresh=True)
 
         yield show
+
+
+@contextmanager
+def stages(team: str) -> Iterator[Callable[[str], None] | None]:
+    """Like `progress_line`, of work whose stages have words and nothing to count."""
+    from robochoc.communication.run_result import Progress
+
+    began = time.monotonic()
+    with progress_line(team) as show:
+        yield None if show is None else lambda stage: show(Progress(0, time.monotonic() - began, stage))

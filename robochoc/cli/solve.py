@@ -308,9 +308,12 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     for line in told_of(loop) if loop and not wanted.as_json else ():
         click.echo(line, err=True)
     if products.html or products.serve:
+        from robochoc.cli.progress import stages
         from robochoc.view.scene import scene_of
 
-        _show(scene_of(outcome, team, mission=flight.mission, flown=flight.flown), products, quiet=wanted.as_json)
+        with stages(team.name) as progress:
+            scene = scene_of(outcome, team, mission=flight.mission, flown=flight.flown, progress=progress)
+        _show(scene, products, quiet=wanted.as_json)
     if outcome.verdict != "unknown":
         return flight.status
     if outcome.reason and wanted.as_json:

@@ -15,7 +15,7 @@ What may happen on the way:
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -60,18 +60,26 @@ _FAR_M = 0.05
 class Flight:
     """Drones with these names that stand at `homes` (N, 3). Legs are flown as they are asked for.
 
-    They are flown around an origin of their own where homes are far away: floating point is fine there, too.
+    They are flown around an origin of their own where homes are far away: floating point is fine there, too. `progress`
+    hears what is being done, in words, every simulated moment that is kept.
 
     Raises `ValueError` where there are no drones or too many (`quadrotor/bounds.py`), the conditions name others, or
     homes are too near for them.
     """
 
-    def __init__(self, names: Sequence[str], homes: Array, conditions: Conditions) -> None:
+    def __init__(
+        self,
+        names: Sequence[str],
+        homes: Array,
+        conditions: Conditions,
+        progress: Callable[[str], None] | None = None,
+    ) -> None:
         homes = np.array(homes, dtype=np.float64).reshape(-1, 3)
         check_homes(names, homes)
         conditions.check(names)
         self.names = tuple(names)
         self.conditions = conditions
+        self._progress = progress or (lambda _: None)
         self._origin = origin_of(homes)
         self._homes = homes - self._origin
         self._ground = float(self._homes[:, 2].min())
@@ -194,6 +202,7 @@ class Flight:
         planned = targets.planned(starts, hazards)
         simulation.leave(planned - self._distance)
         who = targets.who
+        self._progress(f"ways for {len(who)} drones are looked for")
         try:
             way = plan(
                 starts[who],
@@ -237,6 +246,7 @@ class Flight:
             simulation.advance(course, late=late)
             if not simulation.is_sampled:
                 continue
+            self._progress(f"leg {len(self._stages) + 1}, {course.s:.1f} s of {course.plan.duration_s:.1f} s flown")
             reports += self._look(course, watched)
             if reports or (told is not None and len(simulation.broken) > told):
                 course.stop()
@@ -271,8 +281,10 @@ class Flight:
             self._simulation.tell(worst, f"is {apart[worst]:.2f} m from where it is wanted as the leg ends")
 
 
-def fly(mission: Mission, conditions: Conditions | None = None) -> Flown:
+def fly(mission: Mission, conditions: Conditions | None = None, progress: Callable[[str], None] | None = None) -> Flown:
     """Fly all legs of `mission`, one after the other, in `conditions` (None: calm, and nothing happens).
+
+    `progress` is `Flight`'s.
 
     Raises `ValueError` where there is nobody to fly, the conditions do not fit the mission, or its places are too near.
     """
@@ -285,7 +297,7 @@ def fly(mission: Mission, conditions: Conditions | None = None) -> Flown:
         for leg, places in zip(mission.legs, goals, strict=True):
             check_near([names[number] for number in leg.goals], places)
         conditions = replace(conditions, distance=_distance([homes, *goals]))
-    flight = Flight(names, homes, conditions)
+    flight = Flight(names, homes, conditions, progress)
     for leg in mission.legs:
         flight.fly(leg.opened_by, leg.goals)
     return flight.flown()

@@ -105,7 +105,8 @@ class Flying(Senses):
             homes = np.array([drone.home for drone in cast.drones], dtype=float).reshape(-1, 3)
             try:
                 conditions = self.surroundings.conditions(cast.drones, cast.scale)
-                self._flight = Flight([drone.name for drone in cast.drones], homes, conditions)
+                names = [drone.name for drone in cast.drones]
+                self._flight = Flight(names, homes, conditions, lambda _: self.idle())
             except ValueError as refused:
                 raise CannotFly(on_one_line(str(refused))) from refused
         elif not self._calls[-1] and self._leg is not None:

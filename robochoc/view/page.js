@@ -28,10 +28,12 @@ try {
   const camera = new Camera(viewer, film.corners, film.cell, free, still);
   const fit = () => { trails.resize(); camera.fit(); timeline?.spread(); };
   const drones = film.drones.map((drone) => object(drone.path));
+  const names = new Names(viewer, film.drones.map((drone) => object(`${drone.path}/name`)));
 
   const frame = (now) => {
     player.step(now);
     camera.step(now);
+    names.step(now);
     requestAnimationFrame(frame);
   };
 
@@ -89,8 +91,10 @@ try {
   const follow = (number) => {
     chosen.value = String(number);
     camera.follow(drones[number]);
+    names.followed = number;
   };
   camera.onview = (view) => {
+    if (view !== "follow") names.followed = -1;
     for (const name of [...views, "follow"]) element(name).setAttribute("aria-pressed", name === view);
   };
   for (const view of views) element(view).addEventListener("click", () => camera.see(view));
@@ -172,7 +176,7 @@ try {
   viewer.set_3d_pane_size();
   fit();
   requestAnimationFrame(frame);
-  globalThis.Film = { viewer, camera, player, trails, drones };
+  globalThis.Film = { viewer, camera, player, trails, drones, names };
 } catch (error) {
   const trouble = document.getElementById("trouble");
   trouble.append(error.message);

@@ -18,7 +18,7 @@ from robochoc.view.scene import Scene
 from robochoc.view.script import viewer_script
 from robochoc.view.stage import commands
 
-_PLAYER = ("trails.js", "camera.js", "player.js", "timeline.js", "page.js")
+_PLAYER = ("names.js", "trails.js", "camera.js", "player.js", "timeline.js", "page.js")
 """The player's parts, in this order one script."""
 
 

@@ -5,7 +5,7 @@ Lengths are in cells: one cell is one row, one column or one level. Nothing here
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,12 +66,18 @@ class Scene:
 
 
 def scene_of(
-    outcome: Outcome, team: Team | None = None, *, mission: Mission | None = None, flown: Flown | None = None
+    outcome: Outcome,
+    team: Team | None = None,
+    *,
+    mission: Mission | None = None,
+    flown: Flown | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> Scene:
     """The scene of `outcome`. With its `team` also robots that stay behind are shown, and topics say where to fly.
 
     `team` is as its files have it, before its scenario. `mission` is what the outcome asks of the drones, where that
-    is known already, and `flown` how they flew that; without one they are flown here, in calm air.
+    is known already, and `flown` how they flew that; without one they are flown here, in calm air, of
+    which `progress` hears (`ros/flight.py`).
 
     Never raises for want of a place: a robot whose coordinates are missing or undefined is placed by the two
     numbers its name ends in (row and column), and failing that in a tidy grid, at the height of its first value. Nor
@@ -82,7 +88,7 @@ def scene_of(
     if flown is None:
         asked, mission = mission, roomy(mission)
         is_to_scale = mission is asked
-        flown, why_not = _flown(mission)
+        flown, why_not = _flown(mission, progress)
     drones = tuple(_drones(mission))
     withdrawn = {*outcome.withdrawn}
     aside = sum(drone.robot in withdrawn or drone.name in withdrawn for drone in mission.drones)
@@ -92,7 +98,7 @@ def scene_of(
     return Scene(title, facts, drones, axes, film_of(mission, flown) if flown else None)
 
 
-def _flown(mission: Mission) -> tuple[Flown | None, str]:
+def _flown(mission: Mission, progress: Callable[[str], None] | None) -> tuple[Flown | None, str]:
     """How the drones fly their mission in calm air; if they do not, why, unless nobody is to fly."""
     drones, legs = len(mission.drones), len(mission.legs)
     if not any(leg.goals for leg in mission.legs):
@@ -100,7 +106,7 @@ def _flown(mission: Mission) -> tuple[Flown | None, str]:
     if drones > _MOST_DRONES or drones * legs > _MOST_FLIGHTS or legs > _MOST_LEGS:
         return None, f"{_counted(drones, 'drone')} in {_counted(legs, 'epoch')} are more than are flown for a picture"
     try:
-        return fly(mission), ""
+        return fly(mission, progress=progress), ""
     except _NO_FLIGHT as error:
         return None, str(error) or type(error).__name__
 
