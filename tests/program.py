@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import os
+import pty
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
@@ -34,3 +36,20 @@ def robochoc_within(*words: object) -> subprocess.CompletedProcess[str]:
         except SystemExit as leaving:
             status = leaving.code if isinstance(leaving.code, int) else 1
     return subprocess.CompletedProcess(command, status, output.getvalue(), errors.getvalue())
+
+
+def on_a_terminal(*words: object) -> bytes:
+    """What the program shows on standard error where that is a terminal."""
+    ours, theirs = pty.openpty()
+    with subprocess.Popen([PROGRAM, *map(str, words)], stderr=theirs, stdout=subprocess.DEVNULL) as running:
+        os.close(theirs)
+        shown = b""
+        while True:
+            try:
+                chunk = os.read(ours, 4096)
+            except OSError:  # the program has hung up
+                break
+            shown += chunk
+        running.wait(timeout=30)
+    os.close(ours)
+    return shown

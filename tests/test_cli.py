@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import os
-import pty
 import re
 import subprocess
 import sys
@@ -16,7 +14,7 @@ import pytest
 from broken import CASES
 from broken_case import Broken
 from problems import team_of
-from program import PROGRAM, ROOT, robochoc, robochoc_within
+from program import ROOT, on_a_terminal, robochoc, robochoc_within
 
 from robochoc.cli.commands import cli
 from robochoc.formats import read_team, write_team
@@ -282,20 +280,9 @@ def solutions_of_robot(robot: Robot) -> bool:
 
 def test_progress_is_shown_on_a_terminal_only(tmp_path: Path) -> None:
     write_team(queens3d(8), tmp_path / "eight")
-    words = [PROGRAM, "solve", str(tmp_path / "eight"), "--runtime", "simulator", "--timeout", "1.5"]
-    assert subprocess.run(words, capture_output=True, check=False).stderr == b""
-    ours, theirs = pty.openpty()
-    with subprocess.Popen(words, stderr=theirs, stdout=subprocess.DEVNULL) as running:
-        os.close(theirs)
-        shown = b""
-        while True:
-            try:
-                chunk = os.read(ours, 4096)
-            except OSError:
-                break
-            shown += chunk
-        running.wait(timeout=30)
-    os.close(ours)
+    words = ("solve", tmp_path / "eight", "--runtime", "simulator", "--timeout", "1.5")
+    assert robochoc(*words).stderr == ""
+    shown = on_a_terminal(*words)
     assert re.search(rb"eight: [0-9,]+ messages", shown)
 
 

@@ -72,7 +72,7 @@ def test_the_least_cost_is_found_in_the_simulator(protocol: str, batch: int, war
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 4))])
 def test_the_least_cost_is_found_in_processes(protocol: str, batch: int, warm: AceProcess) -> None:
     chance = Random(f"costs processes {protocol} {batch}")
-    for _ in range(16 if batch else 5):
+    for _ in range(16 if batch else 4):
         agrees(team_for(protocol, chance), Options(protocol=protocol, timeout=60), warm)
 
 
@@ -82,7 +82,7 @@ def test_what_is_not_proven_is_no_better_than_the_least(protocol: str, runtime: 
     """And is an answer: its cost is that of its assignment, which breaks nothing hard."""
     chance = Random(f"incomplete {protocol} {runtime}")
     solved = best = 0
-    for _ in range(30 if runtime is Runtime.SIMULATOR else 4):
+    for _ in range(30 if runtime is Runtime.SIMULATOR else 3):
         team = team_for(protocol, chance)
         least = least_cost(team)
         schedule = replace(random_schedule(chance), protocol=protocol, runtime=runtime)

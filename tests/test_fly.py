@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from program import ROOT
+from program import ROOT, on_a_terminal, robochoc
 
 from robochoc.cli.commands import cli
 from robochoc.formats import write_team
@@ -72,6 +73,12 @@ def two(tmp_path: Path) -> Path:
 
 
 # How it went
+
+
+def test_progress_is_shown_on_a_terminal_only(tmp_path: Path) -> None:
+    solution = solved(tmp_path, ROOT / "instances" / "queens3d-7")
+    assert robochoc("fly", solution).stderr == ""
+    assert re.search(rb"queens3d-7: leg 1, [0-9.]+ s of [0-9.]+ s flown, [0-9.]+ s", on_a_terminal("fly", solution))
 
 
 def test_a_table_for_people(two: Path) -> None:

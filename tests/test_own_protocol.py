@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
@@ -237,6 +238,14 @@ def test_a_name_that_two_packages_offer_is_refused(here: Path) -> None:
     assert len(done.stderr.splitlines()) == 1
 
 
+def test_a_package_that_comes_and_goes_meanwhile_is_there_and_gone(here: Path) -> None:
+    before = protocol_names()
+    package(here, "mine", {"own": "mine:Silent"})
+    assert {*protocol_names()} == {*before, "own"}
+    shutil.rmtree(here / "mine-1.0.dist-info")
+    assert protocol_names() == before
+
+
 def test_a_package_on_the_path_twice_is_one_package(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As when a folder that is being worked on stands before what is installed."""
     for folder in ("first", "second"):
@@ -247,6 +256,7 @@ def test_a_package_on_the_path_twice_is_one_package(here: Path, monkeypatch: pyt
 def test_what_is_installed_beside_ours_is_tested_but_has_no_golden_journals(here: Path) -> None:
     ours = golden.files()
     package(here, "mine", {"own": "mine:Silent"})
+    golden.files.cache_clear()
     assert "own" in protocol_names()
     assert golden.files() == ours
 

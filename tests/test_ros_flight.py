@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from dataclasses import replace
 
@@ -70,6 +71,16 @@ def calm(four: Mission) -> Flown:
 
 
 # Missions
+
+
+def test_it_says_how_far_it_is() -> None:
+    told: list[str] = []
+    flown = fly(planar(2), progress=told.append)
+    assert told[0] == "ways for 4 drones are looked for"
+    begin, end = (re.fullmatch(r"leg 1, (.+) s of (.+) s flown", one) for one in (told[1], told[-1]))
+    assert begin
+    assert end
+    assert float(begin[1]) < 0.1 < float(end[1]) == float(end[2]) < flown.times[-1]
 
 
 def test_all_reach_their_places_and_keep_their_distance(four: Mission, calm: Flown) -> None:
