@@ -13,10 +13,11 @@ from pathlib import Path
 import pytest
 from broken import CASES
 from broken_case import Broken
+from click import Context
 from problems import team_of
 from program import ROOT, on_a_terminal, robochoc, robochoc_within
 
-from robochoc.cli.commands import cli
+from robochoc.cli.commands import COMMANDS, cli
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.problem import Constraint, Model, Relation, Robot, Semantics
@@ -227,6 +228,15 @@ def test_wrong_usage_is_status_2(four: Path, words: list[str], said: str) -> Non
     assert said in done.stderr
 
 
+def test_a_command_that_there_is_not_is_status_2() -> None:
+    for word, said in (
+        ("sovle", "No such command 'sovle'. Did you mean 'solve'?"),
+        ("xyzzy", "No such command 'xyzzy'."),
+    ):
+        done = robochoc(word)
+        assert (done.returncode, done.stderr.splitlines()[-1]) == (2, f"Error: {said}")
+
+
 def test_one_file_cannot_hold_several_teams(tmp_path: Path) -> None:
     done = robochoc("solve", "instances/", "--html", tmp_path / "page.html", folder=ROOT)
     assert done.returncode == 2
@@ -291,14 +301,18 @@ def test_progress_is_shown_on_a_terminal_only(tmp_path: Path) -> None:
 
 def test_every_command_has_help_and_is_in_the_readme() -> None:
     readme = (ROOT / "README.md").read_text()
-    for name, command in cli.commands.items():
+    for name in COMMANDS:
+        command = cli.get_command(Context(cli), name)
+        assert command
         assert command.help, name
         assert f"robochoc {name}" in readme, name
     assert robochoc("--help").returncode == 0
 
 
 def test_help_imports_nothing_heavy() -> None:
-    code = "import sys, robochoc.cli.commands; print(*sys.modules)"
-    modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    code = "import sys; from robochoc.cli.commands import run; run(); print(*sys.modules, file=sys.stderr)"
+    command = [sys.executable, "-c", code, "--help"]
+    modules = subprocess.run(command, capture_output=True, text=True, check=True).stderr.split()
+    assert {f"robochoc.cli.{name}" for name in COMMANDS} <= {*modules}
     heavy = {"numpy", "meshcat", "lxml", "rich", "msgspec", "multiprocessing", "tornado", "pycsp3", "zenoh"}
     assert not heavy & set(modules)

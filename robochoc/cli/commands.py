@@ -3,26 +3,11 @@
 from __future__ import annotations
 
 import signal
+from pkgutil import resolve_name
 
 import click
 
 from robochoc import __version__
-from robochoc.cli.animate import animate
-from robochoc.cli.authority import authority
-from robochoc.cli.cache import cache
-from robochoc.cli.compile import compile_team
-from robochoc.cli.directory import directory
-from robochoc.cli.export import export
-from robochoc.cli.fly import fly
-from robochoc.cli.generate import generate
-from robochoc.cli.journal import journal
-from robochoc.cli.master import master
-from robochoc.cli.protocols import protocols
-from robochoc.cli.replay import replay
-from robochoc.cli.robot import robot
-from robochoc.cli.sniff import sniff
-from robochoc.cli.solve import solve
-from robochoc.cli.validate import validate
 
 INTERRUPTED = 128 + signal.SIGINT
 UNREAD = 128 + signal.SIGPIPE
@@ -36,7 +21,57 @@ Exit status:
 """
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]}, epilog=EXIT_STATUS)
+COMMANDS = {
+    "animate": "animate",
+    "authority": "authority",
+    "cache": "cache",
+    "compile": "compile_team",
+    "directory": "directory",
+    "export": "export",
+    "fly": "fly",
+    "generate": "generate",
+    "journal": "journal",
+    "master": "master",
+    "protocols": "protocols",
+    "replay": "replay",
+    "robot": "robot",
+    "sniff": "sniff",
+    "solve": "solve",
+    "validate": "validate",
+}
+"""What a command is called in the module of its name."""
+
+
+class Commands(click.Group):
+    """The commands, each imported when it is asked for: nobody waits for the others."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's
+        """All names, sorted."""
+        return [*COMMANDS]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - click's
+        """The command of that name, if there is one."""
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = resolve_name(f"robochoc.cli.{cmd_name}:{COMMANDS[cmd_name]}")
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """As click's, and says what may have been meant."""
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError as error:
+            import difflib
+
+            near = difflib.get_close_matches(args[0], COMMANDS, 1)
+            if not near:
+                raise
+            raise click.UsageError(f"{error.message} Did you mean {near[0]!r}?", ctx) from None
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]}, epilog=EXIT_STATUS)
 @click.version_option(__version__, prog_name="robochoc")
 def cli() -> None:
     """Teams of robots that solve constraint problems together.
@@ -50,27 +85,6 @@ def cli() -> None:
     robochoc validate
     robochoc solve instances/
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-
-
-for command in (
-    solve,
-    validate,
-    generate,
-    animate,
-    fly,
-    sniff,
-    compile_team,
-    export,
-    replay,
-    journal,
-    cache,
-    protocols,
-    authority,
-    master,
-    robot,
-    directory,
-):
-    cli.add_command(command)
 
 
 def run() -> int:

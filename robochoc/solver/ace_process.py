@@ -44,6 +44,9 @@ from robochoc.solver.ace_words import (
 
 JVM_OPTIONS = (
     "-XX:+UseSerialGC",  # two cores, small heaps: the collector with the least to start
+    "-XX:+IgnoreUnrecognizedVMOptions",
+    "-XX:+UnlockDiagnosticVMOptions",
+    "-XX:-BytecodeVerificationRemote",  # ACE comes in a wheel, as Python's code does; a fifth of the start
     "-Xmx2g",
     "-Xss16m",
     "-Xrs",  # signals are this process's, not the JVM's
