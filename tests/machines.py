@@ -186,7 +186,8 @@ def wait_until(done: Callable[[], bool], otherwise: Callable[[], str], within_s:
 def ended(programs: Mapping[str, Program], status: int = 0) -> None:
     """Wait until all have ended, with that status."""
     found = {name: program.status() for name, program in programs.items()}
-    assert set(found.values()) == {status}, {name: programs[name].errors for name in found if found[name] != status}
+    others = {name: (it, programs[name].errors) for name, it in found.items() if it != status}
+    assert not others, others
 
 
 def written(team: Team, site: Site) -> Path:

@@ -287,7 +287,7 @@ def test_deep_and_huge_texts_are_refused_quickly(written: str) -> None:
     start = time.perf_counter()
     with pytest.raises(ExpressionError) as caught:
         parse(written, ("X",), Type.BOOLEAN)
-    assert time.perf_counter() - start < 1
+    assert time.perf_counter() - start < 3
     assert len(str(caught.value)) < 300
 
 

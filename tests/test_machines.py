@@ -43,7 +43,8 @@ def test_sixteen_machines_find_what_sixteen_processes_do(site: Site) -> None:
     assert "6 step aside" in robots["Robot1.1"].output
     assert master.errors.count("granted to redeem a token") == master.errors.count(" is there") == len(robots)
     assert master.errors.count("\n") == 1 + 2 * len(robots)
-    assert {row.split()[3] for row in site.authority("list").splitlines()[1:]} == {"force"}
+    listed = [json.loads(line) for line in site.authority("list", "--json").splitlines()]
+    assert {member["state"] for member in listed if member["role"] == "robot"} == {"in force"}
 
 
 @pytest.mark.slow
@@ -205,7 +206,7 @@ def test_revoked_in_mid_run(site: Site) -> None:
     told = master.object
     assert (told["verdict"], told["withdrawn"], told["lost"]) == ("unknown", ["RB"], ["RB"])
     assert robots.pop("RB").status() == 4
-    ended(robots)
+    ended(robots, 3)
 
 
 def test_ctrl_c_at_the_master_sends_everybody_home(site: Site) -> None:
