@@ -124,10 +124,11 @@ def test_a_robot_alone_with_no_value_that_is_allowed_ends_the_search(family: Fam
     assert alone(family, [INFINITE, INFINITE]).verdict is Verdict.NO_SOLUTION
 
 
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in (1, 2))])
 @pytest.mark.parametrize("longest", [0, 50, None])
 @pytest.mark.parametrize("protocol", [adopt.ADOPT, bnb_adopt.BnBADOPT])
 def test_when_nobody_speaks_all_have_ended_and_the_roots_bounds_are_the_least_cost(
-    monkeypatch: pytest.MonkeyPatch, protocol: type[BoundingProtocol], longest: int | None
+    monkeypatch: pytest.MonkeyPatch, protocol: type[BoundingProtocol], longest: int | None, batch: int
 ) -> None:
     ends: list[BoundingProtocol] = []
     begin = protocol.begin
@@ -137,8 +138,8 @@ def test_when_nobody_speaks_all_have_ended_and_the_roots_bounds_are_the_least_co
         begin(robot)
 
     monkeypatch.setattr(protocol, "begin", noted)
-    chance = Random(f"quiet {longest}")
-    for seed in range(30):
+    chance = Random(f"quiet {longest} {batch}")
+    for seed in range(10):
         team = random_cost_team(chance)
         ends.clear()
         schedule = RandomChannels(seed) if longest is None else Concurrent(seed, longest)

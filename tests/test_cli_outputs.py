@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from entries import entries_of
-from program import PROGRAM, ROOT, robochoc
+from program import PROGRAM, ROOT, robochoc, robochoc_within
 
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
@@ -36,7 +36,7 @@ def test_a_journal_and_a_result_give_the_page_that_solve_gives(four: Path) -> No
 def test_animate_refuses_what_is_neither(tmp_path: Path, content: str) -> None:
     saved = tmp_path / "saved"
     saved.write_text(content, encoding="latin-1")
-    done = robochoc("animate", saved, "-o", tmp_path / "page.html")
+    done = robochoc_within("animate", saved, "-o", tmp_path / "page.html")
     assert done.returncode == 1
     assert len(done.stderr.splitlines()) == 1
     assert not (tmp_path / "page.html").exists()

@@ -96,7 +96,7 @@ def test_simulator_agrees_with_brute_force_and_shrinks(protocol: str, seed: int,
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 4))])
 def test_processes_agree_with_brute_force(protocol: str, batch: int) -> None:
     chance = Random(f"processes {protocol} {batch}")
-    for _ in range(part_of(25 if batch else 8, protocol, batch)):
+    for _ in range(part_of(25 if batch else 5, protocol, batch)):
         agrees(team_for(protocol, chance), Options(protocol=protocol, timeout=60))
 
 

@@ -109,9 +109,10 @@ def test_parts_of_the_team_that_know_nothing_of_each_other_end_with_the_same_cyc
 
 
 @ALL
-def test_whatever_the_delays_the_course_is_the_same(protocol: type[CycleProtocol]) -> None:
-    chance = Random(f"delays {protocol.__name__}")
-    for seed in range(60):
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in (1, 2))])
+def test_whatever_the_delays_the_course_is_the_same(protocol: type[CycleProtocol], batch: int) -> None:
+    chance = Random(f"delays {protocol.__name__} {batch}")
+    for seed in range(20):
         team = chance.choice((random_cost_team, random_hard_team))(chance)
         if all(domains_of(team).values()):
             one, other = (played(team, protocol, any_schedule(chance), seed, cycles=9) for _ in range(2))

@@ -78,10 +78,11 @@ def random_dynabt(chance: Random) -> Options:
 
 
 @pytest.mark.parametrize("protocol", protocol_names())
-def test_any_protocol_begins_anew_after_each_change(protocol: str) -> None:
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in (1, 2))])
+def test_any_protocol_begins_anew_after_each_change(protocol: str, batch: int) -> None:
     traits = protocol_named(protocol).traits
-    chance = Random(f"anew {protocol}")
-    for _ in range(15):
+    chance = Random(f"anew {protocol} {batch}")
+    for _ in range(8):
         team = random_journey(chance, 6)
         if traits.n_ary and traits.complete:
             agrees(team, replace(random_schedule(chance), protocol=protocol))

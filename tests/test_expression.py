@@ -130,7 +130,7 @@ def compiled_value(expression: Expression, values: Mapping[str, int]) -> int | N
         return None
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=250, deadline=None)
 @given(st.one_of(NUMBERS, TRUTHS), ENVIRONMENTS)
 def test_evaluate_compiled_and_plain_python_agree(expression: Expression, values: dict[str, int]) -> None:
     expected = oracle(expression, values)

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /pro
 TEAMS = {team.name: team for team in (queens3d(4), queens3d(5), queens3d(7))}
 LONGEST_S = {"queens3d-4": 0.3, "queens3d-5": 0.8, "queens3d-7": 0.8}
 """About so long they search; a robot dies within that."""
-FEW, MANY = 6, 100
+FEW, MANY = 4, 100
 
 
 @pytest.fixture(scope="module")

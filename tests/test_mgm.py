@@ -80,7 +80,7 @@ def test_a_broken_constraint_weighs_more_than_any_cost() -> None:
     assert value(robot) == (2,)
 
 
-@pytest.mark.parametrize("batch", range(3))
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in (1, 2))])
 def test_the_cost_never_rises_and_the_end_is_a_local_optimum(batch: int) -> None:
     chance = Random(f"mgm {batch}")
     for seed in range(100):
