@@ -275,7 +275,7 @@ def test_when_the_time_is_over_the_process_goes_and_the_next_task_has_another(te
         began = time.monotonic()
         with pytest.raises(SolverTimeout):
             solver.solve(queens(15), deadline=began + 1)
-        assert 1 <= time.monotonic() - began < 5
+        assert 1 <= time.monotonic() - began < 2
         assert solver.pid is None
         assert not alive(pid)
         assert not list(temporary.iterdir())

@@ -77,8 +77,9 @@ def moved(rows: int, columns: int) -> Iterator[Codes]:
         yield tuple(cells.index((column, row)) for row, column in cells)
 
 
-def test_symmetries_are_found_and_broken_without_losing_an_orbit() -> None:
-    chance = Random("symmetric")
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in (1, 2))])
+def test_symmetries_are_found_and_broken_without_losing_an_orbit(batch: int) -> None:
+    chance = Random(f"symmetric {batch}")
     seen = 0
     for _ in range(100):
         rows, columns = chance.choice(((2, 2), (2, 3), (3, 3)))

@@ -1,10 +1,9 @@
-"""The central judge on costs: the least cost, the fewest aside, and what it says when the time is over."""
+"""The central judge on costs: the least cost, the fewest aside, and second opinions."""
 
 from __future__ import annotations
 
 import itertools
 import json
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -28,9 +27,8 @@ from robochoc.anytime import absent
 from robochoc.formats import PREDEFINED, write_team
 from robochoc.generators.coloring import coloring
 from robochoc.generators.queens3d import queens3d
-from robochoc.generators.random_csp import random_csp
 from robochoc.message import Message
-from robochoc.observers.checker import cost, objections
+from robochoc.observers.checker import objections
 from robochoc.observers.objective import aside_cost
 from robochoc.opinion import contradiction
 from robochoc.outcome import Outcome, Verdict
@@ -38,11 +36,10 @@ from robochoc.problem import INFINITE, Constraint, Predicate, Relation, Semantic
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run import Options, Refuted, Runtime, Withdrawal, solve
-from robochoc.solver.ace import AceProcess, SolverLost, SolverTimeout
+from robochoc.solver.ace import AceProcess, SolverLost
 from robochoc.solver.ace_words import Solved
 from robochoc.solver.central import Judge, Judgement
-from robochoc.solver.encoding import Network, Table, Unsupported
-from robochoc.solver.priced import priced
+from robochoc.solver.encoding import Unsupported
 
 CENTRAL = Options(protocol="central")
 FEWEST = replace(CENTRAL, withdraw=Withdrawal.FEWEST)
@@ -74,7 +71,7 @@ def test_the_least_cost_is_brute_forces(batch: int, solver: AceProcess) -> None:
         assert outcome.cost == (None if least == INFINITE else least), team
         assert outcome.verified is (least < INFINITE)
         seen[outcome.verdict] += 1
-    assert min(seen.values()) > 1
+    assert min(seen.values()) > (3 if batch else 1)
 
 
 def test_both_parts_of_a_partially_known_constraint_are_paid(solver: AceProcess) -> None:
@@ -146,70 +143,6 @@ def test_a_search_that_broke_off_proves_no_optimum(monkeypatch: pytest.MonkeyPat
         Judge().judge(coloring(3, 2, 2))
 
 
-# --- a limit ----------------------------------------------------------------------------------------------------------
-
-
-HARD = random_csp(30, 8, 0.3, 0, 1, max_cost=100)
-"""Hours would not do."""
-LIMITS_S = (1.5, 6, 20)
-"""Until one of them something has been found, however busy the machine is."""
-
-
-@pytest.fixture
-def warm() -> Iterator[AceProcess]:
-    with AceProcess() as one:
-        solve(coloring(3, 2, 2), CENTRAL, solver=one)
-        yield one
-
-
-def test_when_the_time_is_over_the_best_so_far_is_told(warm: AceProcess) -> None:
-    team = HARD
-    for limit in LIMITS_S:
-        outcome = solve(team, replace(CENTRAL, timeout=limit), solver=warm)
-        assert outcome.verdict is Verdict.UNKNOWN
-        assert outcome.metrics.wall_s < limit + 9
-        if outcome.assignment:
-            break
-    assert outcome.bound is not None
-    assert outcome.cost == cost(team, outcome.assignment) > outcome.bound
-    assert outcome.verified
-
-
-def test_without_an_answer_until_then_there_is_a_bound() -> None:
-    """Of two parts one is seen through without ACE."""
-    unary = Relation("U", 1, Semantics.SOFT, ((1,), (2,)), (5, 4), 0)
-    differ = Constraint("D", PREDEFINED["ne"], ("A", "B"), ("A", "B"), cost=3)
-    domains = {"A": (1, 2), "B": (1, 2), "C": (1, 2)}
-    team = with_costs(team_of(domains, [differ, Constraint("U", unary, ("C",), ("C",))]))
-    judgement = Judge(deadline=time.monotonic()).judge(team)
-    assert judgement == Judgement(Verdict.UNKNOWN, bound=4)
-
-
-def test_what_was_found_for_another_task_is_not_told(solver: AceProcess) -> None:
-    rows = tuple((a, b, (a + b) % 3) for a in range(3) for b in range(3))
-    network = Network(((0, 1, 2), (0, 1, 2), (0, 1, 2)), (Table((0, 1, 2), allowed=True, rows=rows),))
-    assert solver.begin(network, costs=(2,))
-    assert solver.answer().solutions[0] in rows
-    for _ in range(3):
-        assert solver.begin(network, costs=(2,))
-        best = solver.give_up().best
-        assert best is None or best in rows
-
-
-def test_a_task_that_is_given_up_has_a_best_once_ace_has_one(warm: AceProcess) -> None:
-    team = HARD
-    (part,) = priced(team.variables.values(), list(team.constraints()))
-    for limit in LIMITS_S:
-        warm.begin(part.network, costs=part.costs)
-        with pytest.raises(SolverTimeout) as over:
-            warm.answer(time.monotonic() + limit)
-        best = over.value.best
-        if best is not None:
-            break
-    assert best is not None
-    assert part.cost(best) == cost(team, part.decoded(best))
-
-
 # --- the fewest aside -------------------------------------------------------------------------------------------------
 
 
@@ -242,7 +175,7 @@ def test_as_few_as_possible_step_aside_by_weight(batch: int, solver: AceProcess)
         assert outcome.verdict is (Verdict.OPTIMAL if outcome.withdrawn else Verdict.SOLUTION)
         assert not list(objections(team, outcome.assignment, outcome.withdrawn))
         aside += bool(outcome.withdrawn)
-    assert 5 < aside < (50 if batch else 25)
+    assert (10 if batch else 5) < aside < (50 if batch else 25)
 
 
 @pytest.mark.parametrize("batch", BATCHES[:8])
@@ -279,18 +212,6 @@ def test_everybody_may_have_to_step_aside(solver: AceProcess) -> None:
     alone = [Constraint("C", never, (name,), (name,)) for name in ("A", "B")]
     outcome = solve(team_of({"A": (1, 2), "B": (1, 2)}, alone), FEWEST, solver=solver)
     assert (outcome.verdict, outcome.withdrawn, outcome.assignment) == (Verdict.OPTIMAL, ("RA", "RB"), {})
-
-
-def test_when_the_time_is_over_those_who_stay_so_far_are_told(warm: AceProcess) -> None:
-    team = queens3d(6)
-    for limit in LIMITS_S:
-        judgement = Judge(deadline=time.monotonic() + limit, solver=warm).judge(team, aside=1)
-        if judgement.assignment:
-            break
-    away = absent(team, judgement.assignment)
-    assert judgement.verdict is Verdict.UNKNOWN
-    assert judgement.cost == len(away) == 36 - len(judgement.assignment)
-    assert not list(objections(team, judgement.assignment, away))
 
 
 def test_there_is_nothing_to_count_where_robots_step_aside() -> None:

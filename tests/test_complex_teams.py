@@ -99,7 +99,7 @@ def test_ace_abt_the_judge_and_brute_force_agree(batch: int) -> None:
             options = replace(random_schedule(chance), cache=False)
             assert solve(team, options, solver=solver).verdict is expected
             seen[expected] += 1
-    assert min(seen.values()) > 7, seen
+    assert min(seen.values()) > (15 if batch else 7), seen
 
 
 def test_processes_agree_with_brute_force() -> None:

@@ -78,9 +78,12 @@ def test_the_least_cost_is_found_in_processes(protocol: str, batch: int, warm: A
 
 @pytest.mark.parametrize("protocol", INCOMPLETE)
 @pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
-def test_what_is_not_proven_is_no_better_than_the_least(protocol: str, runtime: Runtime, warm: AceProcess) -> None:
+@pytest.mark.parametrize("batch", [0, pytest.param(1, marks=pytest.mark.slow)])
+def test_what_is_not_proven_is_no_better_than_the_least(
+    protocol: str, runtime: Runtime, batch: int, warm: AceProcess
+) -> None:
     """And is an answer: its cost is that of its assignment, which breaks nothing hard."""
-    chance = Random(f"incomplete {protocol} {runtime}")
+    chance = Random(f"incomplete {protocol} {runtime} {batch}")
     solved = best = 0
     for _ in range(20 if runtime is Runtime.SIMULATOR else 3):
         team = team_for(protocol, chance)

@@ -130,7 +130,7 @@ def compiled_value(expression: Expression, values: Mapping[str, int]) -> int | N
         return None
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=500, deadline=None)
 @given(st.one_of(NUMBERS, TRUTHS), ENVIRONMENTS)
 def test_evaluate_compiled_and_plain_python_agree(expression: Expression, values: dict[str, int]) -> None:
     expected = oracle(expression, values)
@@ -287,7 +287,7 @@ def test_deep_and_huge_texts_are_refused_quickly(written: str) -> None:
     start = time.perf_counter()
     with pytest.raises(ExpressionError) as caught:
         parse(written, ("X",), Type.BOOLEAN)
-    assert time.perf_counter() - start < 3
+    assert time.perf_counter() - start < 1
     assert len(str(caught.value)) < 300
 
 

@@ -86,6 +86,6 @@ def test_deaf_robots_do_not_outlive_the_time_limit() -> None:
 
 def test_many_runs_leave_nothing_open() -> None:
     before = open_descriptors()
-    for _ in range(15):
+    for _ in range(30):
         speaking(Speaks)
     assert open_descriptors() == before

@@ -121,4 +121,4 @@ def test_a_large_log_is_read_quickly() -> None:
     block = (LINE % b"authorized") * 40_000 + (LINE % b"unauthorized" + INTERCEPTED) * 20_000
     began = time.monotonic()
     assert sum(1 for _ in log.refusals(block)) == 20_000
-    assert time.monotonic() - began < 6
+    assert time.monotonic() - began < 2

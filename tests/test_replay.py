@@ -231,9 +231,10 @@ class Fragile(ABT):
         raise KeyError(nogood.value)
 
 
-def test_a_step_that_stands_there_twice_is_a_difference(four: Journal) -> None:
+@pytest.mark.parametrize("every", [19, pytest.param(7, marks=pytest.mark.slow)])
+def test_a_step_that_stands_there_twice_is_a_difference(four: Journal, every: int) -> None:
     """Nobody begins a run twice, and nobody acts without having taken something in."""
-    for place, event in list(enumerate(four.events))[::19]:
+    for place, event in list(enumerate(four.events))[::every]:
         if isinstance(event, Settled):
             difference = replay(
                 with_events(four, [*four.events[: place + 1], event, *four.events[place + 1 :]])

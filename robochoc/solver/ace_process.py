@@ -44,7 +44,7 @@ from robochoc.solver.ace_words import (
 
 JVM_OPTIONS = (
     "-XX:+UseSerialGC",  # two cores, small heaps: the collector with the least to start
-    "-XX:+IgnoreUnrecognizedVMOptions",
+    "-XX:+IgnoreUnrecognizedVMOptions",  # what other versions may no longer know
     "-XX:+UnlockDiagnosticVMOptions",
     "-XX:-BytecodeVerificationRemote",  # ACE comes in a wheel, as Python's code does; a fifth of the start
     "-Xmx2g",
