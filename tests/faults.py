@@ -16,6 +16,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
 
+from clocks import standstill
+
 PROGRAM = str(Path(sys.executable).with_name("robochoc"))
 GONE_WITHIN_S = 2.0
 """What is promised, on a machine that has time for it; see `gone_within_s`."""
@@ -90,18 +92,19 @@ class Run:
     # Afterwards
 
     def end(self, within_s: float = _PATIENCE_S) -> float:
-        """Wait until no process is left, and return how long that took since the last strike."""
+        """Wait until no process is left; return how long that took since the last strike, in which the machine ran."""
         known = {self.pid, *self.processes()}
         deadline = time.monotonic() + within_s
-        while True:
-            self._process.poll()
-            known = {pid for pid in known if _alive(pid)}
-            took = time.monotonic() - self._struck
-            if not known and not (known := set(self.processes())):
-                return took
-            if time.monotonic() > deadline:
-                raise AssertionError(f"after {took:.1f} s there are still {sorted(known)}: {self.errors()}")
-            time.sleep(POLL_S)
+        with standstill() as stood:
+            while True:
+                self._process.poll()
+                known = {pid for pid in known if _alive(pid)}
+                took = time.monotonic() - self._struck - stood[0]
+                if not known and not (known := set(self.processes())):
+                    return took
+                if time.monotonic() > deadline + stood[0]:
+                    raise AssertionError(f"after {took:.1f} s there are still {sorted(known)}: {self.errors()}")
+                time.sleep(POLL_S)
 
     def processes(self) -> list[int]:
         """The ids of all processes of this run."""

@@ -16,6 +16,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from clocks import waiting
 from complex_problems import complex_team
 from faults import open_descriptors, wait_until
 from lxml import etree
@@ -272,10 +273,8 @@ def test_when_the_time_is_over_the_process_goes_and_the_next_task_has_another(te
     with AceProcess() as solver:
         assert solver.solve(SMALL).found == 3
         pid = pid_of(solver)
-        began = time.monotonic()
-        with pytest.raises(SolverTimeout):
-            solver.solve(queens(15), deadline=began + 1)
-        assert 1 <= time.monotonic() - began < 2
+        with waiting(2, at_least_s=1), pytest.raises(SolverTimeout):
+            solver.solve(queens(15), deadline=time.monotonic() + 1)
         assert solver.pid is None
         assert not alive(pid)
         assert not list(temporary.iterdir())
@@ -301,10 +300,8 @@ def test_a_process_that_is_killed_is_told_and_leaves_nothing(temporary: Path) ->
         pid = pid_of(solver)
         wait_for_the_search(temporary)
         os.kill(pid, signal.SIGKILL)
-        began = time.monotonic()
-        with pytest.raises(SolverLost, match="SIGKILL"):
+        with waiting(5), pytest.raises(SolverLost, match="SIGKILL"):
             solver.answer()
-        assert time.monotonic() - began < 5
         assert solver.pid is None
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)

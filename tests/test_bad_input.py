@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import time
 from pathlib import Path
 
 import pytest
 from broken import CASES
 from broken_case import TEAM, Broken, write_files
+from clocks import working
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -28,10 +28,8 @@ def read_all(path: Path) -> list[Team]:
 def test_broken_input(case: Broken, tmp_path: Path) -> None:
     case.write(tmp_path)
     expected = case.expected(tmp_path)
-    start = time.perf_counter()
-    with pytest.raises(InvalidInput) as caught:
+    with working(2), pytest.raises(InvalidInput) as caught:
         read_all(tmp_path / case.target)
-    assert time.perf_counter() - start < 2
     told = str(caught.value).splitlines()
     assert len(told) == len(expected), caught.value
     for beginning, fragments in expected:
@@ -83,10 +81,8 @@ def test_a_hundred_thousand_mistakes_are_not_all_told(tmp_path: Path) -> None:
         .replace("</constraints>\n  <agents_n", row * 100_000 + "</constraints><agents_n")
     )
     write_files(tmp_path, {"Robot1.xml": content})
-    start = time.perf_counter()
-    with pytest.raises(InvalidInput) as caught:
+    with working(10), pytest.raises(InvalidInput) as caught:
         read_robot(tmp_path / "Robot1.xml")
-    assert time.perf_counter() - start < 10
     assert len(caught.value.diagnostics) == 101
     assert "more mistakes" in str(caught.value.diagnostics[-1])
 
@@ -94,10 +90,8 @@ def test_a_hundred_thousand_mistakes_are_not_all_told(tmp_path: Path) -> None:
 def test_a_million_mistakes_against_the_schema_do_not_take_hours(tmp_path: Path) -> None:
     content = '<instance><presentation type="DisCSP"/><domains>' + "<domain/>\n" * 10**6 + "</domains></instance>"
     write_files(tmp_path, {"Robot1.xml": content})
-    start = time.perf_counter()
-    with pytest.raises(InvalidInput) as caught:
+    with working(10), pytest.raises(InvalidInput) as caught:
         read_robot(tmp_path / "Robot1.xml")
-    assert time.perf_counter() - start < 10
     assert [one.line for one in caught.value.diagnostics] == list(range(1, 102))
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import string
-import time
 from collections.abc import Mapping
 
 import pytest
+from clocks import working
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -284,10 +284,8 @@ def test_errors_say_what_where_and_what_next(written: str, position: int, fragme
     ],
 )
 def test_deep_and_huge_texts_are_refused_quickly(written: str) -> None:
-    start = time.perf_counter()
-    with pytest.raises(ExpressionError) as caught:
+    with working(1), pytest.raises(ExpressionError) as caught:
         parse(written, ("X",), Type.BOOLEAN)
-    assert time.perf_counter() - start < 1
     assert len(str(caught.value)) < 300
 
 

@@ -306,9 +306,9 @@ def test_121_robots_load_quickly(tmp_path: Path) -> None:
         (tmp_path / f"Robot{number}.xml").write_bytes(robot_xml(robot))
     times = []
     for _ in range(3):
-        start = time.perf_counter()
+        start = time.process_time()
         team = read_team(tmp_path)
-        times.append(time.perf_counter() - start)
+        times.append(time.process_time() - start)
     assert team.order == tuple(f"Robot{number}" for number in range(121))
     assert min(times) < 1  # 0.08 s on an idle machine: this is about orders of magnitude
 

@@ -13,9 +13,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from clocks import waiting
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbridge_server import Manner, Server
+from strangers import stranger
 
 from robochoc.ros.live import rosbridge
 from robochoc.ros.live.inbox import Inbox
@@ -128,24 +130,9 @@ def test_nobody_listens() -> None:
 
 @pytest.mark.parametrize("answer", [b"", b"HTTP/1.1 404 Not Found\r\n\r\n", b"\xff" * 100_000])
 def test_what_listens_is_no_rosbridge(answer: bytes) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-
-        def serve() -> None:
-            for _ in range(2):
-                connection, _ = listener.accept()
-                connection.sendall(answer)
-                kept.append(connection)
-
-        kept: list[socket.socket] = []
-        thread = threading.Thread(target=serve, daemon=True)
-        thread.start()
-        begin = time.monotonic()
-        with pytest.raises(SinkFailed, match="does not answer as a rosbridge does; start it"):
-            RosbridgeSink(f"//127.0.0.1:{listener.getsockname()[1]}")
-        assert time.monotonic() - begin < 3
-        thread.join(5)
-        for connection in kept:
-            connection.close()
+    refusal = pytest.raises(SinkFailed, match="does not answer as a rosbridge does; start it")
+    with stranger(answer, hangs_up=False) as port, waiting(3), refusal:
+        RosbridgeSink(f"//127.0.0.1:{port}")
 
 
 def test_the_server_dies() -> None:
@@ -163,10 +150,8 @@ def test_the_server_dies() -> None:
 def test_the_server_reads_nothing() -> None:
     with Server(Manner(stalls=True)) as server:
         sink = RosbridgeSink(server.place)
-        begin = time.monotonic()
-        with pytest.raises(SinkFailed, match=r"has read nothing for 0\.6 s"):
+        with waiting(5), pytest.raises(SinkFailed, match=r"has read nothing for 0\.6 s"):
             publish_long(sink, 2000)
-        assert time.monotonic() - begin < 5
         sink.discard()
 
 
@@ -228,10 +213,8 @@ def test_a_message_that_is_too_long_ends_it() -> None:
         source.listen({"/a/blocked": "geometry_msgs/PointStamped"})
         assert server.wait_for(lambda: "subscribe" in server.log)
         server.say("/a/blocked", {"x": "x" * (rosbridge.MOST_BYTES + 1)})
-        begin = time.monotonic()
-        with pytest.raises(SourceFailed, match="has closed the connection"):
+        with waiting(5), pytest.raises(SourceFailed, match="has closed the connection"):
             source.next(30)
-        assert time.monotonic() - begin < 5
 
 
 def test_a_server_that_dies_wakes_who_waits(server: Server) -> None:
@@ -239,10 +222,8 @@ def test_a_server_that_dies_wakes_who_waits(server: Server) -> None:
         source.listen({"/a": "std_msgs/String"})
         assert server.wait_for(lambda: "subscribe" in server.log)
         threading.Timer(0.2, server.die).start()
-        begin = time.monotonic()
-        with pytest.raises(SourceFailed, match="has closed the connection"):
+        with waiting(5), pytest.raises(SourceFailed, match="has closed the connection"):
             source.next(60)
-        assert time.monotonic() - begin < 5
 
 
 PROGRAM = """

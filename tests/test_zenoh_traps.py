@@ -7,12 +7,12 @@ import os
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
 import pytest
+from clocks import waiting
 from program import ROOT
 
 from robochoc.authority.admission import Household
@@ -169,18 +169,16 @@ def test_a_program_forks_after_a_network_run_runs_another_and_ends() -> None:
     ) as program:
         assert program.stdout
         said = [program.stdout.readline().strip() for _ in range(4)]
-        closed = time.monotonic()
-        assert program.wait(PATIENCE_S) == 0
+        with waiting(5):  # it takes some hundredths of a second; a machine may be busy
+            assert program.wait(PATIENCE_S) == 0
     assert said == ["solution"] * 3 + ["closed"]
-    assert time.monotonic() - closed < 5, "it takes some hundredths of a second; a machine may be busy"
 
 
 def test_sessions_open_and_close_at_once(household: Household, router: Router) -> None:
-    began = time.monotonic()
-    for _ in range(5):
-        with Post(router.endpoint, household.identity("A"), watch=(), patience_s=PATIENCE_S) as one:
-            one.send("B", b"hello")
-    assert time.monotonic() - began < 5, "it takes some hundredths of a second; a machine may be busy"
+    with waiting(5):  # it takes some hundredths of a second; a machine may be busy
+        for _ in range(5):
+            with Post(router.endpoint, household.identity("A"), watch=(), patience_s=PATIENCE_S) as one:
+                one.send("B", b"hello")
 
 
 def test_a_router_that_may_not_look_for_others_does_not_wait_for_them() -> None:
