@@ -30,7 +30,7 @@ R = TypeVar("R")
 CENTRAL = Options(protocol="central")
 HARD = random_csp(30, 8, 0.3, 0, 1, max_cost=100)
 """Hours would not do."""
-LIMITS_S = (1.5, 6, 20)
+LIMITS_S = (1.5, 6, 20, 60)
 """Until one of them something has been found, however busy the machine is."""
 
 
