@@ -66,7 +66,6 @@ class NetworkRun:
         conditions: Conditions = Conditions(),
         *,
         absent: Iterable[str] = (),
-        through: str = "",
         seconds: float | None = 60,
         publication: Publication | None = None,
     ) -> None:
@@ -82,7 +81,6 @@ class NetworkRun:
         self._seconds = seconds
         self._publication = publication
         self._absent = set(absent)
-        self._through = through
         self._gate = folder / "go"
         self._given_up = False
         self._stack = ExitStack()

