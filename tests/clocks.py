@@ -9,10 +9,15 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
+
+R = TypeVar("R")
 
 TICK_S = 0.02
+LIMITS_S = (1.5, 6, 20, 60)
+"""Until one of them something has been found, however busy the machine is."""
 LATE_S = 0.1
 """A tick that comes so late has not been late by chance."""
 
@@ -35,6 +40,15 @@ def waiting(at_most_s: float, at_least_s: float = 0.0) -> Iterator[None]:
     took = time.monotonic() - began
     assert took >= at_least_s, f"{took:.2f} s"
     assert took - stood[0] < at_most_s, f"{took:.2f} s, of which the machine stood still for {stood[0]:.2f} s"
+
+
+def once(found: Callable[[R], bool], ask: Callable[[float], R]) -> R:
+    """What is said when the first of the limits is over by which something was found."""
+    for limit in LIMITS_S:
+        said = ask(limit)
+        if found(said):
+            break
+    return said
 
 
 @contextmanager

@@ -167,8 +167,8 @@ class Office:
             case Register(profile, visit):
                 self.members.register(name, profile, visit)
                 self.tell(name, Welcome(visit, RUN, self._filters, observed=False, private=False))
-            case Joined(card):
-                self.members.robots[name].card, self.members.robots[name].joined = card, True
+            case Joined(visit, card):
+                self.members.robots[name].join(visit, card)
             case Shown(variables):
                 self.members.robots[name].also.update(variables)
             case Objection() as objection:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import TypeVar
 
 import pytest
-from clocks import waiting
+from clocks import once, waiting
 from cost_problems import with_costs
 from problems import team_of
 
@@ -26,22 +25,9 @@ from robochoc.solver.central import Judge, Judgement
 from robochoc.solver.encoding import Codes, Network, Table
 from robochoc.solver.priced import priced
 
-R = TypeVar("R")
-
 CENTRAL = Options(protocol="central")
 HARD = random_csp(30, 8, 0.3, 0, 1, max_cost=100)
 """Hours would not do."""
-LIMITS_S = (1.5, 6, 20, 60)
-"""Until one of them something has been found, however busy the machine is."""
-
-
-def once(found: Callable[[R], bool], ask: Callable[[float], R]) -> R:
-    """What is said when the first of the limits is over by which something was found."""
-    for limit in LIMITS_S:
-        said = ask(limit)
-        if found(said):
-            break
-    return said
 
 
 @pytest.fixture

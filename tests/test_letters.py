@@ -18,6 +18,7 @@ from robochoc.communication.network.words import (
     Ask,
     Copies,
     Denied,
+    Joined,
     Judge,
     Leave,
     Register,
@@ -36,7 +37,7 @@ from robochoc.observers.events import Received
 from robochoc.problem import Kind
 
 PROFILE = Profile("R1", Kind.DISCSP, ("R0",), (), {"X": ((1, 3), (5, 5))}, {}, 1, 0, ("/R1/goal",))
-OUTSIDE = (Register, Welcome, Denied, Ask, Told, Sniff, Sniffable)
+OUTSIDE = (Register, Welcome, Denied, Joined, Ask, Told, Sniff, Sniffable)
 WORDS = get_args(ToMaster), get_args(ToRobot), get_args(ToPeer)
 
 

@@ -157,7 +157,27 @@ def test_another_master_ends_the_run_the_same_one_does_not() -> None:
 
     ending, post = played(script)
     assert ending == Ending("the master was started anew; start this robot anew as well", failed=True, assignment={})
-    assert len(post.heard_of(Joined)) == 1
+    assert len(post.heard_of(Joined)) == 2, "one for each welcome of the same run"
+
+
+def test_behind_another_router_a_robot_registers_until_it_is_welcomed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever it says at first may get lost there, and so may the answer."""
+    monkeypatch.setattr("robochoc.communication.network.robot.REGISTER_AGAIN_S", 0.01)
+
+    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+        match word, len(post.heard_of(Register)):
+            case Register(visit=visit), 4:
+                yield Welcome(visit, RUN, (), observed=False, private=False)
+            case Joined(), 1:
+                post.router = "opened anew"
+            case Joined(), 4:
+                yield LEAVE
+            case _:
+                pass
+
+    ending, post = played(script)
+    assert ending == Ending("over", failed=False, assignment={})
+    assert [type(word) for word in post.heard] == [Register, Joined, Register, Register, Register, Joined, Bye]
 
 
 def test_a_master_that_is_gone_ends_the_run() -> None:

@@ -2,7 +2,7 @@
 
 Pure. The router proves who has sent a letter (`access.py`); its run and its number say which one it is. Within a run
 the letters of an ordered pair are numbered from 1, and come in that order or not at all. Words before a run
-(`Register`, `Welcome`, `Denied`, requests of observers) carry no run and no number: repeating them changes nothing.
+(from `Register` to `Joined`, requests of observers) carry no run and no number: repeating them changes nothing.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import msgspec
 from robochoc.communication.network.words import (
     Ask,
     Denied,
+    Joined,
     Register,
     Sniff,
     Sniffable,
@@ -24,16 +25,17 @@ from robochoc.communication.network.words import (
     Welcome,
     Word,
 )
+from robochoc.solver.encoding import Unsupported
 
 MASTER = "MASTER"
 """The master's name, as in Figure 3. No robot can have it."""
 LARGEST_LETTER = 8 * 2**20
 """Bytes. zenoh drops what is larger than it was told to take without a word, so it is said here, before."""
 
-_OUTSIDE = Register | Welcome | Denied | Ask | Told | Sniff | Sniffable
+_OUTSIDE = Register | Welcome | Denied | Joined | Ask | Told | Sniff | Sniffable
 
 
-class TooLarge(ValueError):  # noqa: N818 - named for what was found
+class TooLarge(Unsupported):
     """A word needs more bytes than a letter may have."""
 
 

@@ -13,6 +13,7 @@ import secrets
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import partial
 from queue import Empty
 from typing import Self
 
@@ -24,7 +25,7 @@ from robochoc.communication.network.chronicle import Chronicle
 from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.facilitator import DirectoryFacilitator, TooOften
 from robochoc.communication.network.gate import Gate
-from robochoc.communication.network.letters import MASTER, Letters, Refused, TooLarge
+from robochoc.communication.network.letters import MASTER, Letters, Refused
 from robochoc.communication.network.members import Member, Members, NotTaken
 from robochoc.communication.network.post import Arrived, Missed, Post, Presence, Woken
 from robochoc.communication.network.profile import Profile
@@ -62,7 +63,7 @@ TICK_S = 0.2
 REGISTRY_S = 0.5
 """How often the Authority's registry is looked at: who has been enrolled or revoked since."""
 LAST_WORDS_S = 10.0
-FAREWELL_S = 5.0
+FAREWELL_S, AGAIN_S = 5.0, 0.5
 _RUN_BYTES = 8
 
 
@@ -190,11 +191,14 @@ class Master:
         return tally.held, tally.cost
 
     def leave(self, why: str, *, failed: bool = False) -> None:
-        """Tell all that the run is over, and wait a moment until they have heard it."""
+        """Tell all that the run is over, until they have heard it: some may have joined, or come back, just now."""
+        leave, until = Leave(why, failed), time.monotonic() + FAREWELL_S
+        staying = partial(self.members.staying, FAREWELL_S, besides=self.tally.lost)
         with suppress(RobotsLost, Unsupported):
-            self._tell_all(Leave(why, failed))
-            until = time.monotonic() + FAREWELL_S
-            self._wait_until(lambda: self.members.have_left(FAREWELL_S, besides=self.tally.lost), until)
+            self._tell_all(leave)
+            while staying() and not over(until):
+                self._wait_until(lambda: not staying(), time.monotonic() + AGAIN_S)
+                self._tell_all(leave)
             self._wait_until(lambda: not self._desk.lagging, time.monotonic() + FAREWELL_S)
 
     def lose(self, name: str, why: str) -> None:
@@ -242,10 +246,9 @@ class Master:
             raise RobotsLost({MASTER: "the router's process has ended"})
         while self._dead:
             self._lose(*self._dead.popitem(), for_good=True)
-        patience_s = self._conditions.patience_s
         for name, member in list(self.members.robots.items()):
-            if member.is_away(patience_s) and not member.left:
-                self._lose(name, f"it has not been there for {patience_s:g} s")
+            if member.is_away(self._conditions.patience_s) and not member.left:
+                self._lose(name, f"it has not been there for {self._conditions.patience_s:g} s")
         if now - self._read_registry >= REGISTRY_S:
             self._read_registry = now
             self._facilitator.expire()
@@ -278,13 +281,10 @@ class Master:
     # Letters
 
     def _tell(self, name: str, word: ToRobot) -> None:
-        try:
-            self._post.send(name, self._letters.write(name, word))
-        except TooLarge as large:
-            raise Unsupported(str(large)) from None
+        self._post.send(name, self._letters.write(name, word))
 
     def _tell_all(self, word: ToRobot) -> None:
-        for name in self.members.robots:
+        for name in self.members.listening:
             self._tell(name, word)
 
     def _read(self, sender: str, content: bytes) -> None:
@@ -311,8 +311,8 @@ class Master:
             case OfEpoch():
                 if not self.tally.hear(name, word):
                     self._refuse(name, "a letter to the master", f"{type(word).__name__} says what cannot be")
-            case Joined(card):
-                member.card, member.joined = card, True
+            case Joined(visit, card):
+                member.join(visit, card)
             case Shown(variables):
                 self._note_failure(name, self.members.show(name, variables))
             case Events(told):
@@ -358,9 +358,8 @@ class Master:
                 self._refuse(name, "be in the directory", unfit)
             self.chronicle.registered(name)
             if self._progress:
-                self._progress(
-                    Progress(0, time.monotonic() - self._began, f"{len(self.members.robots)} robots registered")
-                )
+                said = f"{len(self.members.robots)} robots registered"
+                self._progress(Progress(0, time.monotonic() - self._began, said))
         member.gone, member.doubtful = None, False
         self._tell(name, Welcome(visit, self.run, self._conditions.filters, self._watched, self._conditions.private))
 

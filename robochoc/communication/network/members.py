@@ -60,6 +60,11 @@ class Member:
         """Its silhouette."""
         return silhouette(self.profile, self.also)
 
+    def join(self, visit: str, card: bytes) -> None:
+        """It has read the welcome; a word from another life of it is none of this one's."""
+        if visit == self.visit:
+            self.card, self.joined = card, True
+
     def is_away(self, for_s: float) -> bool:
         """Whether it has been away for longer than that. For a moment all are, behind a router that is opened anew."""
         return self.gone is not None and time.monotonic() - self.gone > for_s
@@ -194,9 +199,15 @@ class Members:
             if member:
                 self._over.add(member.visit)
 
-    def have_left(self, away_s: float, besides: Collection[str]) -> bool:
-        """Whether all `besides` those have taken leave, or been away for longer than `away_s`."""
-        return all(m.left or m.is_away(away_s) for name, m in self.robots.items() if name not in besides)
+    @property
+    def listening(self) -> list[str]:
+        """Who has joined, and not left. Others may not have been welcomed yet: a word of this run is none to them."""
+        return [name for name, member in self.robots.items() if member.joined and not member.left]
+
+    def staying(self, away_s: float, besides: Collection[str]) -> list[str]:
+        """Who has neither taken leave nor been away for longer than `away_s`, `besides` those."""
+        stay = (name for name, member in self.robots.items() if not (member.left or member.is_away(away_s)))
+        return [name for name in stay if name not in besides]
 
     @property
     def order(self) -> tuple[str, ...]:

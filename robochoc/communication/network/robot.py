@@ -23,7 +23,7 @@ from robochoc.authority.keyring import BadCard, KeyCard, KeyRing, UnknownPeer
 from robochoc.communication.control import Failed, Pause, Wave
 from robochoc.communication.filters import FilterStack, NotGenuine, UnknownFilter, filter_named
 from robochoc.communication.host import BadMessage
-from robochoc.communication.network.letters import MASTER, Letters, Opened, Refused, TooLarge
+from robochoc.communication.network.letters import MASTER, Letters, Opened, Refused
 from robochoc.communication.network.post import Arrived, Item, Missed, Post, Presence, Woken
 from robochoc.communication.network.profile import among, profile_of, ranges_of
 from robochoc.communication.network.refusals import Refusals
@@ -147,7 +147,7 @@ class NetworkRobot:
                 self._turn(self._items())
         except _Over as over:
             return Ending(over.why, over.failed, self._searcher.assignment if self._searcher else {})
-        except (Unsupported, TooLarge) as refusal:
+        except Unsupported as refusal:
             self._fail(Failed(str(refusal), unsupported=True, elsewhere=isinstance(refusal, TooMuch)))
             return Ending(str(refusal), failed=True, assignment={})
         except Exception as error:  # noqa: BLE001 - whatever it was, the master has to know
@@ -189,7 +189,7 @@ class NetworkRobot:
             self._searcher.tell_counters(0)
             return
         self._look_up()
-        if self._welcome is None and time.monotonic() - self._registered >= REGISTER_AGAIN_S:
+        if self._unanswered is not None and time.monotonic() - self._registered >= REGISTER_AGAIN_S:
             self._register()
 
     def _look_up(self) -> None:
@@ -326,21 +326,21 @@ class NetworkRobot:
         if welcome.visit != self._visit:
             return
         self._unanswered = None
-        if self._welcome is not None:
-            if welcome.run != self._welcome.run:
-                raise _Over("the master was started anew; start this robot anew as well", failed=True)
-            return
+        if self._welcome is None:
+            self._begin(welcome)
+        elif welcome.run != self._welcome.run:
+            raise _Over("the master was started anew; start this robot anew as well", failed=True)
+        self._say(Joined(self._visit, self._ring.card.encode() if self._ring else b""))
+
+    def _begin(self, welcome: Welcome) -> None:
         self._welcome = welcome
         self._letters.begin(welcome.run)
-        card = b""
         if welcome.filters:
             self._ring = KeyRing(self._identity, welcome.run)
             try:
                 self._filters = FilterStack(self._ring, [filter_named(name) for name in welcome.filters])
             except UnknownFilter as unknown:
                 raise Unsupported(f"{self._robot.name}: {unknown}") from None
-            card = self._ring.card.encode()
-        self._say(Joined(card))
         self._manner.stage("registered, waiting for the others")
 
     def _take_task(self, task: Task) -> None:

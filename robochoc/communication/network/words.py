@@ -36,8 +36,12 @@ class Register(_Word, frozen=True):
 
 
 class Joined(_Word, frozen=True):
-    """I have read your welcome. `card` holds my keys of this run (`KeyCard`; empty: no filter needs any)."""
+    """I, in the life `visit`, have read your welcome: said to each, for an answer may get lost.
 
+    `card` holds my keys of this run (`KeyCard`; empty: no filter needs any).
+    """
+
+    visit: str
     card: bytes
 
 
