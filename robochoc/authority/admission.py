@@ -18,8 +18,11 @@ _LIFETIME = timedelta(hours=24)
 class Admission(Protocol):
     """Who may take part, and who may not any more. `Authority` is one."""
 
-    def names(self, role: Role | None = None, right: Right | None = None) -> tuple[str, ...]:
-        """Who has a certificate in force now (in the role `role`, with the right `right`), sorted."""
+    def names(self, role: Role | None = None, right: Right | None = None, *, invited: bool = False) -> tuple[str, ...]:
+        """Who has a certificate in force now (in the role `role`, with the right `right`), sorted.
+
+        Also, if `invited`, who has a token and never had a certificate: whoever comes in that name has the new one.
+        """
 
     def is_revoked(self, who: str | int) -> bool:
         """Whether `who` is to be turned away."""
@@ -44,7 +47,13 @@ class Household:
         """A new identity of the master, who is reached at `hosts`."""
         return self._identity(MASTER, hosts)
 
-    def names(self, role: Role | None = None, right: Right | None = None) -> tuple[str, ...]:
+    def names(
+        self,
+        role: Role | None = None,
+        right: Right | None = None,
+        *,
+        invited: bool = False,  # noqa: ARG002 - there are no tokens
+    ) -> tuple[str, ...]:
         """All robots that were not revoked; of these, who has the right."""
         there = tuple(n for n in self._robots if n not in self._turned_away) if role in {None, Role.ROBOT} else ()
         return there if right is None else tuple(n for n in there if n in self._sniffers)

@@ -277,18 +277,19 @@ class Authority:
         serial = f"{who:x}"
         return not any(one.serial == serial for member in members.values() for one in member.certificates)
 
-    def names(self, role: Role | None = None, right: Right | None = None) -> tuple[str, ...]:
-        """Who has a certificate in force now (in the role `role`, with the right `right`), sorted."""
+    def names(self, role: Role | None = None, right: Right | None = None, *, invited: bool = False) -> tuple[str, ...]:
+        """Who has a certificate in force now (in the role `role`, with the right `right`), sorted.
+
+        Also, if `invited`, who has a token and never had a certificate: whoever comes in that name has the new one.
+        """
         now = self.clock()
         return tuple(
-            sorted(
-                member.name
-                for member in self.members()
-                if not member.revoked
-                and role in (None, member.role)
-                and right in (None, *member.may)
-                and member.since(now).certificates
-            )
+            member.name
+            for member in self.members()
+            if not member.revoked
+            and role in (None, member.role)
+            and right in (None, *member.may)
+            and (member.since(now).certificates or (invited and member.never_certified))
         )
 
     def members(self) -> tuple[Member, ...]:

@@ -86,6 +86,11 @@ class Member(msgspec.Struct, frozen=True):
             return State.REVOKED
         return State.IN_FORCE if any(now < one.expires for one in self.certificates) else State.EXPIRED
 
+    @property
+    def never_certified(self) -> bool:
+        """Whether no certificate in this name can be about."""
+        return not self.certificates and not self.withdrawn
+
     def expires(self, now: float) -> float:
         """Until when (Unix time) its token, if it is invited, or its last certificate was good; 0: it has neither."""
         token = self.invitation.expires if self.invitation and not self.invitation.used else 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from functools import partial
 from types import MappingProxyType
 
 from robochoc.authority.admission import Admission
@@ -34,10 +35,10 @@ class Gate:
         self._ways = ways
         self.sniffable = False
         """Whether those who may sniff may have the journal of this run."""
-        self._admitted: tuple[dict[str, tuple[str, ...]], tuple[str, ...] | None] | None = None
+        self._rules: tuple[dict[str, tuple[str, ...]], tuple[str, ...] | None] | None = None
 
     def open(self) -> None:
-        """Let in all whom the Authority has certified; they may write to the master, and where the ways lead."""
+        """Let in all whom the Authority has certified, or invited; they may write to the master, and by the ways."""
         self.follow()
 
     def open_ways(self, ways: Reach) -> None:
@@ -46,20 +47,23 @@ class Gate:
         self.follow()
 
     def follow(self) -> None:
-        """Let in who was enrolled since, and keep out who was revoked. Raises `RouterFailed`."""
-        names = [*self._admission.names(Role.ROBOT), *self._admission.names(Role.OBSERVER)]
-        admitted = {name: self._ways.get(name, ()) for name in names if not self.is_revoked(name)}
-        sniffers = tuple(name for name in self._sniffers() if name in admitted) if self.sniffable else None
-        if (admitted, sniffers) != self._admitted:
-            self._admitted = admitted, sniffers
-            self._router.open(admitted, sniffers)
+        """Let in who was enrolled since, and keep out who was revoked. Raises `RouterFailed`.
+
+        There are rules for those who were invited, too: nobody has a certificate in their names, and the router need
+        not be opened anew when they get theirs.
+        """
+        names = partial(self._admission.names, invited=True)
+        there = [*names(Role.ROBOT), *names(Role.OBSERVER)]
+        admitted = {name: self._ways.get(name, ()) for name in there if not self.is_revoked(name)}
+        sniffers = tuple(name for name in names(right=Right.SNIFF) if name in admitted)
+        rules = admitted, sniffers if self.sniffable else None
+        if rules != self._rules:
+            self._rules = rules
+            self._router.open(*rules)
 
     def may_sniff(self, name: str) -> bool:
         """Whether this run's journal is given out, and `name` has the right to it."""
-        return name in self._sniffers()
-
-    def _sniffers(self) -> tuple[str, ...]:
-        return self._admission.names(right=Right.SNIFF) if self.sniffable else ()
+        return self.sniffable and name in self._admission.names(right=Right.SNIFF)
 
     def is_revoked(self, name: str) -> bool:
         """Whether `name` is to be turned away."""
