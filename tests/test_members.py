@@ -230,6 +230,24 @@ def test_a_robot_that_was_away_may_come_back_in_another_life() -> None:
     assert members.register("A", robot("A"), "second").visit == "second"
 
 
+def test_a_team_is_not_complete_while_one_that_has_come_is_away_or_may_be_another() -> None:
+    members = Members()
+    member = members.register("A", robot("A"), "first")
+    member.join("another's", b"")
+    assert not members.complete
+    member.join("first", b"")
+    assert members.complete
+    member.note_presence(there=False)
+    assert not members.complete
+    member.note_presence(there=True)
+    assert not members.complete, "who is there may be another life of it"
+    member.join("first", b"")
+    assert members.complete
+    member.note_presence(there=False)
+    assert members.register("A", robot("A"), "first") is member
+    assert members.complete
+
+
 # What is told at the end
 
 

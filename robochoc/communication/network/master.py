@@ -62,9 +62,7 @@ from robochoc.solver.part import Brief
 TICK_S = 0.2
 REGISTRY_S = 0.5
 """How often the Authority's registry is looked at: who has been enrolled or revoked since."""
-LAST_WORDS_S = 10.0
-FAREWELL_S, AGAIN_S = 5.0, 0.5
-_RUN_BYTES = 8
+LAST_WORDS_S, FAREWELL_S, AGAIN_S = 10.0, 5.0, 0.5
 
 
 class Master:
@@ -87,7 +85,7 @@ class Master:
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
         self.endpoint = endpoint
-        self.run = secrets.token_hex(_RUN_BYTES)
+        self.run = secrets.token_hex(8)
         self.members = members
         self.tally = Tally()
         self._identity = identity
@@ -360,14 +358,17 @@ class Master:
             if self._progress:
                 said = f"{len(self.members.robots)} robots registered"
                 self._progress(Progress(0, time.monotonic() - self._began, said))
-        member.gone, member.doubtful = None, False
+        self._welcome(name, visit)
+
+    def _welcome(self, name: str, visit: str) -> None:
         self._tell(name, Welcome(visit, self.run, self._conditions.filters, self._watched, self._conditions.private))
 
     def _note_presence(self, name: str, *, there: bool) -> None:
         member = self.members.robots.get(name)
         if member:
-            member.gone = None if there else member.gone or time.monotonic()
-            member.doubtful = member.doubtful or not there
+            member.note_presence(there=there)
+            if member.doubtful and there and not self.members.closed:
+                self._welcome(name, member.visit)  # who is still the same answers
 
     def _follow_registry(self) -> None:
         """Let in who was enrolled since, and throw out who was revoked; that needs a router with other rules."""

@@ -63,7 +63,12 @@ class Member:
     def join(self, visit: str, card: bytes) -> None:
         """It has read the welcome; a word from another life of it is none of this one's."""
         if visit == self.visit:
-            self.card, self.joined = card, True
+            self.card, self.joined, self.doubtful = card, True, False
+
+    def note_presence(self, *, there: bool) -> None:
+        """It is there, or is not any more, as far as the router knows."""
+        self.gone = None if there else self.gone or time.monotonic()
+        self.doubtful = self.doubtful or not there
 
     def is_away(self, for_s: float) -> bool:
         """Whether it has been away for longer than that. For a moment all are, behind a router that is opened anew."""
@@ -105,6 +110,7 @@ class Members:
         """Take `sender` in, if it is `admitted`, or find it there already in the same life. Raises `NotTaken`."""
         known = self.robots.get(sender)
         if known and known.visit == visit:
+            known.gone, known.doubtful = None, False
             return known
         if not admitted:
             raise NotTaken("it is enrolled to observe, not to take part; say: robochoc authority enrol NAME")
@@ -136,9 +142,9 @@ class Members:
 
     @property
     def complete(self) -> bool:
-        """Whether all are there: as many as were asked for, or all that somebody names."""
-        enough = self.number is None or len(self.robots) >= self.number
-        return bool(self.robots) and enough and not self.awaited and all(m.joined for m in self.robots.values())
+        """Whether all are there now: as many as were asked for, or all that somebody names."""
+        enough = bool(self.robots) and (self.number is None or len(self.robots) >= self.number)
+        return enough and not self.awaited and all(m.joined and not m.doubtful for m in self.robots.values())
 
     def unseen(self) -> dict[str, tuple[str, ...]]:
         """Variables that neighbours' constraints look at, by those who have not shown them and may own them.
