@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from random import Random
 
 import msgspec
@@ -233,19 +234,18 @@ def test_a_robot_that_was_away_may_come_back_in_another_life() -> None:
 def test_a_team_is_not_complete_while_one_that_has_come_is_away_or_may_be_another() -> None:
     members = Members()
     member = members.register("A", robot("A"), "first")
-    member.join("another's", b"")
-    assert not members.complete
-    member.join("first", b"")
-    assert members.complete
-    member.note_presence(there=False)
-    assert not members.complete
-    member.note_presence(there=True)
-    assert not members.complete, "who is there may be another life of it"
-    member.join("first", b"")
-    assert members.complete
-    member.note_presence(there=False)
-    assert members.register("A", robot("A"), "first") is member
-    assert members.complete
+    steps: list[tuple[Callable[[], object], bool, dict[str, str]]] = [
+        (lambda: member.join("another's", b""), False, {"A": "first"}),
+        (lambda: member.join("first", b""), True, {}),
+        (lambda: member.note_presence(there=False), False, {}),
+        (lambda: member.note_presence(there=True), False, {"A": "first"}),
+        (lambda: member.join("first", b""), True, {}),
+        (lambda: member.note_presence(there=False), False, {}),
+        (lambda: members.register("A", robot("A"), "first"), True, {}),
+    ]
+    for step, complete, to_welcome in steps:
+        step()
+        assert (members.complete, members.to_welcome()) == (complete, to_welcome)
 
 
 # What is told at the end

@@ -249,6 +249,8 @@ class Master:
                 self._lose(name, f"it has not been there for {self._conditions.patience_s:g} s")
         if now - self._read_registry >= REGISTRY_S:
             self._read_registry = now
+            for name, visit in self.members.to_welcome().items():
+                self._welcome(name, visit)
             self._facilitator.expire()
             for subscriber, told in self._facilitator.notices():
                 self._tell(subscriber, told)
@@ -367,8 +369,6 @@ class Master:
         member = self.members.robots.get(name)
         if member:
             member.note_presence(there=there)
-            if member.doubtful and there and not self.members.closed:
-                self._welcome(name, member.visit)  # who is still the same answers
 
     def _follow_registry(self) -> None:
         """Let in who was enrolled since, and throw out who was revoked; that needs a router with other rules."""

@@ -205,6 +205,14 @@ class Members:
             if member:
                 self._over.add(member.visit)
 
+    def to_welcome(self) -> dict[str, str]:
+        """Of an open team, the lives of those who are there, and have answered no welcome since they came (back).
+
+        Their answer may have got lost; and of two lives of one name only the one that is still there answers.
+        """
+        waiting = {name: m.visit for name, m in self.robots.items() if m.gone is None and (m.doubtful or not m.joined)}
+        return {} if self.closed else waiting
+
     @property
     def listening(self) -> list[str]:
         """Who has joined, and not left. Others may not have been welcomed yet: a word of this run is none to them."""
