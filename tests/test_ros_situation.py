@@ -7,7 +7,7 @@ import time
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from problems import team_of
 
@@ -208,6 +208,8 @@ somewhere = st.tuples(*[st.floats(-2, 2) | st.sampled_from([-0.5, 0.0, 0.5, 1.0]
 
 
 @given(st.lists(somewhere, max_size=12), st.lists(st.tuples(somewhere, st.booleans()), max_size=6))
+@example([(0.0, -7e-154, 0.0)], [((0.0, 0.5, 0.0), False)])
+@example([(1.0 - 2**-53, 0.0, 0.0)], [((0.5, 0.0, 0.0), True), ((1.5, 0.0, 0.0), True)])
 def test_what_is_near_is_found_as_if_all_were_looked_at(
     kept: list[tuple[float, float, float]], asked: list[tuple[tuple[float, float, float], bool]]
 ) -> None:

@@ -9,6 +9,8 @@ from itertools import product
 from robochoc.ros.layout import Point
 
 _Cell = tuple[int, int, int]
+_A_HAIR_MORE = 1 + 1e-9
+"""What lies just beyond a cube's side may still be near: distances are rounded."""
 
 
 class Places:
@@ -41,7 +43,8 @@ class Places:
         return self._count < before
 
     def _around(self, place: Point, within: float) -> Iterator[list[Point]]:
-        spans = (range(math.floor(at - within), math.floor(at + within) + 1) for at in place)
+        reach = within * _A_HAIR_MORE
+        spans = (range(math.floor(at - reach), math.floor(at + reach) + 1) for at in place)
         for x, y, z in product(*spans):
             cube = self._cubes.get((x, y, z))
             if cube:
