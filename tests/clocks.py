@@ -15,9 +15,9 @@ from typing import TypeVar
 
 R = TypeVar("R")
 
-TICK_S = 0.02
 LIMITS_S = (1.5, 6, 20, 60)
 """Until one of them something has been found, however busy the machine is."""
+TICK_S = 0.02
 LATE_S = 0.1
 """A tick that comes so late has not been late by chance."""
 
