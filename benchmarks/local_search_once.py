@@ -17,7 +17,6 @@ from robochoc.communication.simulator import Simulation
 from robochoc.formats import PREDEFINED
 from robochoc.problem import Child, Constraint, Domain, Kind, Parent, Robot, Team, Variable
 from robochoc.registry import protocol_named
-from robochoc.solver.domain import compiled_domain
 from robochoc.solver.part import Brief
 
 COLOURS = Domain("Colours", (range(3),))
@@ -61,9 +60,8 @@ def main() -> None:
     cpu_s, wall_s = time.process_time() - cpu_s, time.perf_counter() - wall_s
     memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     trails = {name: found.trail for name, found in result.findings.items() if found.trail}
-    domains = {robot.name: compiled_domain(robot) for robot in team.robots}
     told = {
-        "costs": list(course(team, trails, domains)),
+        "costs": list(course(run.compiled, trails)),
         "messages": sum(result.metrics.messages.values()),
         "bytes": result.metrics.bytes,
         "ncccs": result.metrics.ncccs,

@@ -11,17 +11,17 @@ from robochoc.observers.checker import cost, could_join, objections
 from robochoc.outcome import Epoch, Outcome, Verdict
 from robochoc.problem import Kind, Team
 from robochoc.protocols.traits import Traits
-from robochoc.solver.domain import CompiledDomain
-
-Domains = Mapping[str, CompiledDomain]
+from robochoc.solver.compiled_team import CompiledTeam
 
 
 class Refuted(Exception):  # noqa: N818 - named for what happened to the claim
     """The checker refutes what the protocol claims: a fault of the protocol, or ours."""
 
 
-def answered(epoch: Epoch, team: Team, result: RunResult, traits: Traits, domains: Domains) -> Epoch:
+def answered(epoch: Epoch, team: Team, result: RunResult, traits: Traits, compiled: CompiledTeam) -> Epoch:
     """`epoch`, with the answer of a search by a protocol that has `traits`; as it is where there is none.
+
+    `team` is what the answer is held against, as the files have it; `compiled` is what the robots have worked on.
 
     A protocol that minimises has one whenever it is asked; whether that is proven depends on the protocol, and on
     whether it came to its end. A solution of a team without costs needs no proof. Raises `Refuted`.
@@ -32,14 +32,14 @@ def answered(epoch: Epoch, team: Team, result: RunResult, traits: Traits, domain
         return epoch
     if ended and (traits.complete or not traits.costs):
         return _with(epoch, team, joined(result.assignments), _best_verdict(team))
-    found = best_of(team, result, domains)
+    found = best_of(compiled, result)
     epoch = replace(epoch, bound=bound_of(result.findings))
     if found is None:
         return replace(epoch, verdict=Verdict.UNKNOWN)
     return _with(epoch, team, found.assignment, Verdict.SOLUTION if team.kind is Kind.DISCSP else result.verdict)
 
 
-def placed(outcome: Outcome, team: Team, result: RunResult, domains: Domains, aside: float | None) -> Outcome:
+def placed(outcome: Outcome, team: Team, result: RunResult, compiled: CompiledTeam, aside: float | None) -> Outcome:
     """`outcome`, with the robots that step aside as `result` has it: so that nobody could be added, or the fewest.
 
     `aside` is what it cost that a robot of weight 1 does so; None where nothing was minimised. Robots that were lost
@@ -51,7 +51,7 @@ def placed(outcome: Outcome, team: Team, result: RunResult, domains: Domains, as
     if aside is not None and not ended:
         least = bound_of(result.findings)
         outcome = replace(outcome, bound=None if least is None else least // aside)
-        found = best_of(team, result, domains, aside)
+        found = best_of(compiled, result, aside)
         assignment = found.assignment if found else None
     if assignment is None:
         return outcome

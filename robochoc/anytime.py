@@ -16,7 +16,7 @@ from robochoc.observers.objective import Objective
 from robochoc.outcome import Place
 from robochoc.problem import INFINITE, Team
 from robochoc.protocols.findings import Findings, Trail
-from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.compiled_team import CompiledTeam
 
 
 class Found(NamedTuple):
@@ -26,28 +26,24 @@ class Found(NamedTuple):
     cost: float
 
 
-def best_of(
-    team: Team, result: RunResult, domains: Mapping[str, CompiledDomain], aside: float | None = None
-) -> Found | None:
+def best_of(compiled: CompiledTeam, result: RunResult, aside: float | None = None) -> Found | None:
     """The cheapest assignment that `result` tells of; None when all that it tells of break hard constraints.
 
-    `domains` are all robots' compiled domains.
+    `compiled` is what the robots have worked on.
     """
     best: Found | None = None
-    for own in (result.assignments, *_heard_of(result.findings, domains), *_best_cycle(team, result, domains, aside)):
-        objective = Objective(team, aside)
+    for own in (result.assignments, *_heard_of(compiled, result.findings), *_best_cycle(compiled, result, aside)):
+        objective = Objective(compiled.team, aside)
         objective.change(own)
         if objective.cost < (best.cost if best else INFINITE):
             best = Found(joined(own), objective.cost)
     return best
 
 
-def course(
-    team: Team, trails: Mapping[str, Trail], domains: Mapping[str, CompiledDomain], aside: float | None = None
-) -> Iterator[float]:
+def course(compiled: CompiledTeam, trails: Mapping[str, Trail], aside: float | None = None) -> Iterator[float]:
     """The cost of the values that all robots had in cycle 0, 1, ..., as far as all have come."""
-    objective = Objective(team, aside)
-    for changed in _changes(trails, domains):
+    objective = Objective(compiled.team, aside)
+    for changed in _changes(compiled, trails):
         objective.change(changed)
         yield objective.cost
 
@@ -77,34 +73,32 @@ def absent(team: Team, assignment: Mapping[str, int]) -> tuple[str, ...]:
 _Own = dict[str, dict[str, int]]
 
 
-def _heard_of(findings: Mapping[str, Findings], domains: Mapping[str, CompiledDomain]) -> Iterator[_Own]:
+def _heard_of(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> Iterator[_Own]:
     """The cheapest assignment that some robot has heard of."""
     bests = [found.best for found in findings.values() if found.best is not None]
     if bests:
         best = min(bests, key=lambda one: one.cost)
-        yield {name: domains[name].behind(value) for name, value in best.values.items()}
+        yield {name: compiled[name].behind(value) for name, value in best.values.items()}
 
 
-def _best_cycle(
-    team: Team, result: RunResult, domains: Mapping[str, CompiledDomain], aside: float | None
-) -> Iterator[_Own]:
+def _best_cycle(compiled: CompiledTeam, result: RunResult, aside: float | None) -> Iterator[_Own]:
     """What the robots had in the cheapest cycle, the first of several."""
     trails = {name: found.trail for name, found in result.findings.items() if found.trail is not None}
-    if len(trails) < len(team.robots):
+    if len(trails) < len(compiled.team.robots):
         return
-    costs = list(course(team, trails, domains, aside))
+    costs = list(course(compiled, trails, aside))
     if costs:
         own: _Own = {}
-        for changed in itertools.islice(_changes(trails, domains), costs.index(min(costs)) + 1):
+        for changed in itertools.islice(_changes(compiled, trails), costs.index(min(costs)) + 1):
             own.update(changed)
         yield own
 
 
-def _changes(trails: Mapping[str, Trail], domains: Mapping[str, CompiledDomain]) -> Iterator[_Own]:
+def _changes(compiled: CompiledTeam, trails: Mapping[str, Trail]) -> Iterator[_Own]:
     """For each cycle that all robots have behind them, the values of those that have changed."""
     changes: dict[int, _Own] = {}
     for name, trail in trails.items():
         for cycle, index in trail.entries:
-            changes.setdefault(cycle, {})[name] = domains[name].solution(index)
+            changes.setdefault(cycle, {})[name] = compiled[name].solution(index)
     for cycle in range(min((trail.cycle for trail in trails.values()), default=-1) + 1):
         yield changes.get(cycle, {})

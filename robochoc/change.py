@@ -140,6 +140,11 @@ def without(team: Team, names: Iterable[str]) -> Team:
     return _still_showing(replace(team, robots=tuple(robots)))
 
 
+def still_showing(team: Team, before: Team) -> Team:
+    """Return `team`, what is left of `before`: its robots still show all that they showed there, to nobody."""
+    return replace(team, robots=tuple(replace(robot, shown=before[robot.name].interface) for robot in team.robots))
+
+
 def _still_showing(team: Team) -> Team:
     """`team`, in which robots still show what their parents' parts of partially known constraints look at."""
     for robot in team.robots:

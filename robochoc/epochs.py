@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 from robochoc.change import BadChange, changed, changed_by, concerns, described, possible, rejoined, without
 from robochoc.communication.run_result import RunResult
@@ -26,11 +26,11 @@ from robochoc.outcome import Epoch as Answered
 from robochoc.outcome import Verdict
 from robochoc.problem import AddAgent, Change, Event, Robot, Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import Void, void
 from robochoc.solver.part import NO_BRIEF, Brief
 
-Compile = Callable[[Team], Mapping[str, CompiledDomain]]
+Compile = Callable[[Team], CompiledTeam]
 
 Field = Callable[[Team, Answered, float | None], Event | None]
 """Where decisions go and changes come from, while the team waits: the robots' surroundings.
@@ -42,11 +42,15 @@ nothing. An event of its own comes after those of the files; changes in it that 
 
 
 class Played(NamedTuple):
-    """An epoch that is over: its team, as the files have it, how it ended, and what had opened it."""
+    """An epoch that is over: its team, as the files have it, how it ended, what had opened it.
+
+    `compiled` is that team as the robots have worked on it.
+    """
 
     team: Team
     result: RunResult
     opened_by: str
+    compiled: CompiledTeam
 
 
 class Opening(NamedTuple):
@@ -55,11 +59,6 @@ class Opening(NamedTuple):
     epoch: Epoch
     number: int = 0
     by: str = ""
-
-    @classmethod
-    def of(cls, team: Team, brief: Brief) -> Self:
-        """A run of `team` as it is."""
-        return cls(Epoch(team, brief=brief))
 
 
 class Announcer:
@@ -86,7 +85,7 @@ class Announcer:
 class Journey:
     """A team on its way through its scenario, and through losses.
 
-    `order` is the priority order asked for (None: the files'). `compile_` gives a team's compiled domains.
+    `order` is the priority order asked for (None: the files'). `compile_` compiles a team.
     `left_s` says how many seconds there are left, `messages` how many may be sent in all (None: no limit). Of the
     robots that are lost, `spares` come back: their files are read again, what has happened meanwhile happens to
     them too, and they join at the end of the order. `brief` is what robots are told beside the problem.
@@ -122,17 +121,21 @@ class Journey:
         """The team as the robots see it: in the order of the run. Raises `CannotTurn`."""
         return self.team if self._order is None else reordered(self.team, self._order)
 
+    def compiled(self) -> CompiledTeam:
+        """Return the team as the robots see it, compiled. Raises `CannotTurn`, and what compiling raises."""
+        return self._compile(self.arranged())
+
     def go(self, session: Session, announce: Callable[[Opening], None]) -> Iterator[Played]:
         """One epoch after the other; the last is the one whose verdict counts. A time limit may end it earlier.
 
-        Before each, `announce` is told of it.
+        `session` was opened with the `compiled` team. Before each epoch, `announce` is told of it.
         """
         opened = "the start"
-        epoch = Epoch(self.arranged(), brief=self._brief)
+        epoch = Epoch(session.compiled, brief=self._brief)
         for number in count():
             announce(Opening(epoch, number, opened))
             result = self._search(session)
-            yield Played(self.team, result, opened)
+            yield Played(self.team, result, opened, epoch.compiled)
             if result.lost:
                 fresh = self._back_after(result.lost)
                 opened = _loss(result.lost, fresh)
@@ -141,11 +144,10 @@ class Journey:
             else:
                 opened = self._described(self._next)
                 fresh = self._added_by(self._next)
-            before = self.arranged()
             self._take_stock(fresh)
             if result.lost and not self.team.robots and self._next is None:
                 return
-            epoch = self._go_over(session, before, fresh)
+            epoch = self._go_over(session, fresh)
 
     def _search(self, session: Session) -> RunResult:
         if not self.team.robots:  # all have left, and others may come: nobody is against it
@@ -224,12 +226,12 @@ class Journey:
             stay = [name for name in self._order if name in self.team and name not in fresh]
             self._order = (*stay, *(name for name in self.team.order if name not in stay))
 
-    def _go_over(self, session: Session, before: Team, fresh: Collection[str]) -> Epoch:
-        """Have `session`, which has worked on `before`, work on the team as it is now."""
-        now = self.arranged()
-        keys, agents = void(before, now)
+    def _go_over(self, session: Session, fresh: Collection[str]) -> Epoch:
+        """Have `session` work on the team as it is now."""
+        now = session.workable(self.arranged())
+        keys, agents = void(session.compiled.team, now)
         stale = Void(keys, agents | set(fresh))
-        epoch = Epoch(now, self._compile(now), stale, frozenset(fresh), self._brief)
+        epoch = Epoch(self._compile(now), stale, frozenset(fresh), self._brief)
         session.change(epoch)
         return epoch
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -13,6 +14,7 @@ from robochoc.change import changed_by, described
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress
 from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.session import Epoch as Given
 from robochoc.communication.session import Session
 from robochoc.communication.simulator import Simulation
 from robochoc.communication.timed import Timed
@@ -25,7 +27,7 @@ from robochoc.opinion import contradiction, decided, total_cost
 from robochoc.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.orders import CannotTurn, Order, favourable, order_of
 from robochoc.outcome import Epoch, Metrics, Outcome, Verdict
-from robochoc.problem import INFINITE, Team
+from robochoc.problem import INFINITE, Robot, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.refusals import instead, refuse_central, refuse_field, refuse_unfit
@@ -34,6 +36,7 @@ from robochoc.solver.ace import AceProcess, SolverTimeout
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.central import Judge
 from robochoc.solver.compile import Compiler, CompileTimeout, Source
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain, TooManySolutions
 from robochoc.solver.encoding import TooMuch, Unsupported
 from robochoc.solver.part import Brief
@@ -70,6 +73,14 @@ class _TimeOver(Exception):  # noqa: N818 - a limit that was reached
     """The time for everything was over before the robots could start."""
 
 
+class _NoneAlone(Exception):  # noqa: N818 - it is an answer, not a fault
+    """The private constraints of `robot` leave it no local solution, which decides the matter."""
+
+    def __init__(self, robot: str) -> None:
+        super().__init__(robot)
+        self.robot = robot
+
+
 class _Run:
     """One team, one set of options, one time limit for all that has to be done."""
 
@@ -94,7 +105,6 @@ class _Run:
         self._deadline = None if options.timeout is None else self._began + options.timeout
         self._cache = SolutionCache() if options.cache else None
         self._compile_s = 0.0
-        self._compiled: dict[str, CompiledDomain] = {}
         self._epochs: list[Epoch] = []
         self._outcome = Outcome(
             team=team.name,
@@ -115,7 +125,7 @@ class _Run:
         journey = Journey(
             self._team,
             names,
-            self._domains,
+            self._compiled,
             self._left_s,
             messages=options.messages,
             spares=options.spares,
@@ -133,18 +143,13 @@ class _Run:
         """All epochs; then those step aside who find no place, if they are to."""
         if self._options.withdraw is Withdrawal.FEWEST and protocol.traits.costs:
             return self._placed(self._outcome, journey, protocol)
-        domains = self._domains(journey.team)
-        alone = next((name for name, domain in domains.items() if not domain.values), None)
-        if alone is None or self._dynamic:
-            lost = self._play(journey, protocol, domains)
+        try:
+            lost = self._play(journey, protocol)
             if lost:
                 raise RobotsLost(lost)
             outcome = _without(self._summary(), journey)
-        else:
-            reason = f"{alone} alone has none: its private constraints leave it no local solution"
-            sure = self._confirmed(journey.team, alone)
-            epoch = Epoch(Verdict.NO_SOLUTION, journey.team.order, verified=sure, witness=alone, confirmed=sure)
-            outcome = replace(self._told(epoch), reason=reason)
+        except _NoneAlone as alone:
+            outcome = self._impossible(journey.team, alone.robot)
         if outcome.verdict is Verdict.UNKNOWN and outcome.reason is None:
             outcome = replace(outcome, reason=self._limit(outcome.witness, sum(outcome.metrics.messages.values())))
         if journey.regrets:
@@ -154,6 +159,13 @@ class _Run:
             second = MINIMISES if fewest else FIRST_FIT
             outcome = self._placed(replace(outcome, placed_by=second), journey, spoken(second))
         return outcome
+
+    def _impossible(self, team: Team, alone: str) -> Outcome:
+        """The outcome when one robot `alone` has no local solution. Raises `Refuted`."""
+        reason = f"{alone} alone has none: its private constraints leave it no local solution"
+        sure = self._confirmed(team, alone)
+        epoch = Epoch(Verdict.NO_SOLUTION, team.order, verified=sure, witness=alone, confirmed=sure)
+        return replace(self._told(epoch), reason=reason)
 
     def _limit(self, witness: str | None, sent: int) -> str:
         """Why there is no verdict, after so many messages."""
@@ -165,12 +177,10 @@ class _Run:
             return f"{self._options.protocol} has come to its end, and all that it came by breaks a hard constraint"
         return f"so many messages have been sent (--messages {self._options.messages})"
 
-    def _play(
-        self, journey: Journey, protocol: type[Protocol], domains: Mapping[str, CompiledDomain]
-    ) -> Mapping[str, str]:
+    def _play(self, journey: Journey, protocol: type[Protocol]) -> Mapping[str, str]:
         """Play all epochs; returns the robots that are lost, if nobody is left."""
         lost: Mapping[str, str] = {}
-        with self._session(protocol, journey.arranged(), domains) as session:
+        with self._session(protocol, journey.compiled(), self._brief) as session:
             for played in journey.go(session, lambda opening: self._announce(protocol, opening, session)):
                 self._epochs.append(self._epoch(played, protocol.traits))
                 self._tell_field(journey)
@@ -196,9 +206,9 @@ class _Run:
             team = journey.arranged()
             if outcome.placed_by == MINIMISES and self._options.order is None:
                 team = favourable(team)
-            self._announce(protocol, Opening.of(team, brief))
-            domains = self._domains(team)
-            with self._session(protocol, team, domains, brief) as session:
+            compiled = self._compiled(team, every=True)
+            self._announce(protocol, Opening(Given(compiled, brief=brief)))
+            with self._session(protocol, compiled, brief) as session:
                 result = session.search(self._left_s(), self._options.messages)
             if not result.lost:
                 break
@@ -206,7 +216,8 @@ class _Run:
             if not journey.team.robots:
                 raise RobotsLost(result.lost)
         spent = replace(outcome.metrics + result.metrics, compile_s=self._compile_s)
-        outcome = placed(replace(_without(outcome, journey), metrics=spent), journey.team, result, domains, brief.aside)
+        outcome = replace(_without(outcome, journey), metrics=spent)
+        outcome = placed(outcome, journey.team, result, compiled, brief.aside)
         if outcome.verdict is Verdict.UNKNOWN:
             return replace(outcome, reason=self._limit(None, sum(spent.messages.values())))
         if outcome.verdict is not Verdict.OPTIMAL or brief.aside is None:
@@ -218,7 +229,7 @@ class _Run:
 
     def _epoch(self, played: Played, traits: Traits) -> Epoch:
         """What an epoch has come to, held against every constraint, or against the judge if that is asked for."""
-        team, result, opened = played
+        team, result, opened, compiled = played
         epoch = Epoch(
             verdict=result.verdict,
             robots=team.order,
@@ -230,7 +241,7 @@ class _Run:
         if result.verdict is Verdict.NO_SOLUTION:
             sure = self._confirmed(team)
             return replace(epoch, verified=sure, confirmed=sure)
-        epoch = answered(epoch, team, result, traits, self._compiled)
+        epoch = answered(epoch, team, result, traits, compiled)
         if epoch.verdict is not Verdict.OPTIMAL or epoch.cost is None:
             return epoch
         return replace(epoch, confirmed=self._confirmed(team, total=epoch.cost))
@@ -313,49 +324,52 @@ class _Run:
 
     # What an epoch needs
 
-    def _domains(self, team: Team) -> dict[str, CompiledDomain]:
-        """All robots' compiled domains; up to the first that is empty, if that decides the matter."""
+    def _compiled(self, team: Team, *, every: bool = False) -> CompiledTeam:
+        """Compile `team`, which is what the robots will work on.
+
+        Raises `_NoneAlone` at the first robot without a local solution, unless the others matter: `every` one is asked
+        for, or the problem changes over time.
+        """
         began = time.monotonic()
-        domains = {}
+        number = itertools.count(1)
         solved = False
-        with Compiler(self._options.local, self._cache, self._deadline, self._solver) as compiler:
-            for number, robot in enumerate(team.robots, 1):
-                self._show(f"compiling {robot.name} ({number} of {len(team.robots)})")
-                try:
-                    compilation = compiler.compile(robot)
-                except SolverTimeout:
-                    raise _TimeOver(f"the time (--timeout) was over while {robot.name} was compiled") from None
-                solved = solved or compilation.source is not Source.DIRECT
-                domains[robot.name] = compilation.domain
-                if not compilation.domain.values and self._options.withdraw is None and not self._dynamic:
-                    break
-        if solved:
-            self._compile_s += time.monotonic() - began
-        self._compiled = domains
-        return domains
+
+        def compile_robot(robot: Robot) -> CompiledDomain:
+            nonlocal solved
+            self._show(f"compiling {robot.name} ({next(number)} of {len(team.robots)})")
+            try:
+                compilation = compiler.compile(robot)
+            except SolverTimeout:
+                raise _TimeOver(f"the time (--timeout) was over while {robot.name} was compiled") from None
+            solved = solved or compilation.source is not Source.DIRECT
+            if not (compilation.domain.values or every or self._dynamic):
+                raise _NoneAlone(robot.name)
+            return compilation.domain
+
+        try:
+            with Compiler(self._options.local, self._cache, self._deadline, self._solver) as compiler:
+                return CompiledTeam(team, compile_robot)
+        finally:
+            if solved:
+                self._compile_s += time.monotonic() - began
 
     @property
     def _brief(self) -> Brief:
         return Brief(self._options.seed, self._options.settings)
 
-    def _session(
-        self, protocol: type[Protocol], team: Team, domains: Mapping[str, CompiledDomain], brief: Brief | None = None
-    ) -> Session:
+    def _session(self, protocol: type[Protocol], team: CompiledTeam, brief: Brief) -> Session:
         """`protocol` in the runtime asked for."""
-        brief = brief or self._brief
         watchers: _Watchers = {"observer": self._observer, "progress": self._progress}
         if self._options.runtime is Runtime.PROCESSES:
             from robochoc.communication.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
 
             survive = self._options.on_loss is OnLoss.WITHDRAW
-            return ProcessesRun(team, protocol, domains=domains, survive=survive, brief=brief, **watchers)
+            return ProcessesRun(team, protocol, survive=survive, brief=brief, **watchers)
         if self._options.runtime is Runtime.NETWORK:
-            return self._network(protocol, team, domains, brief)
-        return Simulation(team, protocol, _schedule(self._options), domains=domains, brief=brief, **watchers)
+            return self._network(protocol, team, brief)
+        return Simulation(team, protocol, _schedule(self._options), brief=brief, **watchers)
 
-    def _network(
-        self, protocol: type[Protocol], team: Team, domains: Mapping[str, CompiledDomain], brief: Brief
-    ) -> Session:
+    def _network(self, protocol: type[Protocol], team: CompiledTeam, brief: Brief) -> Session:
         try:
             from robochoc.communication.network.conditions import Conditions  # noqa: PLC0415 - one runtime is enough
             from robochoc.communication.network.local import LocalNetwork  # noqa: PLC0415 - and it is an extra
@@ -364,7 +378,7 @@ class _Run:
         survive = self._options.on_loss is OnLoss.WITHDRAW
         conditions = Conditions(filters=self._options.filters, survive=survive)
         watchers: _Watchers = {"observer": self._observer, "progress": self._progress}
-        return LocalNetwork(team, protocol, domains=domains, conditions=conditions, brief=brief, **watchers)
+        return LocalNetwork(team, protocol, conditions=conditions, brief=brief, **watchers)
 
     def _left_s(self) -> float | None:
         return None if self._deadline is None else max(0.0, self._deadline - time.monotonic())

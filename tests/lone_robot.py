@@ -25,6 +25,7 @@ from robochoc.message import encode
 from robochoc.problem import Constraint, Team
 from robochoc.protocols.abt import ABT, Ok
 from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.part import NO_BRIEF
 
 UNPROVEN = cast("Identity", None)
@@ -66,5 +67,5 @@ def played(script: Script, protocol: type[Protocol] = ABT, patience_s: float = P
         return protocol
 
     post = Scripted("RB", answers)
-    robot = NetworkRobot(differ()["RB"], None, UNPROVEN, cast("Post", post), named, Manner(patience_s))
+    robot = NetworkRobot(CompiledRobot(differ()["RB"]), UNPROVEN, cast("Post", post), named, Manner(patience_s))
     return robot.run(), post

@@ -29,6 +29,7 @@ from robochoc.communication.network.words import Word
 from robochoc.communication.run_result import RunResult
 from robochoc.observers.events import AnyEvent, Lost, Received, Refused
 from robochoc.problem import Team
+from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.part import Brief
 
 WITHIN_S = 30.0
@@ -207,8 +208,7 @@ class NetworkRun:
     def _take_part(self, name: str, endpoint: str) -> None:
         with self.post(name, endpoint=endpoint) as post:
             robot = NetworkRobot(
-                self.team[name],
-                None,
+                CompiledRobot(self.team[name]),
                 self.household.identity(name),
                 post,
                 lambda _name: Held,

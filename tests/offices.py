@@ -30,6 +30,7 @@ from robochoc.communication.run_result import RunResult
 from robochoc.outcome import Verdict
 from robochoc.problem import Robot, Team
 from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.part import NO_BRIEF, Brief
 
 RUN = "run"
@@ -199,7 +200,7 @@ class Stepped(NetworkRobot):
     """A robot whose loop is turned by hand."""
 
     def __init__(self, robot: Robot, identity: Identity, desk: Desk, protocol: type[Protocol]) -> None:
-        super().__init__(robot, None, identity, cast("Post", desk), lambda _name: protocol)
+        super().__init__(CompiledRobot(robot), identity, cast("Post", desk), lambda _name: protocol)
 
     def begin(self) -> None:
         self._register()

@@ -7,7 +7,6 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from random import Random
-from types import MappingProxyType
 
 import msgspec
 import pytest
@@ -20,7 +19,7 @@ from robochoc.message import Envelope, encode
 from robochoc.observers.events import AnyEvent, Decided
 from robochoc.problem import Constraint, Domain, Model, Relation, Robot, Semantics, Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.shared import Others, SharedConstraint
 
 Asked = Mapping[tuple[str, str], set[frozenset[tuple[str, int]]]]
@@ -52,10 +51,9 @@ class _Tapped(RandomChannels):
 
 
 def run(
-    team: Team,
+    team: Team | CompiledTeam,
     protocol: type[Protocol],
     seed: int,
-    domains: Mapping[str, CompiledDomain] = MappingProxyType({}),
 ) -> Run:
     """One run in the simulator; the same seed draws the same channels as long as the same is said."""
     tapped = _Tapped(seed)
@@ -66,7 +64,7 @@ def run(
             for name, value in event.assignment.items():
                 taken[name].add(value)
 
-    result = Simulation(team, protocol, tapped, domains=domains, observer=note).run(60)
+    result = Simulation(team, protocol, tapped, observer=note).run(60)
     return Run(result, tuple(tapped.envelopes), taken)
 
 

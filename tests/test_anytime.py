@@ -22,15 +22,11 @@ from robochoc.observers.objective import Objective, aside_cost
 from robochoc.outcome import Metrics, Outcome, Place, Verdict
 from robochoc.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
 from robochoc.protocols.findings import Best, Findings, Trail
-from robochoc.solver.domain import CompiledDomain, compiled_domain
+from robochoc.solver.compiled_team import CompiledTeam
 
 PRICES = Relation("price", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1)), (4, 3, INFINITE), 7)
 PAIR = with_costs(team_of({"A": (1, 2), "B": (1, 2)}, [Constraint("C", PRICES, ("A", "B"), ("A", "B"))]))
 """(1, 1) costs 4, (1, 2) costs 3, (2, 1) is forbidden, (2, 2) costs 7."""
-
-
-def domains(team: Team) -> dict[str, CompiledDomain]:
-    return {robot.name: compiled_domain(robot) for robot in team.robots}
 
 
 def own(team: Team, assignment: Mapping[str, int]) -> dict[str, dict[str, int]]:
@@ -95,13 +91,13 @@ def test_stepping_aside_costs_more_than_all_that_can_be_paid_without() -> None:
 
 
 def test_the_values_at_the_end_are_an_answer() -> None:
-    found = best_of(PAIR, result(own(PAIR, {"A": 2, "B": 2})), domains(PAIR))
+    found = best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2})))
     assert found == ({"A": 2, "B": 2}, 7)
 
 
 def test_what_breaks_something_hard_is_none() -> None:
-    assert best_of(PAIR, result(own(PAIR, {"A": 2, "B": 1})), domains(PAIR)) is None
-    assert best_of(PAIR, result({"RA": {"A": 1}, "RB": {}}), domains(PAIR)) is None
+    assert best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 1}))) is None
+    assert best_of(CompiledTeam(PAIR), result({"RA": {"A": 1}, "RB": {}})) is None
 
 
 def test_the_cheapest_that_a_robot_has_heard_of_is_better_than_the_values_at_the_end() -> None:
@@ -109,13 +105,13 @@ def test_the_cheapest_that_a_robot_has_heard_of_is_better_than_the_values_at_the
         "RA": Findings(best=Best(4, {"RA": (1,), "RB": (1,)})),
         "RB": Findings(best=Best(3, {"RA": (1,), "RB": (2,)})),
     }
-    found = best_of(PAIR, result(own(PAIR, {"A": 2, "B": 2}), findings), domains(PAIR))
+    found = best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2}), findings))
     assert found == ({"A": 1, "B": 2}, 3)
 
 
 def test_who_steps_aside_in_the_best_has_no_values_in_it() -> None:
     findings = {"RA": Findings(best=Best(11, {"RA": (2,), "RB": (None,)}))}
-    found = best_of(PAIR, result({"RA": {}, "RB": {}}, findings), domains(PAIR), 11)
+    found = best_of(CompiledTeam(PAIR), result({"RA": {}, "RB": {}}, findings), 11)
     assert found == ({"A": 2}, 11)
 
 
@@ -124,7 +120,7 @@ def test_who_has_nothing_to_show_and_no_value_steps_aside_in_the_best() -> None:
     forbids = Relation("R", 1, Semantics.CONFLICTS, ((1,),))
     team = team_of({"A": (1,), "B": (1,)}, [Constraint("C", forbids, ("A",), ("A",))])
     findings = {"RB": Findings(best=Best(1, {"RA": (), "RB": ()}))}
-    assert best_of(team, result({"RA": {}, "RB": {}}, findings), domains(team), 1) == ({"B": 1}, 1)
+    assert best_of(CompiledTeam(team), result({"RA": {}, "RB": {}}, findings), 1) == ({"B": 1}, 1)
 
 
 def test_the_best_cycle_is_found_and_unfinished_cycles_do_not_count() -> None:
@@ -133,14 +129,14 @@ def test_the_best_cycle_is_found_and_unfinished_cycles_do_not_count() -> None:
         "RB": Findings(trail=Trail([(0, 1), (1, 0), (2, 1)], 2)),  # 2, 1, 2
     }
     trails = {name: found.trail for name, found in findings.items() if found.trail}
-    assert list(course(PAIR, trails, domains(PAIR))) == [7, 4, 3]
-    found = best_of(PAIR, result(own(PAIR, {"A": 2, "B": 2}), findings), domains(PAIR))
+    assert list(course(CompiledTeam(PAIR), trails)) == [7, 4, 3]
+    found = best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2}), findings))
     assert found == ({"A": 1, "B": 2}, 3)
 
 
 def test_a_robot_without_a_trail_leaves_the_cycles_out() -> None:
     findings = {"RA": Findings(trail=Trail([(0, 0)], 1)), "RB": Findings()}
-    assert best_of(PAIR, result(own(PAIR, {"A": 2, "B": 2}), findings), domains(PAIR)) == ({"A": 2, "B": 2}, 7)
+    assert best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2}), findings)) == ({"A": 2, "B": 2}, 7)
 
 
 def test_bounds_of_several_roots_are_summed_and_an_infinite_one_is_none() -> None:

@@ -24,6 +24,7 @@ from robochoc.solver import compiled
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import Judge
 from robochoc.solver.compile import Compiler
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain, compiled_domain
 from robochoc.solver.encoding import Codes, Network
 
@@ -33,6 +34,11 @@ def by_hand(network: Network) -> Iterator[Codes]:
     for codes in itertools.product(*network.domains):
         if all((tuple(codes[p] for p in table.scope) in table.rows) is table.allowed for table in network.tables):
             yield codes
+
+
+def compiled_by_hand(team: Team) -> CompiledTeam:
+    """`team`, its local problems solved by hand."""
+    return CompiledTeam(team, lambda robot: compiled_domain(robot, by_hand))
 
 
 def local_solutions(robot: Robot) -> Iterator[dict[str, int]]:
@@ -59,9 +65,8 @@ def check_domain(robot: Robot, domain: CompiledDomain) -> None:
 
 def solved_by_hand(team: Team, chance: Random) -> Verdict:
     """ABT's verdict on any schedule, its local problems solved by hand; a solution is held against the files."""
-    domains = {robot.name: compiled_domain(robot, by_hand) for robot in team.robots}
     schedule = RandomChannels(chance.getrandbits(32))
-    result = Simulation(team, protocol_named("abt"), schedule, domains=domains).run(60)
+    result = Simulation(compiled_by_hand(team), protocol_named("abt"), schedule).run(60)
     if result.verdict is Verdict.SOLUTION:
         assignment = {name: value for own in result.assignments.values() for name, value in own.items()}
         assert not list(objections(team, assignment))
@@ -137,11 +142,11 @@ def test_many_values_are_looked_up_as_few_are(monkeypatch: pytest.MonkeyPatch) -
     chance = Random("tables")
     for _ in range(150):
         team = random_complex_team(chance)
-        domains = {robot.name: compiled_domain(robot, by_hand) for robot in team.robots}
+        by_itself = compiled_by_hand(team)
         seed = chance.getrandbits(32)
         results = []
         for large in (1, 10**9):
             monkeypatch.setattr(compiled, "LARGE", large)
-            results.append(Simulation(team, protocol_named("abt"), Concurrent(seed, 20), domains=domains).run(60))
+            results.append(Simulation(by_itself, protocol_named("abt"), Concurrent(seed, 20)).run(60))
         walked, tables = (replace(result, metrics=replace(result.metrics, wall_s=0)) for result in results)
         assert walked == tables

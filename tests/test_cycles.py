@@ -27,7 +27,7 @@ from robochoc.protocols.mgm import MGM
 from robochoc.protocols.mgm2 import MGM2
 from robochoc.registry import protocol_named
 from robochoc.run import Options, Runtime, Withdrawal, solve
-from robochoc.solver.domain import compiled_domain
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.part import Brief
 
 ALL = pytest.mark.parametrize("protocol", [DSA, MGM, MGM2, MaxSum])
@@ -149,8 +149,7 @@ def test_who_may_step_aside_does_so_rather_than_break_anything(protocol: type[Cy
         brief = Brief(seed, {"cycles": "25"}, aside=price)
         result = Simulation(team, protocol, any_schedule(chance), brief=brief).search()
         assert result.verdict is Verdict.SOLUTION
-        domains = {robot.name: compiled_domain(robot) for robot in team.robots}
-        found = best_of(team, result, domains, price)
+        found = best_of(CompiledTeam(team), result, price)
         assert found
         assert not list(objections(team, found.assignment, _absent(team, found.assignment)))
         aside += len(_absent(team, found.assignment)) > 0

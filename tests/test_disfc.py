@@ -14,7 +14,6 @@ from complex_problems import complex_team, random_complex_team
 from pkc_bytes import changed_where_nobody_was, nothing_hidden, renamed, restated, run
 from pkc_problems import random_pkc_team, with_private_parts
 from problems import random_team, team_of
-from test_complex_teams import by_hand
 from test_pkc import SECRETS, agrees, pair_team, part
 
 import robochoc.protocols.disfc
@@ -30,7 +29,6 @@ from robochoc.protocols.disfc import AddLink, DisFC, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver import filters
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.domain import compiled_domain
 from robochoc.solver.encoding import Unsupported
 from robochoc.solver.filters import allows
 from robochoc.solver.part import parts
@@ -236,7 +234,7 @@ def test_disfc_agrees_on_complex_robots() -> None:
         if all(len({team.owner[name] for name in c.variables}) < 3 for robot in team.robots for c in robot.shared):
             split = seen.total() % 2 == 1
             team = with_private_parts(team, chance) if split else team
-            agrees(team, DisFC, chance, {robot.name: compiled_domain(robot, by_hand) for robot in team.robots})
+            agrees(team, DisFC, chance)
             seen[split] += 1
 
 

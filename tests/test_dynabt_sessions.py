@@ -9,7 +9,7 @@ import pytest
 from changes import random_journey, stages
 from complex_changes import random_complex_journey
 from problems import solutions
-from test_complex_teams import by_hand
+from test_complex_teams import compiled_by_hand
 
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
@@ -20,12 +20,8 @@ from robochoc.observers.checker import objections
 from robochoc.outcome import Verdict
 from robochoc.problem import AddAgent, Team
 from robochoc.registry import protocol_named
-from robochoc.solver.domain import CompiledDomain, compiled_domain
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import Void, void
-
-
-def domains(team: Team) -> dict[str, CompiledDomain]:
-    return {robot.name: compiled_domain(robot, by_hand) for robot in team.robots}
 
 
 def random_schedule(chance: Random) -> Schedule:
@@ -35,11 +31,11 @@ def random_schedule(chance: Random) -> Schedule:
 
 def played(team: Team, schedule: Schedule) -> Counter[Verdict]:
     """The verdicts of all epochs that came to their end; each is right."""
-    journey = Journey(team, None, domains, lambda: None)
+    journey = Journey(team, None, compiled_by_hand, lambda: None)
     seen = Counter[Verdict]()
-    with Simulation(team, protocol_named("dynabt"), schedule, domains=domains(journey.team)) as session:
+    with Simulation(journey.compiled(), protocol_named("dynabt"), schedule) as session:
         epochs = list(journey.go(session, lambda _: None))
-    for now, (then, result, _) in zip(stages(team), epochs, strict=True):
+    for now, (then, result, *_) in zip(stages(team), epochs, strict=True):
         assert now.order == then.order
         if result.verdict is not Verdict.UNKNOWN:
             check(now, result)
@@ -75,7 +71,7 @@ def test_the_problem_may_change_again_before_the_search_goes_on() -> None:
             for event, new in zip(team.scenario, later, strict=True):
                 fresh = frozenset(change.robot.name for change in event.changes if isinstance(change, AddAgent))
                 keys, agents = void(now, new)
-                session.change(Epoch(new, {}, Void(keys, agents | fresh), fresh))
+                session.change(Epoch(CompiledTeam(new), Void(keys, agents | fresh), fresh))
                 now = new
                 if chance.random() < 0.6 or new is later[-1]:
                     check(now, session.search())

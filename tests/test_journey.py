@@ -37,6 +37,7 @@ from robochoc.problem import (
 )
 from robochoc.protocols.dynabt import DynABT
 from robochoc.run import Options, Runtime, solve
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import void
 
 BASE = team_of(dict.fromkeys("ABC", range(1, 4)), [differ("A", "B"), differ("B", "C")])
@@ -46,7 +47,8 @@ DONE = RunResult(Verdict.SOLUTION, None, {}, Metrics({"Ok": 7}))
 class Scripted(Session):
     """Ends each search as it was told to, and notes what it is given."""
 
-    def __init__(self, *results: RunResult) -> None:
+    def __init__(self, team: Team, *results: RunResult) -> None:
+        super().__init__(team)
         self.results = list(results)
         self.epochs: list[Epoch] = []
         self.limits: list[int | None] = []
@@ -61,6 +63,7 @@ class Scripted(Session):
         return self.results.pop(0) if self.results else DONE
 
     def change(self, epoch: Epoch) -> None:
+        self.compiled = epoch.compiled
         self.epochs.append(epoch)
 
     def close(self) -> None:
@@ -76,7 +79,7 @@ def event(*changes: Change) -> Event:
 
 
 def journey_of(team: Team, *, spares: int = 0, messages: int | None = None) -> Journey:
-    return Journey(team, None, lambda _: {}, lambda: None, messages=messages, spares=spares)
+    return Journey(team, None, CompiledTeam, lambda: None, messages=messages, spares=spares)
 
 
 def travel(journey: Journey, session: Scripted) -> list[Played]:
@@ -101,7 +104,7 @@ def on_disk(team: Team, folder: Path) -> Team:
 
 
 def test_a_lost_robot_leaves_and_the_others_go_on() -> None:
-    journey, session = journey_of(BASE), Scripted(losing("RB"))
+    journey, session = journey_of(BASE), Scripted(BASE, losing("RB"))
     assert teams(travel(journey, session)) == [("RA", "RB", "RC"), ("RA", "RC")]
     assert journey.withdrawn == ["RB"]
     assert "RB" in session.epochs[0].void.agents
@@ -113,7 +116,7 @@ def test_events_go_on_without_those_that_were_lost() -> None:
         scenario=(event(AddAgent(newcomer("RD", "RA", "RB"))), event(RemoveAgent("RB")), event(RemoveValue("D", 1))),
     )
     journey = journey_of(team)
-    played = travel(journey, Scripted(losing("RB")))
+    played = travel(journey, Scripted(journey.team, losing("RB")))
     assert teams(played) == [("RA", "RB", "RC"), ("RA", "RC"), *[("RA", "RC", "RD")] * 3]
     assert [parent.name for parent in played[-1].team["RD"].parents] == ["RA"]
     assert list(played[-1].team.variables["D"].domain) == [2, 3]
@@ -123,19 +126,20 @@ def test_events_go_on_without_those_that_were_lost() -> None:
 def test_a_team_that_all_have_left_may_be_joined() -> None:
     everybody = event(*map(RemoveAgent, BASE.order))
     team = replace(BASE, scenario=(everybody, event(AddAgent(newcomer("RD")))))
-    assert teams(travel(journey_of(team), Scripted())) == [("RA", "RB", "RC"), (), ("RD",)]
+    assert teams(travel(journey_of(team), Scripted(team))) == [("RA", "RB", "RC"), (), ("RD",)]
     outcome = solve(team, Options(protocol="dynabt", runtime=Runtime.SIMULATOR))
     assert [str(epoch.verdict) for epoch in outcome.epochs] == ["solution"] * 3
 
 
 def test_all_are_lost() -> None:
-    played = travel(journey_of(BASE), Scripted(losing(*BASE.order)))
+    played = travel(journey_of(BASE), Scripted(BASE, losing(*BASE.order)))
     assert len(played) == 1
     assert set(played[0].result.lost) == {"RA", "RB", "RC"}
 
 
 def test_a_spare_comes_back_at_the_end_of_the_order(tmp_path: Path) -> None:
-    journey, session = journey_of(on_disk(BASE, tmp_path / "team"), spares=1), Scripted(losing("RA"), losing("RC"))
+    journey = journey_of(on_disk(BASE, tmp_path / "team"), spares=1)
+    session = Scripted(journey.team, losing("RA"), losing("RC"))
     travel(journey, session)
     assert [epoch.team.order for epoch in session.epochs] == [("RB", "RC", "RA"), ("RB", "RA")]
     assert [epoch.fresh for epoch in session.epochs] == [{"RA"}, set()]
@@ -147,7 +151,7 @@ def test_what_has_happened_meanwhile_happens_to_a_spare_too(tmp_path: Path) -> N
         RemoveValue("A", 1), RemoveConstraint("RB", "RA", "C"), AddConstraint("RC", "RA", differ("A", "C", "new"))
     )
     team = on_disk(replace(BASE, scenario=(happened, event(AddValue("A", 1)))), tmp_path / "team")
-    journey, session = journey_of(team, spares=1), Scripted(DONE, losing("RA"))
+    journey, session = journey_of(team, spares=1), Scripted(team, DONE, losing("RA"))
     played = travel(journey, session)
     back = played[2].team
     assert list(back.variables["A"].domain) == [2, 3]
@@ -158,7 +162,7 @@ def test_what_has_happened_meanwhile_happens_to_a_spare_too(tmp_path: Path) -> N
 
 def test_messages_are_counted_over_all_epochs() -> None:
     team = replace(BASE, scenario=(event(AddValue("A", 8)), event(AddValue("A", 9))))
-    session = Scripted()
+    session = Scripted(BASE)
     played = travel(journey_of(team, messages=10), session)
     assert session.limits == [10, 3]
     assert [one.result.verdict for one in played] == [Verdict.SOLUTION, Verdict.SOLUTION, Verdict.UNKNOWN]
@@ -176,8 +180,8 @@ def test_two_changes_in_a_row_tell_a_new_child() -> None:
     less = changed(linked, [RemoveAgent("RZ")])
     session = Simulation(team, DynABT, Concurrent(0))
     session.search()
-    session.change(Epoch(linked, {}, void(team, linked)))  # and before the search goes on
-    session.change(Epoch(less, {}, void(linked, less)))
+    session.change(Epoch(CompiledTeam(linked), void(team, linked)))  # and before the search goes on
+    session.change(Epoch(CompiledTeam(less), void(linked, less)))
     result = session.search()
     assert result.verdict is Verdict.SOLUTION
     assert result.assignments["RA"]["A"] != result.assignments["RB"]["B"]

@@ -12,9 +12,10 @@ from cost_problems import random_complex_cost_team, random_cost_team
 from problems import random_team, team_of
 
 from robochoc.message import Value
-from robochoc.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.problem import INFINITE, Constraint, Relation, Robot, Semantics, Team
 from robochoc.solver import compiled
 from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.part import Brief, Part, parts
 
@@ -116,7 +117,7 @@ def test_the_first_conflict_is_the_one_that_is_explained(batch: int, monkeypatch
     chance = Random(f"explained {batch}")
     for _ in range(30):
         team = random_complex_team(chance)
-        for part in parts(team, _any_domains(team, chance), everywhere=True).values():
+        for part in parts(_any_domains(team, chance), everywhere=True).values():
             monkeypatch.setattr(compiled, "LARGE", chance.choice((1, 1000)))
             _compare(part, chance)
 
@@ -128,7 +129,7 @@ def test_what_a_robot_adds_is_the_difference_that_it_makes(batch: int) -> None:
     seen = Counter[str]()
     for _ in range(40):
         team = random_complex_cost_team(chance)
-        for part in parts(team, _any_domains(team, chance), everywhere=True).values():
+        for part in parts(_any_domains(team, chance), everywhere=True).values():
             problem, again = LocalProblem(part), LocalProblem(part)
             view: dict[str, Value] = {}
             costs = problem.costs(view)
@@ -205,13 +206,14 @@ def _view(team: Team, given: dict[str, int]) -> dict[str, Value]:
     return {robot.name: tuple([given[name] for name in robot.interface]) for robot in team.robots}
 
 
-def _any_domains(team: Team, chance: Random) -> dict[str, CompiledDomain]:
+def _any_domains(team: Team, chance: Random) -> CompiledTeam:
     """Some values for each robot, whatever its private constraints say."""
-    domains = {}
-    for robot in team.robots:
+
+    def compile_robot(robot: Robot) -> CompiledDomain:
         names = tuple(variable.name for variable in robot.variables)
         rows = sorted({tuple([chance.choice(list(variable.domain)) for variable in robot.variables]) for _ in range(6)})
         by_value = {tuple([row[names.index(name)] for name in robot.interface]): row for row in rows}
         ones, noughts = (1,) * len(by_value), (0,) * len(by_value)
-        domains[robot.name] = CompiledDomain(names, tuple(by_value), tuple(by_value.values()), ones, noughts)
-    return domains
+        return CompiledDomain(names, tuple(by_value), tuple(by_value.values()), ones, noughts)
+
+    return CompiledTeam(team, compile_robot)

@@ -29,12 +29,14 @@ from robochoc.problem import (
     RemoveValue,
     Team,
 )
+from robochoc.solver.compiled_team import CompiledTeam
 
 
 class Losing(Session):
     """Each search loses the robots it is told to, or solves the problem."""
 
-    def __init__(self, losses: Sequence[str]) -> None:
+    def __init__(self, team: Team, losses: Sequence[str]) -> None:
+        super().__init__(team)
         self._losses = list(losses)
         self.epochs: list[Epoch] = []
 
@@ -49,6 +51,7 @@ class Losing(Session):
         return RunResult(verdict, None, {}, Metrics(), lost)
 
     def change(self, epoch: Epoch) -> None:
+        self.compiled = epoch.compiled
         self.epochs.append(epoch)
 
     def close(self) -> None:
@@ -71,8 +74,8 @@ def team(tmp_path: Path) -> Team:
 
 
 def travel(team: Team, losses: Sequence[str], spares: int = 0) -> tuple[Journey, Losing, list[Team]]:
-    journey = Journey(team, None, lambda _: {}, lambda: None, spares=spares)
-    session = Losing(losses)
+    journey = Journey(team, None, CompiledTeam, lambda: None, spares=spares)
+    session = Losing(journey.team, losses)
     return journey, session, [played.team for played in journey.go(session, lambda _: None)]
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from random import Random
-from types import MappingProxyType
 
 import pytest
 from clocks import once
@@ -13,7 +11,7 @@ from cost_problems import least_cost, random_cost_team
 from held import CHAIN, Broken, Held, Overwhelmed
 from pkc_problems import random_pkc_team
 from problems import random_team, solutions
-from test_complex_teams import by_hand
+from test_complex_teams import compiled_by_hand
 
 from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.local import LocalNetwork
@@ -26,7 +24,7 @@ from robochoc.outcome import Verdict
 from robochoc.problem import INFINITE, Team
 from robochoc.protocols.findings import NOTHING
 from robochoc.registry import protocol_named
-from robochoc.solver.domain import CompiledDomain, compiled_domain
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooMuch
 from robochoc.solver.part import Brief
 
@@ -36,17 +34,14 @@ MANY = ("abt", "afc-ng", "awc", "dynabt", "sbt", "agile-abt", "afc-tree", "sfb",
 
 
 def run_over_network(
-    team: Team,
+    team: Team | CompiledTeam,
     protocol: str,
     conditions: Conditions = Conditions(),
-    domains: Mapping[str, CompiledDomain] = MappingProxyType({}),
     events: list[AnyEvent] | None = None,
 ) -> tuple[RunResult, tuple[bool, float] | None]:
     """The result, and what the robots themselves say of the values that were decided."""
     observer = None if events is None else events.append
-    with LocalNetwork(
-        team, protocol_named(protocol), domains=domains, conditions=conditions, observer=observer
-    ) as network:
+    with LocalNetwork(team, protocol_named(protocol), conditions=conditions, observer=observer) as network:
         result = network.search(TIMEOUT_S)
         found = result.verdict is Verdict.SOLUTION
         return result, network.master.checked(result.assignments) if found and not conditions.private else None
@@ -56,10 +51,9 @@ def agrees(
     team: Team,
     protocol: str,
     filters: tuple[str, ...] = (),
-    domains: Mapping[str, CompiledDomain] = MappingProxyType({}),
 ) -> Verdict:
     """The verdict is brute force's, and the robots' own check agrees with the checker's."""
-    result, checked = run_over_network(team, protocol, Conditions(filters), domains)
+    result, checked = run_over_network(compiled_by_hand(team), protocol, Conditions(filters))
     truth = next(solutions(team), None)
     assert result.verdict is (Verdict.NO_SOLUTION if truth is None else Verdict.SOLUTION), (team, protocol)
     assert not result.lost
@@ -102,7 +96,7 @@ def test_more_partially_known_constraints(protocol: str, seed: int) -> None:
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 8))])
 def test_complex_robots(seed: int) -> None:
     team = random_complex_team(Random(f"network {seed}"))
-    agrees(team, "abt", ("signed", "sealed"), {robot.name: compiled_domain(robot, by_hand) for robot in team.robots})
+    agrees(team, "abt", ("signed", "sealed"))
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6))])

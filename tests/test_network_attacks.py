@@ -30,6 +30,7 @@ from robochoc.message import encode
 from robochoc.outcome import Verdict
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled_team import CompiledRobot
 
 A_DAY_S = 86_400
 JUNK = 10_000
@@ -276,7 +277,7 @@ def test_thousands_of_junk_letters(run: NetworkRun, receiver: str) -> None:
 
 def test_a_robot_of_a_name_that_is_there_already(run: NetworkRun) -> None:
     with run.post("RX2") as post:
-        robot = NetworkRobot(CHAIN["RX2"], None, run.household.identity("RX2"), post, protocol_named)
+        robot = NetworkRobot(CompiledRobot(CHAIN["RX2"]), run.household.identity("RX2"), post, protocol_named)
         ending = robot.run()
     assert ending.failed
     assert ending.why == "the master does not take RX2: a robot called RX2 is registered already"

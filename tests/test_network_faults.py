@@ -31,6 +31,7 @@ from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import RunResult
 from robochoc.observers.events import AnyEvent, Lost, Received, Sent
 from robochoc.outcome import Verdict
+from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.part import Brief
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
@@ -289,7 +290,7 @@ class Elsewhere:
     def _take_part(self, name: str) -> None:
         identity = self.identities[name]
         with Post(self.endpoint, identity, watch=(), patience_s=30) as post:
-            robot = NetworkRobot(CHAIN[name], None, identity, post, lambda _: Held, Manner(4))
+            robot = NetworkRobot(CompiledRobot(CHAIN[name]), identity, post, lambda _: Held, Manner(4))
             self.endings[name] = robot.run()
 
 

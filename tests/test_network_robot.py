@@ -33,6 +33,7 @@ from robochoc.communication.network.words import (
     Word,
 )
 from robochoc.protocols.abt import ABT
+from robochoc.solver.compiled_team import CompiledRobot
 
 
 def test_a_run_from_beginning_to_end() -> None:
@@ -265,7 +266,7 @@ def test_noise_before_the_welcome_is_nothing_to_tell() -> None:
     post.inbox.put(Arrived(MASTER, msgspec.msgpack.encode(Letter("", 1, LEAVE))))
     post.inbox.put(Arrived(MASTER, msgspec.msgpack.encode(Letter("", 0, Denied("another's", "no")))))
     post.router = ""
-    robot = NetworkRobot(differ()["RB"], None, UNPROVEN, cast("Post", post), lambda _name: ABT, Manner(0.01))
+    robot = NetworkRobot(CompiledRobot(differ()["RB"]), UNPROVEN, cast("Post", post), lambda _name: ABT, Manner(0.01))
     assert robot.run().why == "the master is gone: no link to it for 0.01 s"
     assert [type(word) for word in post.heard] == [Register]
     assert not played(script)[0].failed

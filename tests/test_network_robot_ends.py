@@ -33,6 +33,7 @@ from robochoc.problem import INFINITE, Model
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.awc import AWC
 from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled_team import CompiledRobot
 
 
 def failing(*said: Word | Item, protocol: type[Protocol] = ABT, at: type[Word] = Joined) -> tuple[Ending, Failed]:
@@ -141,7 +142,7 @@ def test_who_is_denied_ends() -> None:
         yield post.letter(Denied(word.visit, "a robot called RB is registered already"))
 
     post = Scripted("RB", answers)
-    ending = NetworkRobot(differ()["RB"], None, UNPROVEN, cast("Post", post), lambda _name: ABT).run()
+    ending = NetworkRobot(CompiledRobot(differ()["RB"]), UNPROVEN, cast("Post", post), lambda _name: ABT).run()
     assert ending == Ending(
         "the master does not take RB: a robot called RB is registered already", failed=True, assignment={}
     )

@@ -8,7 +8,7 @@ from random import Random
 import pytest
 from complex_problems import random_complex_team
 from problems import random_team, solutions
-from test_complex_teams import by_hand
+from test_complex_teams import compiled_by_hand
 from test_orders import SIMULATED, graph_team, shuffled
 
 from robochoc.communication.schedule import RandomChannels
@@ -22,7 +22,6 @@ from robochoc.problem import (
 from robochoc.registry import protocol_named
 from robochoc.run import solve
 from robochoc.solver.central import Judge, Judgement
-from robochoc.solver.domain import compiled_domain
 
 
 def test_robots_solve_in_the_order_they_are_given() -> None:
@@ -43,8 +42,7 @@ def test_complex_robots_solve_in_any_order() -> None:
     for seed in range(25):
         team = random_complex_team(chance)
         turned = reordered(team, shuffled(chance, team))
-        domains = {robot.name: compiled_domain(robot, by_hand) for robot in turned.robots}
-        result = Simulation(turned, protocol_named("abt"), RandomChannels(seed), domains=domains).run(30)
+        result = Simulation(compiled_by_hand(turned), protocol_named("abt"), RandomChannels(seed)).run(30)
         assert (result.verdict is Verdict.SOLUTION) is any(solutions(team))
         if result.verdict is Verdict.SOLUTION:
             found = {name: value for own in result.assignments.values() for name, value in own.items()}

@@ -13,7 +13,7 @@ from complex_problems import complex_team, random_complex_team
 from pkc_bytes import changed_elsewhere, nothing_hidden, restated, run, watched
 from pkc_problems import pkc_parts, random_pkc_team, with_part, with_private_parts
 from problems import ON_ONE_MACHINE, random_team, solutions, team_of
-from test_complex_teams import by_hand
+from test_complex_teams import compiled_by_hand
 
 from robochoc.communication.processes import ProcessesRun
 from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
@@ -29,7 +29,6 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.domain import CompiledDomain, compiled_domain
 from robochoc.solver.encoding import Unsupported
 from robochoc.solver.part import parts
 
@@ -155,11 +154,9 @@ def schedule(chance: Random) -> Schedule:
     return Concurrent(chance.getrandbits(32), chance.choice((0, 3, 20, 200)))
 
 
-def agrees(
-    team: Team, protocol: type[Protocol], chance: Random, domains: dict[str, CompiledDomain] | None = None
-) -> Verdict:
+def agrees(team: Team, protocol: type[Protocol], chance: Random) -> Verdict:
     """Solve `team`; the verdict must be brute force's, and a solution must hold."""
-    result = Simulation(team, protocol, schedule(chance), domains=domains or {}).run(60)
+    result = Simulation(compiled_by_hand(team), protocol, schedule(chance)).run(60)
     solvable = any(solutions(team))
     assert result.verdict is (Verdict.SOLUTION if solvable else Verdict.NO_SOLUTION), team
     if solvable:
@@ -184,7 +181,7 @@ def test_abt_agrees_on_complex_robots() -> None:
     chance = Random("pkc complex")
     for _ in range(40):
         team = with_private_parts(random_complex_team(chance), chance)
-        agrees(team, ABT, chance, {robot.name: compiled_domain(robot, by_hand) for robot in team.robots})
+        agrees(team, ABT, chance)
 
 
 def test_splitting_keeps_the_solutions() -> None:

@@ -40,6 +40,8 @@ from robochoc.formats import read_team
 from robochoc.formats.extension import MAX_VALUES
 from robochoc.problem import Domain, Kind, Robot, Team
 from robochoc.protocols.traits import Traits
+from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
+from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.part import NO_BRIEF, Brief, Part, parts
 
 ROOT = Path(__file__).parents[1]
@@ -72,19 +74,24 @@ def registered(team: Team) -> Members:
     return members
 
 
+def nothing_of(_robot: Robot) -> CompiledDomain:
+    """No values: nobody searches here, and large files need no solver then."""
+    return CompiledDomain((), (), (), (), ())
+
+
 def part_of(robot: Robot, task: Task) -> Part:
     """What a robot knows across machines."""
     brief = Brief(task.seed, task.settings, task.aside)
     domains = {name: domain_of(name, ranges) for name, ranges in task.domains.items()}
-    own = among(robot, task.interfaces)
-    return Part(own, task.order, task.interfaces, None, (), domains, task.links, task.secretive, brief)
+    own = CompiledRobot(among(robot, task.interfaces), nothing_of)
+    return Part(own, task.order, task.interfaces, (), domains, task.links, task.secretive, brief)
 
 
 def comparable(part: Part) -> Part:
     """Without what says the same twice: the names of domains, and what a robot shows that its file implies."""
     domains = {name: Domain(name, domain.ranges) for name, domain in part.domains.items()}
     return part._replace(
-        robot=replace(part.robot, shown=()),
+        own=part.own.relinked(replace(part.robot, shown=())),
         domains=domains,
         secretive=tuple(sorted(part.secretive)),
         interfaces=dict(part.interfaces),
@@ -94,7 +101,7 @@ def comparable(part: Part) -> Part:
 
 def assert_same(team: Team, members: Members, robots: Sequence[Robot], brief: Brief) -> None:
     """What robots know by the master's word is what they would know in a process of the whole team."""
-    expected = parts(team, brief=brief, tree=True)
+    expected = parts(CompiledTeam(team, nothing_of), brief, tree=True)
     tasks = members.tasks(1, "abt", TREE, brief)
     assert list(tasks) == list(expected)
     for robot in robots:
@@ -124,7 +131,7 @@ def test_robots_left_behind_know_what_a_smaller_team_would_tell_them(team: Team,
     members.remove(gone)
     left = without(team, gone)
     assert members.order == left.order
-    expected = parts(left, tree=True)
+    expected = parts(CompiledTeam(left, nothing_of), tree=True)
     for name, task in members.tasks(2, "abt", TREE, NO_BRIEF).items():
         known = part_of(team[name], task)
         assert replace(known.robot, shown=()) == replace(left[name], shown=())

@@ -38,6 +38,7 @@ from robochoc.registry import protocol_names
 from robochoc.replay import CannotReplay, Means, Replayed, replay
 from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.solver.ace import AceProcess
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.part import Brief
 
 FEW, MANY = 2, 100
@@ -156,10 +157,10 @@ def test_robots_are_lost_and_come_back(spares: int, tmp_path: Path) -> None:
     write_team(odd_team(), tmp_path / "team")
     team = read_team(tmp_path / "team")
     Meteor.flag = tmp_path / "hit"
-    journey = Journey(team, None, lambda _: {}, lambda: None, spares=spares, brief=Brief(0, {}))
+    journey = Journey(team, None, CompiledTeam, lambda: None, spares=spares, brief=Brief(0, {}))
     recorder = Recorder(Header(team="team", protocol="dynabt", runtime="processes", seed=0))
     announce = Announcer(recorder)
-    with ProcessesRun(journey.arranged(), Meteor, observer=recorder, survive=True) as session:
+    with ProcessesRun(journey.compiled(), Meteor, observer=recorder, survive=True) as session:
         played = list(journey.go(session, lambda opening: announce(Meteor, opening, session)))
     journal = read_journal(recorder.content())
     assert len(played) == 2

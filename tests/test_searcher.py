@@ -23,6 +23,7 @@ from robochoc.protocols.abt import ABT, Ok
 from robochoc.protocols.awc import AWC
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.explanation import held
 from robochoc.solver.part import NO_BRIEF, Brief
 
@@ -67,7 +68,7 @@ def searcher(
 ) -> Searcher:
     """RB's."""
     team = team or chain()
-    return Searcher(team["RB"], None, tasks(team, protocol, brief)["RB"], protocol, around)
+    return Searcher(CompiledRobot(team["RB"]), tasks(team, protocol, brief)["RB"], protocol, around)
 
 
 def ok(value: int | None, clock: int = 0) -> Envelope:
@@ -205,7 +206,7 @@ def test_events_are_told_if_anybody_wants_them_and_not_too_many_at_once() -> Non
 def test_a_verdict_is_told_once() -> None:
     team = team_of({"A": (1,), "B": (1,), "C": (1,)}, chain().constraints())
     around = Around()
-    one = Searcher(team["RA"], None, tasks(team, ABT)["RA"], ABT, around.surroundings())
+    one = Searcher(CompiledRobot(team["RA"]), tasks(team, ABT)["RA"], ABT, around.surroundings())
     one.prepare()
     one.search()
     nogood = msgspec.msgpack.encode(["Nogood", {}, [1]])

@@ -11,9 +11,8 @@ Why fork, why queues are opened on demand, and what was measured: docs/design.md
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
-from types import MappingProxyType
 from typing import assert_never
 
 from robochoc.communication.control import (
@@ -44,7 +43,7 @@ from robochoc.observers.events import AnyEvent, Lost, Observer, Registered
 from robochoc.outcome import Verdict
 from robochoc.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooMuch, Unsupported
 from robochoc.solver.part import NO_BRIEF, Brief, Part
 
@@ -59,7 +58,6 @@ LATE_WORDS_S = 0.5
 class ProcessesRun(Session):
     """One team, each robot in a process of its own; whatever happens, no process outlives `close`.
 
-    `domains` holds the compiled domains of robots whose private constraints need a solver (`solver/compile.py`).
     `observer` is told of all events; with `progress`, somebody watches the count of messages. With `survive`, robots
     whose processes end break the search off, and are told of in its result; otherwise `RobotsLost` is raised.
     `brief` is what robots are told beside the problem.
@@ -67,16 +65,16 @@ class ProcessesRun(Session):
 
     def __init__(
         self,
-        team: Team,
+        team: Team | CompiledTeam,
         protocol: type[Protocol],
         *,
-        domains: Mapping[str, CompiledDomain] = MappingProxyType({}),
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
         start_method: StartMethod = "fork",
         survive: bool = False,
         brief: Brief = NO_BRIEF,
     ) -> None:
+        super().__init__(team)
         self._protocol = protocol
         self._observer = observer
         self._progress = progress
@@ -87,9 +85,9 @@ class ProcessesRun(Session):
         self._number = 0
         self._quiet = True
         self._deadline: float | None = None
-        self._waiting = Epoch(team, domains, brief=brief).parts(protocol)
+        self._waiting = Epoch(self.compiled, brief=brief).parts(protocol)
         """Robots that are still to be started."""
-        self._enter_epoch(team.order)
+        self._enter_epoch(self.compiled.team.order)
 
     def _enter_epoch(self, order: Sequence[str]) -> None:
         self._counters = FourCounters(order)
@@ -130,6 +128,7 @@ class ProcessesRun(Session):
 
     def change(self, epoch: Epoch) -> None:
         """See `Session.change`; robots that are no longer in the team, or begin anew, are dismissed."""
+        self.compiled = epoch.compiled
         self._number += 1
         self._crew.reap()
         given = epoch.parts(self._protocol)

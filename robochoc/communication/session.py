@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from types import MappingProxyType, TracebackType
+from types import TracebackType
 from typing import NamedTuple, Self
 
 from robochoc.communication.run_result import RunResult
 from robochoc.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.compiled_team import CompiledTeam, as_compiled
 from robochoc.solver.explanation import Void
 from robochoc.solver.part import NO_BRIEF, Brief, Part, parts
 
@@ -19,30 +18,42 @@ from robochoc.solver.part import NO_BRIEF, Brief, Part, parts
 class Epoch(NamedTuple):
     """What the team has to solve from now on.
 
-    `domains` holds the compiled domains of robots whose private constraints need a solver (`solver/compile.py`);
     `void` is what of the epoch before no longer stands; the robots in `fresh` begin anew, though there may have been
     others of their names before; `brief` is what robots are told beside the problem.
     """
 
-    team: Team
-    domains: Mapping[str, CompiledDomain] = MappingProxyType({})
+    compiled: CompiledTeam
     void: Void = Void(frozenset(), frozenset())
     fresh: frozenset[str] = frozenset()
     brief: Brief = NO_BRIEF
 
+    @property
+    def team(self) -> Team:
+        """The team, in the order that its robots work in."""
+        return self.compiled.team
+
     def parts(self, protocol: type[Protocol]) -> dict[str, Part]:
         """What each robot knows when it speaks `protocol`."""
         traits = protocol.traits
-        return parts(self.team, self.domains, self.brief, everywhere=traits.everywhere, tree=traits.tree)
+        return parts(self.compiled, self.brief, everywhere=traits.everywhere, tree=traits.tree)
 
 
 class Session(ABC):
     """One team and one protocol in one runtime. Whoever opens it closes it: it is a context manager.
 
-    `anew`: robots know nothing of the epoch before, whatever their protocol could have kept.
+    `compiled` is what its robots work on: the `team` that it was opened with (compiled without a solver, where that was
+    not done before), and after each `change` that epoch's. `anew`: robots know nothing of the epoch before, whatever
+    their protocol could have kept.
     """
 
     anew: bool = False
+
+    def __init__(self, team: Team | CompiledTeam) -> None:
+        self.compiled = as_compiled(team)
+
+    def workable(self, team: Team) -> Team:
+        """Return `team`, a later form of the one that the robots work on, as they can go on with it."""
+        return team
 
     @property
     @abstractmethod

@@ -6,10 +6,9 @@ A schedule says which messages arrive next (`communication/schedule.py`); nobody
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from types import MappingProxyType
 
 from robochoc.communication.host import Host
 from robochoc.communication.run_result import Progress, RunResult
@@ -20,7 +19,7 @@ from robochoc.observers.events import Observer
 from robochoc.outcome import Verdict
 from robochoc.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.part import NO_BRIEF, Brief, Part
 
 PROGRESS_EVERY = 256
@@ -30,21 +29,20 @@ PROGRESS_EVERY = 256
 class Simulation(Session):
     """One team in this thread. `observer` is told of all events, with the schedule's time.
 
-    `domains` holds the compiled domains of robots whose private constraints need a solver (`solver/compile.py`);
     `brief` is what robots are told beside the problem.
     """
 
     def __init__(
         self,
-        team: Team,
+        team: Team | CompiledTeam,
         protocol: type[Protocol],
         schedule: Schedule,
         *,
-        domains: Mapping[str, CompiledDomain] = MappingProxyType({}),
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
         brief: Brief = NO_BRIEF,
     ) -> None:
+        super().__init__(team)
         self._protocol = protocol
         self._schedule = schedule
         self._observer = observer
@@ -53,9 +51,8 @@ class Simulation(Session):
         self._checks = 0
         self._verdict: Verdict | None = None
         self._witness: str | None = None
-        self._hosts = {
-            name: self._host(part) for name, part in Epoch(team, domains, brief=brief).parts(protocol).items()
-        }
+        parts = Epoch(self.compiled, brief=brief).parts(protocol)
+        self._hosts = {name: self._host(part) for name, part in parts.items()}
 
     @property
     def quiet(self) -> bool:
@@ -82,6 +79,7 @@ class Simulation(Session):
 
     def change(self, epoch: Epoch) -> None:
         """See `Session.change`."""
+        self.compiled = epoch.compiled
         self._verdict = self._witness = None
         before = self._hosts
         self._hosts = {}

@@ -15,6 +15,7 @@ from robochoc.machines.place import Place
 from robochoc.problem import Robot
 from robochoc.registry import spoken
 from robochoc.solver.compile import Compiler
+from robochoc.solver.compiled_team import CompiledRobot
 
 PATIENCE_S = 30.0
 """How long the master may be out of reach."""
@@ -61,8 +62,8 @@ def join(robot: Robot, place: Place, identity: Identity, manner: Manner, compile
     Raises `CannotConnect`, and what compiling raises.
     """
     manner.stage("compiling")
-    domain = compiler.compile(robot).domain
-    manner.stage(f"looking for the master at {place}")
     manner = replace(manner, compiled=lambda shown: compiler.compile(shown).domain)
+    own = CompiledRobot(robot, manner.compiled)
+    manner.stage(f"looking for the master at {place}")
     with Post(str(place), identity, watch=(), patience_s=manner.patience_s) as post:
-        return NetworkRobot(robot, domain, identity, post, spoken, manner).run()
+        return NetworkRobot(own, identity, post, spoken, manner).run()

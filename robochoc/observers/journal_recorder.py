@@ -6,7 +6,7 @@ import errno
 import io
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from operator import attrgetter
 from pathlib import Path
@@ -16,6 +16,7 @@ import msgspec
 
 from robochoc.files import Growing
 from robochoc.observers.events import AnyEvent, Began, Decided, Given, Heard, Improved, Refused, Sent, actor
+from robochoc.observers.given import BadGiven, TeamReader
 from robochoc.observers.journal_blocks import BEGINNING, LARGEST_BLOCK, PREAMBLE, framed
 from robochoc.observers.journal_columns import columns_of
 from robochoc.observers.journal_entries import Ended, Header, Line
@@ -54,6 +55,7 @@ class Recorder:
         self._closed = False
         self._pending: list[Line] = [_readable(header)]
         self._weighed: list[AnyEvent] | None = None
+        self._given: list[Given] = []
         self._digest = BEGINNING
         self._beginning = PREAMBLE
         self._staged: list[bytes] = []
@@ -84,7 +86,7 @@ class Recorder:
                 return
             self._close_block()  # also what was staged when an interrupt came
             if self._weighed:
-                self._pending, self._weighed = [*self._improved(self._weighed)], None
+                self._pending, self._weighed = [*self._improved(self._weighed, self._given)], None
             if self.outcome:
                 self._pending.append(Ended(outcome=self.outcome))
             self._close_block()
@@ -117,10 +119,12 @@ class Recorder:
         if all(outlet.failure for outlet in self._outlets):
             self._pending = []
             return
-        lines, weighed = self._told(self._pending)
+        lines, weighed, given = self._told(self._pending)
         blocks, digest = self._packed(lines)
         due = time.monotonic() + SPAN_S
-        self._pending, self._weighed, self._digest, self._staged, self._due = [], weighed, digest, blocks, due
+        self._pending, self._weighed, self._given, self._digest, self._staged, self._due = (
+            [], weighed, given, digest, blocks, due,
+        )  # fmt: skip
         self._pass_on()
 
     def _pass_on(self) -> None:
@@ -129,31 +133,37 @@ class Recorder:
         number = self._number + len(self._staged)
         self._staged, self._number = [], number
 
-    def _told(self, pending: list[Line]) -> tuple[Sequence[Line], list[AnyEvent] | None]:
+    def _told(self, pending: list[Line]) -> tuple[Sequence[Line], list[AnyEvent] | None, list[Given]]:
         """`pending`, and improvements where a run ends; and what may improve in the run that is open, if it minimises.
+
+        The third is all that robots have been given.
 
         Improvements follow from the order of events, which is known once all of a run have come.
         """
         if self._objective is None:
-            return pending, None
+            return pending, None, []
         weighed = None if self._weighed is None else [*self._weighed]
+        given = [*self._given]
         lines: list[Line] = []
         for entry in pending:
             match entry:
                 case Began():
-                    lines += self._improved(weighed or ())
+                    lines += self._improved(weighed or (), given)
                     weighed = [] if entry.minimises is True else None
+                case Given():
+                    given.append(entry)
                 case Decided() | Heard() if weighed is not None:
                     weighed.append(entry)
                 case _:
                     pass
             lines.append(entry)
-        return lines, weighed
+        return lines, weighed, given
 
-    def _improved(self, weighed: Sequence[AnyEvent]) -> Iterator[Improved]:
+    def _improved(self, weighed: Sequence[AnyEvent], given: Sequence[Given]) -> Iterator[Improved]:
         if self._objective is None or not weighed:
             return
-        events = sorted(weighed, key=attrgetter("t"))
+        heard = any(isinstance(event, Heard) for event in weighed)
+        events = [*(given if heard else ()), *sorted(weighed, key=attrgetter("t"))]
         yield from (event for event in improvements(events, self._objective()) if isinstance(event, Improved))
 
     def _packed(self, lines: Sequence[Line]) -> tuple[list[bytes], bytes]:
@@ -218,8 +228,13 @@ class _Outlet:
 
 
 def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[AnyEvent]:
-    """`events`, and an `Improved` after each that tells of something cheaper than ever."""
+    """`events`, and an `Improved` after each that tells of something cheaper than ever.
+
+    What robots were given says which variables they show: `objective` may be of the team as the files have it.
+    """
     best = INFINITE
+    reader = TeamReader()
+    now: Mapping[str, Mapping[str, int]] | None
     own: dict[str, dict[str, int]] = {}
     for event in events:
         yield event
@@ -230,12 +245,23 @@ def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[A
                 cost, now = objective.cost, own
             case Heard():
                 cost, now = event.cost, objective.shown(event.values)
+            case Given():
+                objective.interfaces = _interfaces(reader, event)
+                continue
             case _:
                 continue
-        if cost < best:
+        if cost < best and now is not None:
             best = cost
             values = {name: value for robot in sorted(now, key=natural) for name, value in now[robot].items()}
             yield Improved(t=event.t, cost=best, assignment=values)
+
+
+def _interfaces(reader: TeamReader, given: Given) -> dict[str, tuple[str, ...]]:
+    """Return the variables that the robots in `given` show; of none, if it cannot be read."""
+    try:
+        return {robot.name: robot.interface for robot in reader.team(given).robots}
+    except BadGiven:
+        return {}
 
 
 def _readable(header: Header) -> Header:

@@ -13,6 +13,8 @@ class Objective:
     """What is minimised, for values that change: the costs of `team`'s constraints, and of those who step aside.
 
     `aside` is what it costs that a robot of weight 1 does so (None: nobody may, and without values there is no cost).
+    `interfaces` are the variables that each robot shows to its neighbours. They are `team`'s, until somebody says
+    that robots work on the team in another form.
     """
 
     def __init__(self, team: Team, aside: float | None = None) -> None:
@@ -21,7 +23,7 @@ class Objective:
         self._constraints = [(c.variables, price_on(c, c.variables)) for c in team.constraints()]
         self._paid: list[float] = [0] * len(self._constraints)
         self._on: dict[str, list[int]] = {name: [] for name in team.variables}
-        self._interfaces = {robot.name: robot.interface for robot in team.robots}
+        self.interfaces = {robot.name: robot.interface for robot in team.robots}
         self._variables = {robot.name: [variable.name for variable in robot.variables] for robot in team.robots}
         for number, (names, price) in enumerate(self._constraints):
             for name in names:
@@ -45,10 +47,12 @@ class Objective:
             known = all(name in self._values for name in names)
             self._paid[number] = price([self._values[name] for name in names]) if known else 0
 
-    def shown(self, values: Mapping[str, Value]) -> dict[str, dict[str, int]]:
-        """What `values`, as neighbours see them, say of each robot's variables."""
+    def shown(self, values: Mapping[str, Value]) -> dict[str, dict[str, int]] | None:
+        """Return what `values`, as neighbours see them, say of each robot's variables; None if they cannot be those."""
+        if any(len(self.interfaces.get(robot, (*value, ""))) != len(value) for robot, value in values.items()):
+            return None
         return {
-            robot: {name: part for name, part in zip(self._interfaces[robot], value, strict=True) if part is not None}
+            robot: {name: part for name, part in zip(self.interfaces[robot], value, strict=True) if part is not None}
             for robot, value in values.items()
         }
 

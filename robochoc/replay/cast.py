@@ -21,6 +21,7 @@ from robochoc.replay.steps import Run
 from robochoc.solver.ace import AceProcess, SolverLost, SolverMissing, SolverTimeout
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import CompileFailed, Compiler, CompileTimeout, Limits
+from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
 from robochoc.solver.domain import CompiledDomain, TooManySolutions
 from robochoc.solver.encoding import Unsupported
 from robochoc.solver.part import Brief, Part
@@ -88,7 +89,7 @@ class Cast:
         self._only = only
         self._reader = TeamReader(header.team if header else "")
         self._hosts: dict[str, Host] = {}
-        self._compiled: dict[str, tuple[Robot, CompiledDomain]] = {}
+        self._before: Mapping[str, CompiledRobot] = {}
         self._lost: set[str] = set()
 
     def enter(self, run: Run) -> Ensemble:
@@ -96,19 +97,17 @@ class Cast:
         protocol = self._protocol(run)
         try:
             epoch = self._epoch(run, protocol)
-            epoch = epoch._replace(domains=self._domains(epoch.team))
             parts = epoch.parts(protocol)
             goes_on = run.began is not None and isinstance(run.began.epoch, int)
             before = self._hosts if goes_on else {}
-            names = [name for name in parts if self._only is None or name in self._only]
-            self._hosts = {name: _host(protocol, parts[name], before.get(name), epoch) for name in names}
+            self._hosts = {name: _host(protocol, part, before.get(name), epoch) for name, part in parts.items()}
         except BadGiven as why:
             raise CannotReplay(str(why), broken=True) from why
         except _UNCOMPILED as why:
             raise CannotReplay(str(why)) from why
         self._lost.update(event.robot for event in run.events if isinstance(event, Lost))
         kept = issubclass(protocol, DynamicProtocol)
-        mindful = [name for name in names if kept and name in before and name not in epoch.fresh]
+        mindful = [name for name in parts if kept and name in before and name not in epoch.fresh]
         return Ensemble(protocol, self._hosts, parts, run.given is None or run.given.quiet, mindful)
 
     def _protocol(self, run: Run) -> type[Protocol]:
@@ -138,7 +137,8 @@ class Cast:
         return self._as_filed(run, protocol)
 
     def _as_given(self, given: Given) -> Epoch:
-        return Epoch(self._reader.team(given), void=void_of(given), fresh=frozenset(given.fresh), brief=brief_of(given))
+        compiled = self._compiled(self._reader.team(given))
+        return Epoch(compiled, void_of(given), frozenset(given.fresh), brief_of(given))
 
     def _as_filed(self, run: Run, protocol: type[Protocol]) -> Epoch:
         """What the files say, for a run whose journal does not; robots that were lost before are left out."""
@@ -156,8 +156,9 @@ class Cast:
         seed = self._header.seed if self._header else 0
         asked = self._header.protocol if self._header else None
         if asked is None or self._named(asked) is protocol:
-            return Epoch(team, brief=Brief(seed, self._means.settings))
-        return Epoch(team, brief=Brief(seed, aside=aside_cost(team) if protocol.traits.costs else None))
+            return Epoch(self._compiled(team), brief=Brief(seed, self._means.settings))
+        aside = aside_cost(team) if protocol.traits.costs else None
+        return Epoch(self._compiled(team), brief=Brief(seed, aside=aside))
 
     def _arranged(self, team: Team) -> Team:
         order = self._header.order if self._header else None
@@ -167,17 +168,18 @@ class Cast:
             team = reordered(team, order)
         return without(team, [name for name in self._lost if name in team])
 
-    def _domains(self, team: Team) -> dict[str, CompiledDomain]:
-        """The compiled domains of those who play; what did not change is not compiled again."""
+    def _compiled(self, team: Team) -> CompiledTeam:
+        """Return `team` with those compiled who play; what did not change is not compiled again."""
         means = self._means
+
+        def compile_robot(robot: Robot) -> CompiledDomain:
+            known = self._before.get(robot.name)
+            return known.domain if known and known.robot == robot else compiler.compile(robot).domain
+
         with Compiler(means.limits, means.cache, solver=means.solver) as compiler:
-            for robot in team.robots:
-                if self._only is not None and robot.name not in self._only:
-                    continue
-                known = self._compiled.get(robot.name)
-                if known is None or known[0] != robot:
-                    self._compiled[robot.name] = robot, compiler.compile(robot).domain
-        return {name: domain for name, (_, domain) in self._compiled.items() if name in team}
+            compiled = CompiledTeam(team, compile_robot, self._only)
+        self._before = {**self._before, **compiled.robots}
+        return compiled
 
 
 def _host(protocol: type[Protocol], part: Part, before: Host | None, epoch: Epoch) -> Host:

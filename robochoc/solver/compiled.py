@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING
 
 from robochoc.message import Value
 from robochoc.problem import INFINITE, Model
-from robochoc.solver.domain import compiled_domain
 from robochoc.solver.explanation import Known, held, held_below
 from robochoc.solver.filters import Filters
 from robochoc.solver.part import Part
@@ -46,8 +45,7 @@ class LocalProblem:
     `values[i]` is the i-th value as neighbours see it; `solution(i)` are the own variables' values behind it.
     `parents` and `children` are the links that the files name, `neighbours` are they and all others in a constraint
     that this robot knows; each in priority order. `partners` are the parents with whom a partially known constraint
-    is shared: they have to hear of the own value too. `checks` counts constraint checks so far. Raises `Unsupported`
-    when the robot has private constraints among its variables and comes without its compiled domain.
+    is shared: they have to hear of the own value too. `checks` counts constraint checks so far.
 
     `charges[i]` is what the i-th value costs before anybody else has said a word: what its private constraints
     charge. Where robots may step aside, the last value is to do so: all its parts are None, it breaks nothing, and no
@@ -60,7 +58,7 @@ class LocalProblem:
         self.agent = robot.name
         self.parents = tuple(sorted((parent.name for parent in robot.parents), key=rank.__getitem__))
         self.children = tuple(sorted((child.name for child in robot.children), key=rank.__getitem__))
-        self._domain = compiled_domain(robot) if part.domain is None else part.domain
+        self._domain = part.domain
         self.values: tuple[Value, ...] = self._domain.values
         self.charges: tuple[float, ...] = self._domain.costs
         if part.brief.aside is not None:

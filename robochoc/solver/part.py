@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from robochoc.problem import Domain, Model, Robot, Team
+from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, as_compiled
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.explanation import Known, held
 
@@ -39,37 +40,43 @@ NO_BRIEF = Brief()
 class Part(NamedTuple):
     """What one robot knows when the search begins.
 
-    `order`, `interfaces` and the declared `domains` of interface variables are common knowledge. `domain` is None
-    when the robot can compile its domain without a solver. `copies` are the totally known constraints over its
+    `own` is the robot itself with its compiled domain. `order`, `interfaces` and the declared `domains` of interface
+    variables are common knowledge. `copies` are the totally known constraints over its
     variables that lower robots hold, for protocols in which all robots of a scope have to know them. `links` is
     for protocols that work on a pseudo-tree. `secretive` are the parents that hold parts of partially known
     constraints towards this robot: that there is such a constraint both sides know, the parts they do not.
     `brief` is what all robots are told; whoever may step aside does so at the `brief.aside` times its weight.
     """
 
-    robot: Robot
+    own: CompiledRobot
     order: Sequence[str]
     interfaces: Interfaces
-    domain: CompiledDomain | None = None
     copies: tuple[Known, ...] = ()
     domains: Mapping[str, Domain] = MappingProxyType({})
     links: Links | None = None
     secretive: tuple[str, ...] = ()
     brief: Brief = NO_BRIEF
 
+    @property
+    def robot(self) -> Robot:
+        """The robot itself, as its file says."""
+        return self.own.robot
+
+    @property
+    def domain(self) -> CompiledDomain:
+        """Its compiled domain."""
+        return self.own.domain
+
 
 def parts(
-    team: Team,
-    domains: Mapping[str, CompiledDomain] = MappingProxyType({}),
-    brief: Brief = NO_BRIEF,
-    *,
-    everywhere: bool = False,
-    tree: bool = False,
+    team: Team | CompiledTeam, brief: Brief = NO_BRIEF, *, everywhere: bool = False, tree: bool = False
 ) -> dict[str, Part]:
-    """Each robot's part of `team`, in priority order.
+    """Return the part of each robot of `team` that is compiled, in priority order.
 
     `everywhere`: every robot of a constraint's scope knows it. `tree`: all know who is whose parent.
     """
+    compiled = as_compiled(team)
+    team = compiled.team
     shown = {robot.name: robot.interface for robot in team.robots}
     known = {name: team.variables[name].domain for names in shown.values() for name in names}
     links = {robot.name: tuple(parent.name for parent in robot.parents) for robot in team.robots} if tree else None
@@ -86,16 +93,6 @@ def parts(
             if child.constraints:
                 secretive[child.name].append(robot.name)
     return {
-        robot.name: Part(
-            robot,
-            team.order,
-            shown,
-            domains.get(robot.name),
-            tuple(copies[robot.name]),
-            known,
-            links,
-            tuple(secretive[robot.name]),
-            brief,
-        )
-        for robot in team.robots
+        name: Part(own, team.order, shown, tuple(copies[name]), known, links, tuple(secretive[name]), brief)
+        for name, own in compiled.robots.items()
     }

@@ -15,10 +15,10 @@ from collections.abc import Callable, Mapping
 from multiprocessing.connection import wait
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
-from types import MappingProxyType
 from typing import cast
 
 from robochoc.authority.admission import Household
+from robochoc.change import still_showing
 from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members, reach
@@ -32,7 +32,7 @@ from robochoc.communication.system import signals_held
 from robochoc.observers.events import Observer
 from robochoc.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import Unsupported
 from robochoc.solver.part import NO_BRIEF, Brief
 
@@ -49,29 +49,30 @@ _OURS = "robochoc."
 class LocalNetwork(Session):
     """One team on this machine, each robot in a process of its own, joined by zenoh. See `Session`, `ProcessesRun`.
 
-    Robots compile nothing: `domains` are their compiled domains.
+    Robots compile nothing: they come compiled, and when others are lost they still show what they showed before.
     """
 
     anew = True
 
     def __init__(
         self,
-        team: Team,
+        team: Team | CompiledTeam,
         protocol: type[Protocol],
         *,
-        domains: Mapping[str, CompiledDomain] = MappingProxyType({}),
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
         conditions: Conditions = Conditions(),
         brief: Brief = NO_BRIEF,
     ) -> None:
+        super().__init__(team)
+        team = self.compiled.team
         self._protocol = protocol
         self._brief = brief
         self._conditions = conditions
         self._processes: dict[str, BaseProcess] = {}
         self._sent_home = False
         self._household = Household(team.order)
-        self._waiting = [(robot, domains.get(robot.name)) for robot in team.robots]
+        self._waiting = list(self.compiled.robots.values())
         watched = observer is not None
         self._context = _fork_server(protocol)
         profiles = {robot.name: profile_of(robot) for robot in team.robots}
@@ -131,8 +132,13 @@ class LocalNetwork(Session):
         left = None if deadline is None else max(0.0, deadline - time.monotonic())
         return self._master.search(self._protocol.__name__, self._protocol.traits, self._brief, left, messages)
 
+    def workable(self, team: Team) -> Team:
+        """Return what is left of the team: robots whose values still mean what they meant. See `Session.workable`."""
+        return still_showing(team, self.compiled.team)
+
     def change(self, epoch: Epoch) -> None:
         """Go on without the robots that were lost: no other change can happen here."""
+        self.compiled = epoch.compiled
         gone = [name for name in self._master.members.robots if name not in epoch.team]
         self._master.members.remove(gone)
         self._brief = epoch.brief
@@ -155,13 +161,14 @@ class LocalNetwork(Session):
         waiting, self._waiting = self._waiting, []
         if not waiting:
             return
-        for robot, domain in waiting:
-            texts = self._household.identity(robot.name).texts
+        for own in waiting:
+            name = own.robot.name
+            texts = self._household.identity(name).texts
             limits = (self._conditions.patience_s, self._conditions.lease_ms)
-            given = Given(robot, domain, texts, self._master.endpoint, self._protocol, *limits)
-            process = self._context.Process(target=robot_process, name=robot.name, args=(given,), daemon=True)
+            given = Given(own, texts, self._master.endpoint, self._protocol, *limits)
+            process = self._context.Process(target=robot_process, name=name, args=(given,), daemon=True)
             process.start()
-            self._processes[robot.name] = process
+            self._processes[name] = process
         threading.Thread(target=self._watch, args=[dict(self._processes)], daemon=True).start()
 
     def _watch(self, processes: dict[str, BaseProcess]) -> None:

@@ -189,8 +189,13 @@ def in_priority_order(profiles: Mapping[str, Profile]) -> Sequence[str]:
 def among(robot: Robot, interfaces: Mapping[str, Sequence[str]]) -> Robot:
     """`robot` in a team of those in `interfaces`: without neighbours that have left, and constraints with them.
 
-    It shows the variables that stand there for it, whoever looks at them.
+    It shows the variables that stand there for it, whoever looks at them, and in the order that they have there: so
+    others read its values. They do not stand as in its file where it had to show more than its file says.
     """
+    shown = tuple(interfaces[robot.name])
+    place = {name: number for number, name in enumerate(shown)}
+    moved = iter(sorted((one for one in robot.variables if one.name in place), key=lambda one: place[one.name]))
+    variables = tuple(next(moved) if one.name in place else one for one in robot.variables)
     known = {name for names in interfaces.values() for name in names} | {v.name for v in robot.variables}
 
     def kept(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
@@ -198,7 +203,8 @@ def among(robot: Robot, interfaces: Mapping[str, Sequence[str]]) -> Robot:
 
     return replace(
         robot,
+        variables=variables,
         parents=tuple(replace(p, constraints=kept(p.constraints)) for p in robot.parents if p.name in interfaces),
         children=tuple(replace(c, constraints=kept(c.constraints)) for c in robot.children if c.name in interfaces),
-        shown=tuple(interfaces[robot.name]),
+        shown=shown,
     )

@@ -50,9 +50,9 @@ from robochoc.communication.network.words import (
     Word,
 )
 from robochoc.message import Envelope
-from robochoc.problem import Robot
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.compiled_team import CompiledRobot, CompileRobot
+from robochoc.solver.domain import compiled_domain
 from robochoc.solver.encoding import TooMuch, Unsupported
 
 IDLE_S = 0.002
@@ -93,38 +93,37 @@ class Manner:
     `patience_s` is how long the master may be gone. `sniffed`: the master's observers are to be told of all that the
     robot does, even if they do not ask for it. `place` is told the robot's place in the priority order, and how many
     robots there are, before each search; `stage` in a few words how far it is. `compiled` compiles the robot's domain
-    again, should others have to see more of its variables than it knew (None: it has no private constraints).
+    again, should others have to see more of its variables than it knew.
     """
 
     patience_s: float = 10.0
     sniffed: bool = False
     place: Callable[[int, int], None] = _nothing
     stage: Callable[[str], None] = _nothing
-    compiled: Callable[[Robot], CompiledDomain | None] = lambda _robot: None
+    compiled: CompileRobot = compiled_domain
 
 
 class NetworkRobot:
-    """The robot `robot` at its `post`, with its compiled `domain` (None: it needs no solver for that).
+    """The robot `own` at its `post`.
 
     `protocol_named` finds the protocol that the master asks for; it raises `LookupError`.
     """
 
     def __init__(
         self,
-        robot: Robot,
-        domain: CompiledDomain | None,
+        own: CompiledRobot,
         identity: Identity,
         post: Post,
         protocol_named: Callable[[str], type[Protocol]],
         manner: Manner = Manner(),
     ) -> None:
-        self._robot = robot
-        self._domain = domain
+        self._own = own
+        self._robot = own.robot
         self._identity = identity
         self._post = post
         self._protocol_named = protocol_named
         self._manner = manner
-        self._letters = Letters(robot.name)
+        self._letters = Letters(own.robot.name)
         self._visit = secrets.token_hex(_VISIT_BYTES)
         self._ring: KeyRing | None = None
         self._filters: FilterStack | None = None
@@ -355,10 +354,8 @@ class NetworkRobot:
         told = self._welcome.observed and not self._welcome.private  # events have values in them
         observed = told or self._manner.sniffed
         around = Surroundings(self._say, self._send, self._manner.place, observed, self._welcome.private)
-        robot, domain = among(self._robot, task.interfaces), self._domain
-        if domain is not None and robot.interface != self._robot.interface:
-            domain = self._manner.compiled(robot)
-        self._searcher = Searcher(robot, domain, task, protocol, around)
+        own = self._own.relinked(among(self._robot, task.interfaces), self._manner.compiled)
+        self._searcher = Searcher(own, task, protocol, around)
         self._searcher.prepare()
         ahead, self._ahead = self._ahead, []
         for sender, opened in ahead:

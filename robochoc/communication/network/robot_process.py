@@ -14,9 +14,8 @@ from typing import NamedTuple
 from robochoc.authority.identity import Identity, IdentityTexts
 from robochoc.communication.network.post import CannotConnect, Post
 from robochoc.communication.network.robot import Manner, NetworkRobot
-from robochoc.problem import Robot
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.compiled_team import CompiledRobot
 
 START_S = 60.0
 """How long robots may take to come."""
@@ -27,8 +26,7 @@ _PR_SET_NAME = 15
 class Given(NamedTuple):
     """With what a robot's process begins."""
 
-    robot: Robot
-    domain: CompiledDomain | None
+    own: CompiledRobot
     identity: IdentityTexts
     endpoint: str
     protocol: type[Protocol]
@@ -43,7 +41,7 @@ def robot_process(given: Given) -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
     if sys.platform == "linux":
         libc = ctypes.CDLL(None)
-        libc.prctl(_PR_SET_NAME, given.robot.name.encode())
+        libc.prctl(_PR_SET_NAME, given.own.robot.name.encode())
     threading.Thread(target=_end_with_the_parent, daemon=True).start()
     identity = Identity.of(given.identity)
 
@@ -55,7 +53,7 @@ def robot_process(given: Given) -> None:
     try:
         with Post(given.endpoint, identity, watch=(), patience_s=START_S, lease_ms=given.lease_ms) as post:
             manner = Manner(given.patience_s, place=take_place)
-            NetworkRobot(given.robot, given.domain, identity, post, lambda _name: given.protocol, manner).run()
+            NetworkRobot(given.own, identity, post, lambda _name: given.protocol, manner).run()
     except CannotConnect as error:
         sys.exit(str(error))
 

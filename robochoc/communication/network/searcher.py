@@ -21,10 +21,10 @@ from robochoc.communication.system import own_memory
 from robochoc.message import Envelope
 from robochoc.observers.events import AnyEvent
 from robochoc.outcome import Metrics
-from robochoc.problem import INFINITE, Kind, Model, Robot
+from robochoc.problem import INFINITE, Kind, Model
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.encoding import Unsupported
 from robochoc.solver.explanation import Known, held
 from robochoc.solver.part import Brief, Part
@@ -48,22 +48,18 @@ class Surroundings:
 
 
 class Searcher:
-    """The robot `robot`, as it is `among` those of `task`, in its epoch.
-
-    `domain` is its compiled domain, None: it needs no solver for that.
-    """
+    """The robot `own`, as it is `among` those of `task`, in its epoch. Raises `Unsupported` when it is another."""
 
     def __init__(
         self,
-        robot: Robot,
-        domain: CompiledDomain | None,
+        own: CompiledRobot,
         task: Task,
         protocol: type[Protocol],
         around: Surroundings,
     ) -> None:
         self.epoch = task.epoch
-        self._robot = robot
-        self._domain = domain
+        self._own = own
+        self._robot = own.robot
         self._task = task
         self._protocol = protocol
         self._around = around
@@ -76,6 +72,8 @@ class Searcher:
         self._sent = self._received = 0
         self._told: tuple[int, int] | None = None
         self._searching = self._concluded = self._paused = False
+        if task.interfaces.get(self._robot.name) != self._robot.interface:  # others would misread its values
+            raise Unsupported(f"{self._robot.name} was told what cannot be: that it shows other variables")
 
     @property
     def assignment(self) -> dict[str, int]:
@@ -143,8 +141,8 @@ class Searcher:
         except (BadShared, BadProfile) as bad:
             raise Unsupported(f"{self._robot.name} was told what cannot be: {bad}") from None
         brief = Brief(task.seed, task.settings, task.aside)
-        own = (self._robot, task.order, task.interfaces, self._domain)
-        return Part(*own, _sorted(copies, task.order), domains, task.links, task.secretive, brief)
+        copied = _sorted(copies, task.order)
+        return Part(self._own, task.order, task.interfaces, copied, domains, task.links, task.secretive, brief)
 
     def _known(self, sender: str, record: SharedRecord) -> Known:
         """The constraint that `sender` holds: only a child can, over variables that are there, mine among them."""
