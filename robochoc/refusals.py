@@ -31,7 +31,8 @@ def refuse_unfit(team: Team, options: Options, protocol: type[Protocol]) -> None
     if options.withdraw is not None:
         refuse_scenario(team, "--withdraw")
     if traits.costs or options.withdraw is Withdrawal.FEWEST:
-        _refuse_dear(team, aside=options.withdraw is not None)
+        for events in range(len(team.scenario) + 1):
+            _refuse_dear(changed_by(team, events), aside=options.withdraw is not None)
     if options.withdraw is Withdrawal.FEWEST:
         _refuse_fewest(team, options, traits)
     else:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple
 
-from robochoc.change import BadChange, changed_by, without
+from robochoc.change import BadChange, changed_by, still_showing, without
 from robochoc.communication.host import BadSettings, Host
 from robochoc.communication.session import Epoch
 from robochoc.observers.events import Given, Lost
@@ -150,23 +151,32 @@ class Cast:
         if run.began is not None and isinstance(run.began.epoch, int):
             raise CannotReplay("the journal does not say what the robots were given when their problem changed")
         try:
-            team = self._arranged(changed_by(self._means.team, events=0))
+            filed = self._ordered(changed_by(self._means.team, events=0))
+            team = self._left(filed)
         except (CannotTurn, BadChange, ValueError) as why:
             raise CannotReplay(f"the team cannot be brought into the order of the run: {why}") from why
         seed = self._header.seed if self._header else 0
         asked = self._header.protocol if self._header else None
         if asked is None or self._named(asked) is protocol:
             return Epoch(self._compiled(team), brief=Brief(seed, self._means.settings))
-        aside = aside_cost(team) if protocol.traits.costs else None
+        there = [robot for robot in filed.robots if run.given is not None or robot.name in team]
+        aside = aside_cost(replace(filed, robots=tuple(there))) if protocol.traits.costs else None
         return Epoch(self._compiled(team), brief=Brief(seed, aside=aside))
 
-    def _arranged(self, team: Team) -> Team:
+    def _ordered(self, team: Team) -> Team:
+        """Return `team` in the order of the run. Raises `CannotTurn`, `ValueError`."""
         order = self._header.order if self._header else None
         if isinstance(order, str):
             order = order_of(team, Order(order), self._header.seed if self._header else 0)
         if isinstance(order, tuple):
-            team = reordered(team, order)
-        return without(team, [name for name in self._lost if name in team])
+            return reordered(team, order)
+        return team
+
+    def _left(self, team: Team) -> Team:
+        """Return `team` without the robots that were lost before. On a network the others show what they did show."""
+        left = without(team, [name for name in self._lost if name in team])
+        on_network = self._header is not None and self._header.runtime == "network"
+        return still_showing(left, team) if on_network else left
 
     def _compiled(self, team: Team) -> CompiledTeam:
         """Return `team` with those compiled who play; what did not change is not compiled again."""

@@ -199,7 +199,12 @@ class Members:
         }
 
     def remove(self, names: Collection[str]) -> None:
-        """Robots are out for good: whoever named them as neighbours does so no more."""
+        """Robots are out for good: whoever named them as neighbours does so no more.
+
+        Once the team is complete, those who are left keep their places in the order, as they do in every runtime.
+        """
+        if self.closed:
+            self._order = self.order
         for name in names:
             member = self.robots.pop(name, None)
             if member:
