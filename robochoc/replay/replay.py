@@ -19,6 +19,7 @@ from robochoc.communication.run_result import Progress
 from robochoc.message import Envelope, Message
 from robochoc.observers.events import AnyEvent, Event, Received, Sent
 from robochoc.observers.journal import Journal
+from robochoc.protocols.protocol import Said
 from robochoc.replay.cast import Cast, Ensemble, Means
 from robochoc.replay.channels import Channels, Words
 from robochoc.replay.steps import RobotEvent, Run, Step, runs_of, steps_of
@@ -87,7 +88,7 @@ class SaysNoEnd(Exception):  # noqa: N818 - named for what happens
     """A protocol has said so much in one step that it may never end."""
 
 
-class _Outbox(list[tuple[str, Message]]):
+class _Outbox(list[Said]):
     """An outbox that takes so many messages: a protocol that goes round in a circle mostly speaks on the way."""
 
     def __init__(self, most: int, listen: Callable[[str, Message], None]) -> None:
@@ -95,7 +96,7 @@ class _Outbox(list[tuple[str, Message]]):
         self._most = most
         self._listen = listen
 
-    def append(self, said: tuple[str, Message]) -> None:
+    def append(self, said: Said) -> None:
         """Take one more. Raises `SaysNoEnd`."""
         if len(self) >= self._most:
             raise SaysNoEnd(f"{len(self):,} messages in one step, and no end of it")
@@ -221,7 +222,7 @@ class Scene:
     def _delay(self, host: Host, received: Received, told: list[AnyEvent]) -> None:
         """A message that was under way for longer has moved the clock on; nobody says so, but the clock."""
         if self._simulated and received.clock > host.clock and told and isinstance(told[-1], Received):
-            host.clock = received.clock
+            host.catch_up(received.clock)
             told[-1] = msgspec.structs.replace(told[-1], clock=received.clock)
 
     def _difference(
