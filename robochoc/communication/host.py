@@ -64,7 +64,7 @@ class Host:
         self.said_at: list[int] = []
         """Of each message that the last step has said: `checks` as it was then."""
         self._stamps: list[int] = []
-        self._answers = 0
+        self._answers = self._step_began = 0
         self._begun = False
         self._decoder = msgspec.msgpack.Decoder(protocol.messages)
         self._checks = 0
@@ -79,7 +79,7 @@ class Host:
     ) -> None:
         """From now on tell `observer` of each event, stamped with `now()`.
 
-        Where time is counted in checks, `then(n)` is the time when the robot had done n: what it says is stamped so.
+        Where time is counted in checks, `then(n)` is the time when the robot had done n: for what it takes in and says.
         """
         self._observer = observer
         self._now = now
@@ -114,7 +114,7 @@ class Host:
             self.protocol = type(self.protocol)(problem, order)
             self._equip(part.brief)
             self._begun = False
-        self.clock = self.bytes = self._checks = 0
+        self.clock = self.bytes = self._checks = self._step_began = 0
         self.sent = {}
         self._reported = (None, None)
         self._heard = math.inf
@@ -143,7 +143,13 @@ class Host:
         if self._observer:
             kind = type(message).__name__
             self._observer(
-                Received(t=self._now(), sender=envelope.sender, receiver=self.name, type=kind, clock=self.clock)
+                Received(
+                    t=self._time(self._step_began),
+                    sender=envelope.sender,
+                    receiver=self.name,
+                    type=kind,
+                    clock=self.clock,
+                )
             )
 
     def catch_up(self, clock: int) -> None:
@@ -172,12 +178,12 @@ class Host:
         """Let the protocol act, count its checks, and wrap what it has said."""
         act()
         self._tick()
-        if self._observer:
-            self._report_state(self._observer)
         self.said_at = [said.checks for said in self.protocol.outbox]
         said = [self._wrap(said, clock) for said, clock in zip(self.protocol.outbox, self._stamps, strict=True)]
         self._forget_said()
+        self._step_began = self._checks
         if self._observer:
+            self._report_state(self._observer)
             self._observer(Settled(t=self._now(), robot=self.name, clock=self.clock, checks=self._checks))
         return said
 
@@ -190,7 +196,7 @@ class Host:
         if self._observer:
             self._observer(
                 Sent(
-                    t=self._then(said.checks) if self._then else self._now(),
+                    t=self._time(said.checks),
                     sender=self.name,
                     receiver=receiver,
                     type=kind,
@@ -208,6 +214,10 @@ class Host:
         self._stamps += [before + said.checks for said in self.protocol.outbox[self._answers :]]
         self._checks = self.protocol.problem.checks
         self.clock = before + self._checks
+
+    def _time(self, checks: int) -> float:
+        """The time when so many checks were done."""
+        return self._now() if self._then is None else self._then(checks)
 
     def _forget_said(self) -> None:
         self.protocol.outbox.clear()
