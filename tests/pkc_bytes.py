@@ -45,9 +45,9 @@ class _Tapped(RandomChannels):
         super().__init__(seed)
         self.envelopes: list[Envelope] = []
 
-    def put(self, envelope: Envelope) -> None:
+    def put(self, envelope: Envelope, checks: int = 0) -> None:
         self.envelopes.append(envelope)
-        super().put(envelope)
+        super().put(envelope, checks)
 
 
 def run(

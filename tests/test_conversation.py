@@ -49,12 +49,12 @@ class Recording(RandomChannels):
         super().__init__(seed)
         self.seen: dict[str, dict[bytes, Envelope]] = {}
 
-    def put(self, envelope: Envelope) -> None:
+    def put(self, envelope: Envelope, checks: int = 0) -> None:
         kind = msgspec.msgpack.decode(envelope.content)[0]
         kept = self.seen.setdefault(kind, {})
         if len(kept) < 10:
             kept.setdefault(envelope.content, envelope)
-        super().put(envelope)
+        super().put(envelope, checks)
 
 
 @EVERY_PROTOCOL

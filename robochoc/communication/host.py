@@ -1,8 +1,8 @@
 """The host: what stands between a protocol, which is pure, and a runtime, which moves envelopes.
 
 It decodes and encodes, stamps envelopes with the clock of non-concurrent constraint checks (NCCC; Meisels et al.
-2002: c = max(c, c of the message), plus one for each check), counts, and reports events to an observer. Every
-runtime uses it, so the same run counts the same everywhere.
+2002: c = max(c, c of the message), plus one for each check; a message carries c as it was when it was said), counts,
+and reports events to an observer. Every runtime uses it, so the same run counts the same everywhere.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from robochoc.message import Envelope, Message, encode
 from robochoc.observers.events import Concluded, Decided, Heard, Observer, Received, Sent, Settled
 from robochoc.outcome import Metrics, Verdict
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import DynamicProtocol, Protocol, Settings
+from robochoc.protocols.protocol import DynamicProtocol, Protocol, Said, Settings
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Void
 from robochoc.solver.part import NO_BRIEF, Brief, Part
@@ -61,6 +61,10 @@ class Host:
         self.clock = 0
         self.sent: dict[str, int] = {}
         self.bytes = 0
+        self.said_at: list[int] = []
+        """Of each message that the last step has said: `checks` as it was then."""
+        self._stamps: list[int] = []
+        self._answers = self._step_began = 0
         self._begun = False
         self._decoder = msgspec.msgpack.Decoder(protocol.messages)
         self._checks = 0
@@ -68,11 +72,18 @@ class Host:
         self._heard: float = math.inf
         self._observer: Observer | None = None
         self._now: Callable[[], float] = lambda: 0.0
+        self._then: Callable[[int], float] | None = None
 
-    def observe(self, observer: Observer, now: Callable[[], float]) -> None:
-        """From now on tell `observer` of each event, stamped with `now()`."""
+    def observe(
+        self, observer: Observer, now: Callable[[], float], then: Callable[[int], float] | None = None
+    ) -> None:
+        """From now on tell `observer` of each event, stamped with `now()`.
+
+        Where time is counted in checks, `then(n)` is the time when the robot had done n: for what it takes in and says.
+        """
         self._observer = observer
         self._now = now
+        self._then = then
 
     @property
     def checks(self) -> int:
@@ -98,12 +109,12 @@ class Host:
         problem, order = LocalProblem(part), PriorityOrder(part.order, part.links)
         if isinstance(self.protocol, DynamicProtocol):
             self.protocol.change(problem, order, void)
-            self.protocol.outbox.clear()
+            self._forget_said()
         else:
             self.protocol = type(self.protocol)(problem, order)
             self._equip(part.brief)
             self._begun = False
-        self.clock = self.bytes = self._checks = 0
+        self.clock = self.bytes = self._checks = self._step_began = 0
         self.sent = {}
         self._reported = (None, None)
         self._heard = math.inf
@@ -118,7 +129,10 @@ class Host:
         return self.settle()
 
     def take_in(self, envelope: Envelope) -> None:
-        """Take in one message of a packet, of which more may follow. Raises `BadMessage`."""
+        """Take in one message of a packet, of which more may follow. Raises `BadMessage`.
+
+        What the robot says at once does not carry the clocks of those that follow.
+        """
         try:
             message: Message = self._decoder.decode(envelope.content)
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
@@ -129,8 +143,21 @@ class Host:
         if self._observer:
             kind = type(message).__name__
             self._observer(
-                Received(t=self._now(), sender=envelope.sender, receiver=self.name, type=kind, clock=self.clock)
+                Received(
+                    t=self._time(self._step_began),
+                    sender=envelope.sender,
+                    receiver=self.name,
+                    type=kind,
+                    clock=self.clock,
+                )
             )
+
+    def catch_up(self, clock: int) -> None:
+        """Set the clock: by so much later was that of the message taken in last, and all that was said to it."""
+        late = clock - self.clock
+        self.clock = clock
+        for place in range(self._answers, len(self._stamps)):
+            self._stamps[place] += late
 
     def settle(self) -> list[Envelope]:
         """That was the whole packet: let the protocol settle, and return what it says."""
@@ -151,15 +178,17 @@ class Host:
         """Let the protocol act, count its checks, and wrap what it has said."""
         act()
         self._tick()
+        self.said_at = [said.checks for said in self.protocol.outbox]
+        said = [self._wrap(said, clock) for said, clock in zip(self.protocol.outbox, self._stamps, strict=True)]
+        self._forget_said()
+        self._step_began = self._checks
         if self._observer:
             self._report_state(self._observer)
-        said = [self._wrap(receiver, message) for receiver, message in self.protocol.outbox]
-        self.protocol.outbox.clear()
-        if self._observer:
             self._observer(Settled(t=self._now(), robot=self.name, clock=self.clock, checks=self._checks))
         return said
 
-    def _wrap(self, receiver: str, message: Message) -> Envelope:
+    def _wrap(self, said: Said, clock: int) -> Envelope:
+        receiver, message = said
         content = encode(message)
         kind = type(message).__name__
         self.sent[kind] = self.sent.get(kind, 0) + 1
@@ -167,21 +196,32 @@ class Host:
         if self._observer:
             self._observer(
                 Sent(
-                    t=self._now(),
+                    t=self._time(said.checks),
                     sender=self.name,
                     receiver=receiver,
                     type=kind,
                     content=msgspec.structs.asdict(message),
                     bytes=len(content),
-                    clock=self.clock,
+                    clock=clock,
                 )
             )
-        return Envelope(self.name, receiver, content, self.clock)
+        return Envelope(self.name, receiver, content, clock)
 
     def _tick(self) -> None:
-        """Each check done since the last look moves the clock by one."""
-        self.clock += self.protocol.problem.checks - self._checks
+        """Each check done since the last look moves the clock by one; what was said meanwhile is stamped with it."""
+        before = self.clock - self._checks
+        self._answers = len(self._stamps)
+        self._stamps += [before + said.checks for said in self.protocol.outbox[self._answers :]]
         self._checks = self.protocol.problem.checks
+        self.clock = before + self._checks
+
+    def _time(self, checks: int) -> float:
+        """The time when so many checks were done."""
+        return self._now() if self._then is None else self._then(checks)
+
+    def _forget_said(self) -> None:
+        self.protocol.outbox.clear()
+        self._stamps.clear()
 
     def _report_state(self, observer: Observer) -> None:
         """Tell of a value, a verdict or a best assignment that is new since the last report."""

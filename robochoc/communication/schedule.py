@@ -22,8 +22,8 @@ class Schedule(ABC):
     now: int = 0
 
     @abstractmethod
-    def put(self, envelope: Envelope) -> None:
-        """Send `envelope` on its way."""
+    def put(self, envelope: Envelope, checks: int = 0) -> None:
+        """Send `envelope` on its way: its sender has said it `checks` checks after it had begun with its packet."""
 
     @abstractmethod
     def get(self) -> Sequence[Envelope]:
@@ -53,7 +53,8 @@ class Concurrent(Schedule):
     """All robots compute at the same time, and time is counted in constraint checks. The default.
 
     The asynchronous message-delaying simulator of Zivan and Meisels (2006): a robot is busy for as long as its
-    checks take, then takes in all that has arrived meanwhile. A message takes a number of checks drawn from
+    checks take, then takes in all that has arrived meanwhile. A message leaves at the check at which it is said,
+    which its clock tells, so it may be there before its sender is free again. It takes a number of checks drawn from
     0..`longest`, which the receiver's NCCC clock takes up as well. Ties are broken by the seed.
     """
 
@@ -66,7 +67,7 @@ class Concurrent(Schedule):
         self._last_arrival: dict[tuple[str, str], int] = {}
         self._agenda: list[tuple[int, float, str]] = []
 
-    def put(self, envelope: Envelope) -> None:
+    def put(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: ARG002 - they are in its clock
         """Draw the delay; never earlier than the message before it in the same channel."""
         edge = (envelope.sender, envelope.receiver)
         delay = self._chance.randint(0, self._longest) if self._longest else 0
@@ -129,7 +130,7 @@ class RandomChannels(Schedule):
         self._channels: dict[tuple[str, str], deque[Envelope]] = {}
         self._waiting: list[tuple[str, str]] = []
 
-    def put(self, envelope: Envelope) -> None:
+    def put(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: ARG002 - there is no time
         """Append to the channel from sender to receiver."""
         edge = (envelope.sender, envelope.receiver)
         channel = self._channels.setdefault(edge, deque())

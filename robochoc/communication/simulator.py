@@ -97,7 +97,7 @@ class Simulation(Session):
     def _host(self, part: Part) -> Host:
         host = Host.of(self._protocol, part)
         if self._observer:
-            host.observe(self._observer, lambda: self._schedule.time(host.checks - self._checks))
+            host.observe(self._observer, lambda: self._time(host.checks), self._time)
         return host
 
     def _play(self, began: float, timeout: float | None, messages: int | None) -> None:
@@ -125,10 +125,15 @@ class Simulation(Session):
     def _step(self, host: Host, act: Callable[[], Sequence[Envelope]]) -> None:
         """Let `host` act, and send what it says on its way."""
         self._checks = host.checks
-        for envelope in act():
-            self._schedule.put(envelope)
+        envelopes = act()
+        for envelope, checks in zip(envelopes, host.said_at, strict=True):
+            self._schedule.put(envelope, checks - self._checks)
         self._schedule.done(host.name, host.clock, host.checks - self._checks)
         self._note_verdict(host)
+
+    def _time(self, checks: int) -> float:
+        """The time when the robot that is at work had done so many checks."""
+        return self._schedule.time(checks - self._checks)
 
     def _note_verdict(self, host: Host) -> None:
         if host.protocol.verdict is not None:

@@ -26,8 +26,9 @@ class Timed(Schedule):
 
     `now` is in nanoseconds. Ties are broken by the seed.
 
-    A robot takes in all that has arrived, is busy for as long as its checks take, and then hands what it says to its
-    radio. Messages get the medium in the order in which they are ready.
+    A robot takes in all that has arrived, and is busy for as long as its checks take. What it says it hands to its
+    radio at the check at which it says it, and computes on. Messages get the medium in the order in which they are
+    ready.
     """
 
     def __init__(self, seed: int, channel: ChannelModel) -> None:
@@ -35,7 +36,7 @@ class Timed(Schedule):
         self._channel = channel
         self._count = count()
         self.now = self._end_ns = 0
-        self._said: list[Envelope] = []
+        self._said: list[tuple[int, Envelope]] = []
         self._busy_until: dict[str, int] = {}
         self._free_at: dict[str, int] = {}
         self._inboxes: dict[str, list[tuple[int, int, Envelope]]] = {}
@@ -47,17 +48,17 @@ class Timed(Schedule):
         """Simulated seconds until the last robot had finished."""
         return self._end_ns / NS_PER_S
 
-    def put(self, envelope: Envelope) -> None:
-        """Keep `envelope` until its sender has finished."""
-        self._said.append(envelope)
+    def put(self, envelope: Envelope, checks: int = 0) -> None:
+        """Keep `envelope` until all that its sender says is known; it is ready when it was said."""
+        self._said.append((self.now + checks * self._channel.check_ns, envelope))
 
     def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: ARG002 - time is not the NCCC clock
-        """The robot has done so many checks since it began; then its messages are ready, and it is free again."""
-        ready = self.now + checks * self._channel.check_ns
-        self._end_ns = max(self._end_ns, ready)
-        self._busy_until[robot] = ready
+        """The robot has done so many checks since it began, and is free again."""
+        free = self.now + checks * self._channel.check_ns
+        self._end_ns = max(self._end_ns, free)
+        self._busy_until[robot] = free
         lot = self._chance.random()
-        for envelope in self._said:
+        for ready, envelope in self._said:
             self._note(ready, _SEND, lot, envelope)
         self._said.clear()
         if self._inboxes.get(robot):

@@ -7,8 +7,12 @@ import msgspec
 from robochoc.observers.events import AnyEvent, Event
 from robochoc.outcome import Outcome
 
-VERSION = 1
+VERSION = 2
 """Of what entries mean. Raised when one is added, or gets another meaning; readers refuse what they do not know."""
+STAMPED_LATE = 1
+"""In this version the `clock` of what was said was that of the end of the step; and it came after what was decided."""
+READ = (STAMPED_LATE, VERSION)
+"""Versions that are read."""
 
 
 class BadJournal(ValueError):  # noqa: N818 - named for what was found

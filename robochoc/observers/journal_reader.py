@@ -18,7 +18,7 @@ import msgspec
 from robochoc.observers.events import AnyEvent, Began
 from robochoc.observers.journal_blocks import MAGIC, Damaged, Unframer
 from robochoc.observers.journal_columns import BadBlock, entries_of
-from robochoc.observers.journal_entries import VERSION, BadJournal, Ended, Header, Line
+from robochoc.observers.journal_entries import READ, BadJournal, Ended, Header, Line
 from robochoc.outcome import Outcome
 
 MOST_ENTRIES = 30_000_000
@@ -179,8 +179,9 @@ class Follower:
                 if began:
                     raise Damaged(f"{self._place}: a second header")
                 raise BadJournal(f"{self._place}: expected the header of a journal")
-            if isinstance(line, Header) and line.version != VERSION:
-                raise BadJournal(f"its entries are of version {line.version}, and this robochoc reads {VERSION}")
+            if isinstance(line, Header) and line.version not in READ:
+                known = " and ".join(map(str, READ))
+                raise BadJournal(f"its entries are of version {line.version}, and this robochoc reads {known}")
             began, over = True, isinstance(line, Ended)
         self._began, self._over = began, over
         return lines

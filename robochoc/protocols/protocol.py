@@ -33,6 +33,16 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 NO_SETTINGS = Settings()
 
 
+class Said(tuple[str, Message]):
+    """The receiver and the message, of what was said.
+
+    `checks` is how many constraint checks the speaker had done by then: from it the host makes the clock that the
+    message carries, which is the speaker's when it says it (Meisels et al. 2002), not when its step is over.
+    """
+
+    checks: int = 0
+
+
 class Protocol(ABC):
     """One robot's side of a protocol.
 
@@ -50,7 +60,7 @@ class Protocol(ABC):
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         self.problem = problem
         self.order = order
-        self.outbox: list[tuple[str, Message]] = []
+        self.outbox: list[Said] = []
         self.value: int | None = None
         """The own value, as its place in the compiled domain; None: unassigned."""
         self.verdict: Verdict | None = None
@@ -68,8 +78,10 @@ class Protocol(ABC):
         """The inbox has been drained: the time to look at the whole view and to decide."""
 
     def send(self, receiver: str, message: Message) -> None:
-        """Say `message` to `receiver`."""
-        self.outbox.append((receiver, message))
+        """Say `message` to `receiver`; checks that are done later are not on its clock."""
+        said = Said((receiver, message))
+        said.checks = self.problem.checks
+        self.outbox.append(said)
 
     def conclude(self, verdict: Verdict) -> None:
         """End the search of the whole team with `verdict`."""

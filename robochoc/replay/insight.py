@@ -15,7 +15,7 @@ from robochoc.observers.journal import Header, Journal
 from robochoc.replay.cast import CannotReplay, Cast, Means
 from robochoc.replay.look import Look, carefully
 from robochoc.replay.reasons import Reasons
-from robochoc.replay.replay import SIMULATED, Difference, Scene, Stops
+from robochoc.replay.replay import Difference, Scene, Stops
 from robochoc.replay.steps import Step, runs_of, steps_of
 
 
@@ -86,7 +86,7 @@ class _Player:
 
     def __init__(self, header: Header | None, robot: str, means: Means, *, alone: bool) -> None:
         self._cast = Cast(header, means, {robot} if alone else None)
-        self._simulated = header is None or header.runtime == SIMULATED
+        self._header = header
         self._robot = robot
         self._alone = alone
         self._step = 0
@@ -97,7 +97,7 @@ class _Player:
             ensemble = self._cast.enter(run)
             if self._robot not in ensemble.hosts:
                 continue
-            scene = Scene(run, ensemble, simulated=self._simulated)
+            scene = Scene(run, ensemble, self._header)
             look = Look(ensemble.parts[self._robot])
             gone.intersection_update(ensemble.mindful)
             for step in steps_of(run.events):

@@ -18,7 +18,9 @@ from robochoc.communication.host import Host
 from robochoc.communication.run_result import Progress
 from robochoc.message import Envelope, Message
 from robochoc.observers.events import AnyEvent, Event, Received, Sent
-from robochoc.observers.journal import Journal
+from robochoc.observers.journal import Header, Journal
+from robochoc.observers.journal_entries import STAMPED_LATE
+from robochoc.protocols.protocol import Said
 from robochoc.replay.cast import Cast, Ensemble, Means
 from robochoc.replay.channels import Channels, Words
 from robochoc.replay.steps import RobotEvent, Run, Step, runs_of, steps_of
@@ -87,7 +89,7 @@ class SaysNoEnd(Exception):  # noqa: N818 - named for what happens
     """A protocol has said so much in one step that it may never end."""
 
 
-class _Outbox(list[tuple[str, Message]]):
+class _Outbox(list[Said]):
     """An outbox that takes so many messages: a protocol that goes round in a circle mostly speaks on the way."""
 
     def __init__(self, most: int, listen: Callable[[str, Message], None]) -> None:
@@ -95,7 +97,7 @@ class _Outbox(list[tuple[str, Message]]):
         self._most = most
         self._listen = listen
 
-    def append(self, said: tuple[str, Message]) -> None:
+    def append(self, said: Said) -> None:
         """Take one more. Raises `SaysNoEnd`."""
         if len(self) >= self._most:
             raise SaysNoEnd(f"{len(self):,} messages in one step, and no end of it")
@@ -121,12 +123,13 @@ def replay(
 class Scene:
     """One run being played again."""
 
-    def __init__(self, run: Run, ensemble: Ensemble, *, simulated: bool) -> None:
+    def __init__(self, run: Run, ensemble: Ensemble, header: Header | None) -> None:
         self.run = run
         self.ensemble = ensemble
         self.words = Words(ensemble.protocol)
         self.channels = Channels(run.events, self.words)
-        self._simulated = simulated
+        self._simulated = header is None or header.runtime == SIMULATED
+        self._stamped_late = header is not None and header.version == STAMPED_LATE
         self._begun: set[str] = set()
         self.heard: list[tuple[Sent, Message]] = []
         """What was taken in by the step that was played last."""
@@ -221,7 +224,7 @@ class Scene:
     def _delay(self, host: Host, received: Received, told: list[AnyEvent]) -> None:
         """A message that was under way for longer has moved the clock on; nobody says so, but the clock."""
         if self._simulated and received.clock > host.clock and told and isinstance(told[-1], Received):
-            host.clock = received.clock
+            host.catch_up(received.clock)
             told[-1] = msgspec.structs.replace(told[-1], clock=received.clock)
 
     def _difference(
@@ -229,6 +232,8 @@ class Scene:
     ) -> tuple[RobotEvent | None, AnyEvent | None] | None:
         """The first pair of events that are not the same."""
         recorded = [*step.received, *step.done]
+        if self._stamped_late:
+            told = sorted(told, key=_as_it_was_told)
         for place, event in enumerate(recorded):
             again = told[place] if place < len(told) else None
             if again is None or not self._same(event, again):
@@ -242,8 +247,16 @@ class Scene:
             return False
         if isinstance(recorded, Sent) and isinstance(replayed, Sent) and not self.words.same(recorded, replayed):
             return False
-        names = [name for name in recorded.__struct_fields__ if name not in ("t", "content")]
+        apart = {"t", "content"}
+        if self._stamped_late and isinstance(recorded, Sent):
+            apart.add("clock")
+        names = [name for name in recorded.__struct_fields__ if name not in apart]
         return all(getattr(recorded, name) == getattr(replayed, name) for name in names)
+
+
+def _as_it_was_told(event: AnyEvent) -> int:
+    """Where an event stood in its step in the first version of journals: decisions came before words."""
+    return 0 if isinstance(event, Received) else 2 if isinstance(event, Sent) else 3 if isinstance(event, Settled) else 1
 
 
 class _Replay:
@@ -267,7 +280,7 @@ class _Replay:
             ensemble = self._cast.enter(run)
             self._runs += 1
             self._counts.update({name: 0 for name in ensemble.hosts if name not in self._counts})
-            difference = self._run(Scene(run, ensemble, simulated=self._journal.header.runtime == SIMULATED))
+            difference = self._run(Scene(run, ensemble, self._journal.header))
             if difference:
                 break
         return Replayed(
