@@ -176,7 +176,7 @@ class _Search:
             if high != domain:
                 domains[place] = high
                 shrunk.append(place)
-        return self._propagates(domains, left, shrunk)
+        return self._propagates(domains, left, shrunk) and self._bound(domains, costs) < least
 
     def _bound(self, domains: Sequence[int], costs: Codes) -> int:
         """What the variables at `costs` come to at least."""
