@@ -221,10 +221,8 @@ class _Search:
                 waiting[other] = None
         return True
 
-    def _revised(
-        self, domains: list[int], left: list[int], number: int, index: int, waiting: dict[int, None]
-    ) -> bool:
-        """Take from table `number` what the domain of its variable `index` has lost, and from others what that loses."""
+    def _revised(self, domains: list[int], left: list[int], number: int, index: int, waiting: dict[int, None]) -> bool:
+        """Take from table `number` what its variable `index` has lost, and from the others what that supported."""
         rows, scope = self._rows[number], self._scopes[number]
         kept, steps = 0, 0
         values, domain = rows[index], domains[scope[index]]
