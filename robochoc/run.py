@@ -275,7 +275,7 @@ class _Run:
         refuse_central(self._team, self._options)
         self._outcome = replace(self._outcome, runtime=CENTRAL)
         count = None
-        with AceProcess() as warm:
+        with AceProcess(always=self._options.local.always_ace) as warm:
             self._solver = self._solver or warm
             for events in range(len(self._team.scenario) + 1):
                 changes = self._team.scenario[events - 1].changes if events else ()
@@ -320,7 +320,9 @@ class _Run:
         return opinion.verdict is not Verdict.UNKNOWN
 
     def _judge(self) -> Judge:
-        return Judge(self._cache, self._deadline, lambda: self._show("ACE decides the whole team"), self._solver)
+        always = self._options.local.always_ace
+        show = lambda: self._show("ACE decides the whole team")  # noqa: E731 - it is one word for the judge
+        return Judge(self._cache, self._deadline, show, self._solver, always_ace=always)
 
     # What an epoch needs
 

@@ -51,7 +51,7 @@ HARD_MODEL_BYTES = 5_000
 WATCHED = """
 from test_ace import queens
 from robochoc.solver.ace import AceProcess
-ace = AceProcess()
+ace = AceProcess(always=True)
 ace.begin(queens(15))
 print(ace.pid, flush=True)
 ace.answer()
@@ -120,7 +120,7 @@ def wait_for_the_search(folder: Path) -> None:
 @pytest.fixture(scope="module")
 def warm() -> Iterator[AceProcess]:
     """A process for all tests that leave it in good health."""
-    with AceProcess() as solver:
+    with AceProcess(always=True) as solver:
         yield solver
 
 
@@ -165,7 +165,7 @@ def test_ace_alone_still_counts_wrongly(warm: AceProcess, monkeypatch: pytest.Mo
 
 def test_ace_alone_still_dies_of_an_emptied_table(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(front, "propagated", lambda network: network)  # see above
-    with AceProcess() as solver, pytest.raises(SolverLost):
+    with AceProcess(always=True) as solver, pytest.raises(SolverLost):
         solver.solve(EMPTIED)
 
 
@@ -242,7 +242,7 @@ def test_variables_that_no_table_looks_at_take_every_value_in_their_places(warm:
 
 @pytest.mark.parametrize("count_only", [False, True])
 def test_what_is_plainly_impossible_needs_no_process(*, count_only: bool) -> None:
-    with AceProcess() as solver:
+    with AceProcess(always=True) as solver:
         for network in IMPOSSIBLE:
             answer = solver.solve(network, count_only=count_only)
             assert (answer.found, answer.complete, answer.solutions) == (0, True, ())
@@ -251,7 +251,7 @@ def test_what_is_plainly_impossible_needs_no_process(*, count_only: bool) -> Non
 
 def test_what_is_plain_needs_no_process() -> None:
     network = Network(((0, 1), (3,), (0, 2)), (Table((0, 1), allowed=True, rows=((1, 3),)),))
-    with AceProcess() as solver:
+    with AceProcess(always=True) as solver:
         assert not solver.begin(network)
         assert solver.answer().solutions == ((1, 3, 0), (1, 3, 2))
         assert solver.pid is None
@@ -259,7 +259,7 @@ def test_what_is_plain_needs_no_process() -> None:
 
 def test_after_many_tasks_another_process_takes_over(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(front, "TASKS", 2)
-    with AceProcess() as solver:
+    with AceProcess(always=True) as solver:
         pids = []
         for _ in range(3):
             assert solver.solve(SMALL).found == 3
@@ -270,7 +270,7 @@ def test_after_many_tasks_another_process_takes_over(monkeypatch: pytest.MonkeyP
 
 def test_when_the_time_is_over_the_process_goes_and_the_next_task_has_another(temporary: Path) -> None:
     before = open_descriptors()
-    with AceProcess() as solver:
+    with AceProcess(always=True) as solver:
         assert solver.solve(SMALL).found == 3
         pid = pid_of(solver)
         with waiting(2, at_least_s=1), pytest.raises(SolverTimeout):
@@ -287,7 +287,7 @@ def test_a_judge_out_of_time_leaves_a_lent_solver_fit_for_the_next_task() -> Non
     names = [f"V{number}" for number in range(30)]
     chain = [Constraint("C", PREDEFINED["neq"], pair, pair) for pair in itertools.pairwise(names)]
     team = complex_team({f"R{name}": [name] for name in names}, {name: range(4) for name in names}, chain)
-    with AceProcess() as solver:
+    with AceProcess(always=True) as solver:
         options = Options(protocol="central", count=True, timeout=1, cache=False)
         assert solve(team, options, solver=solver).verdict is Verdict.UNKNOWN
         assert solver.solve(SMALL, deadline=time.monotonic() + 10).found == 3
@@ -295,7 +295,7 @@ def test_a_judge_out_of_time_leaves_a_lent_solver_fit_for_the_next_task() -> Non
 
 def test_a_process_that_is_killed_is_told_and_leaves_nothing(temporary: Path) -> None:
     before = open_descriptors()
-    with AceProcess() as solver:
+    with AceProcess(always=True) as solver:
         solver.begin(queens(15))
         pid = pid_of(solver)
         wait_for_the_search(temporary)
@@ -310,7 +310,7 @@ def test_a_process_that_is_killed_is_told_and_leaves_nothing(temporary: Path) ->
 
 
 def test_a_process_that_is_killed_before_its_task_is_told_too(temporary: Path) -> None:
-    with AceProcess() as solver:
+    with AceProcess(always=True) as solver:
         solver.start()
         pid = pid_of(solver)
         os.kill(pid, signal.SIGKILL)
@@ -346,7 +346,7 @@ def test_a_parent_that_is_killed_takes_the_process_along(tmp_path: Path, *, sear
 @pytest.mark.usefixtures("no_java")
 @pytest.mark.parametrize("words", [["solve"], ["solve", "--protocol", "central"], ["compile"]], ids=" ".join)
 def test_without_java_one_line_says_what_to_install(rows: Path, words: Sequence[str]) -> None:
-    done = robochoc(*words, rows)
+    done = robochoc(*words, "--ace", rows)
     assert done.returncode == 2
     assert done.stdout == ""
     (line,) = done.stderr.splitlines()
@@ -356,7 +356,7 @@ def test_without_java_one_line_says_what_to_install(rows: Path, words: Sequence[
 @pytest.mark.usefixtures("no_java")
 def test_that_java_is_missing_is_told_however_late_the_task_comes(temporary: Path) -> None:
     """A judge starts the process first, and takes its time to prepare a task."""
-    with AceProcess() as solver:
+    with AceProcess(always=True) as solver:
         solver.start()
         pid = pid_of(solver)
         wait_until(lambda: not alive(pid), "it found some Java")
@@ -367,7 +367,7 @@ def test_that_java_is_missing_is_told_however_late_the_task_comes(temporary: Pat
 
 def test_no_java_is_looked_for_on_the_path(rows: Path, tmp_path: Path) -> None:
     environment = {"PATH": "/nonexistent", "XDG_CACHE_HOME": str(tmp_path / "cache")}
-    command = [PROGRAM, "compile", "--json", str(rows)]
+    command = [PROGRAM, "compile", "--ace", "--json", str(rows)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert '"source":"ace"' in done.stdout

@@ -110,7 +110,7 @@ def cache(tmp_path: Path) -> SolutionCache:
 
 @pytest.fixture(scope="module")
 def solver() -> Iterator[AceProcess]:
-    with AceProcess() as process:
+    with AceProcess(always=True) as process:
         yield process
 
 
@@ -293,7 +293,7 @@ def test_clearing_removes_the_cache_and_nothing_else(cache: SolutionCache) -> No
 def test_the_program_keeps_shows_and_clears_its_cache(rows: Path) -> None:
     home = rows.parent / "home" / "robochoc"
     assert robochoc("cache", "show").stdout == f"{home}: 0 problems, 0 bytes\n"
-    assert sources(rows) == ["ace", "equal", "equal", "equal"]
+    assert sources("--ace", rows) == ["ace", "equal", "equal", "equal"]
     (path,) = home.iterdir()
     assert robochoc("cache", "show").stdout == f"{home}: 1 problem, {path.stat().st_size} bytes\n"
     assert sources(rows) == ["cache", "equal", "equal", "equal"]
@@ -304,17 +304,17 @@ def test_the_program_keeps_shows_and_clears_its_cache(rows: Path) -> None:
 
 
 def test_without_the_cache_it_is_neither_used_nor_filled(rows: Path) -> None:
-    assert sources("--no-cache", rows) == ["ace", "equal", "equal", "equal"]
+    assert sources("--ace", "--no-cache", rows) == ["ace", "equal", "equal", "equal"]
     assert robochoc("solve", "--no-cache", "--runtime", "simulator", rows).returncode == 0
     assert not (rows.parent / "home").exists()
-    assert robochoc("solve", "--runtime", "simulator", rows).returncode == 0
+    assert robochoc("solve", "--ace", "--runtime", "simulator", rows).returncode == 0
     assert len(list((rows.parent / "home" / "robochoc").iterdir())) == 1
-    assert sources("--no-cache", rows) == ["ace", "equal", "equal", "equal"]
+    assert sources("--ace", "--no-cache", rows) == ["ace", "equal", "equal", "equal"]
 
 
 def test_the_program_does_without_a_cache_that_it_cannot_have(rows: Path) -> None:
     home = rows.parent / "home"
     home.write_text("in the way")
-    assert sources(rows) == ["ace", "equal", "equal", "equal"]
+    assert sources("--ace", rows) == ["ace", "equal", "equal", "equal"]
     assert robochoc("cache", "show").stdout == f"{home / 'robochoc'}: 0 problems, 0 bytes\n"
     assert robochoc("cache", "clear").returncode == 0

@@ -33,9 +33,10 @@ from robochoc.solver.merged import identifiers
 from robochoc.solver.symmetry import Symmetry, broken, orbits, symmetries
 
 
-@pytest.fixture(scope="module")
-def solver() -> Iterator[AceProcess]:
-    with AceProcess() as one:
+@pytest.fixture(scope="module", params=[False, True], ids=["enumerated", "by ACE"])
+def solver(request: pytest.FixtureRequest) -> Iterator[AceProcess]:
+    """A solver that enumerates what is small, and one that asks ACE always."""
+    with AceProcess(always=request.param) as one:
         yield one
 
 
@@ -301,4 +302,4 @@ def test_a_search_that_broke_off_proves_nothing(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(AceProcess, "_hear", lambda *_: Solved(found=0, complete=False, solutions=b""))
     for options in ({"count": True}, {"count": False}):
         with pytest.raises(SolverLost, match="stopped before"):
-            Judge().judge(queens3d(7), **options)
+            Judge(always_ace=True).judge(queens3d(7), **options)

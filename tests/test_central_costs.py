@@ -46,9 +46,10 @@ FEWEST = replace(CENTRAL, withdraw=Withdrawal.FEWEST)
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 21))]
 
 
-@pytest.fixture(scope="module")
-def solver() -> Iterator[AceProcess]:
-    with AceProcess() as one:
+@pytest.fixture(scope="module", params=[False, True], ids=["enumerated", "by ACE"])
+def solver(request: pytest.FixtureRequest) -> Iterator[AceProcess]:
+    """A solver that enumerates what is small, and one that asks ACE always."""
+    with AceProcess(always=request.param) as one:
         yield one
 
 
@@ -140,7 +141,7 @@ def test_an_answer_that_does_not_cost_what_the_judge_says_is_none(monkeypatch: p
 def test_a_search_that_broke_off_proves_no_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(AceProcess, "_hear", lambda *_: Solved(found=1, complete=False, solutions=b"\0" * 4 * 6))
     with pytest.raises(SolverLost, match="stopped before"):
-        Judge().judge(coloring(3, 2, 2))
+        Judge(always_ace=True).judge(coloring(3, 2, 2))
 
 
 # --- the fewest aside -------------------------------------------------------------------------------------------------

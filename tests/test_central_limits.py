@@ -32,7 +32,7 @@ HARD = random_csp(30, 8, 0.3, 0, 1, max_cost=100)
 
 @pytest.fixture
 def warm() -> Iterator[AceProcess]:
-    with AceProcess() as one:
+    with AceProcess(always=True) as one:
         solve(coloring(3, 2, 2), CENTRAL, solver=one)
         yield one
 

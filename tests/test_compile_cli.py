@@ -34,7 +34,7 @@ ROBOT_KEYS = {
 LIMITS = {
     "known solutions": (["--local-solutions", 10], "--local-solutions"),
     "solutions": (["--local-solutions", 10, "--no-cache"], "--local-solutions"),
-    "time": (["--local-timeout", 0.001, "--no-cache"], "--local-timeout"),
+    "time": (["--ace", "--local-timeout", 0.001, "--no-cache"], "--local-timeout"),
 }
 
 
@@ -51,7 +51,7 @@ def generated(teams: Path, n: int) -> tuple[Path, str]:
     """The queens of n rows, and what `compile` prints of them the first time."""
     folder = teams / f"rows-{n}"
     assert robochoc("generate", "queens3d", "--n", n, "--robots", "rows", "-o", folder).returncode == 0
-    done = robochoc("compile", folder)
+    done = robochoc("compile", "--ace", folder)
     assert (done.returncode, done.stderr) == (0, "")
     return folder, done.stdout
 

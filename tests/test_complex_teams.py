@@ -92,7 +92,7 @@ def test_domains_and_abt_agree_with_brute_force(batch: int) -> None:
 def test_ace_abt_the_judge_and_brute_force_agree(batch: int) -> None:
     chance = Random(f"judged {batch}")
     seen = Counter[Verdict]()
-    with AceProcess() as solver, Compiler(solver=solver) as compiler:
+    with AceProcess(always=True) as solver, Compiler(solver=solver) as compiler:
         for _ in range(100 if batch else 50):
             team = random_complex_team(chance)
             for robot in team.robots:

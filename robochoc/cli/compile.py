@@ -29,6 +29,7 @@ def compile_team(
     as_json: bool,
     local_solutions: int,
     local_timeout: float,
+    always_ace: bool,
     no_cache: bool,
 ) -> None:
     """Compile the local problem of every robot of the teams at TEAM or below, and show what it comes to.
@@ -43,12 +44,12 @@ def compile_team(
     local      solutions of these
     groups     of local solutions that look alike from outside
     cost       of the cheapest local solution of a group, from the cheapest group to the dearest (DisWCSP)
-    how        ACE: solved now; cached: before; equal: for a robot above; direct: without solver
+    how        direct: by propagation; enumerated: without ACE; ACE: by it; cached: by it, before; equal: for a robot above
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.formats import find_teams
     from robochoc.solver.cache import SolutionCache
 
-    bounds = limits(local_solutions, local_timeout)
+    bounds = limits(local_solutions, local_timeout, always_ace=always_ace)
     cache = None if no_cache else SolutionCache()
     statuses = []
     for path in paths:

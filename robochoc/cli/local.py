@@ -14,7 +14,7 @@ Command = TypeVar("Command", bound=Callable[..., object])
 
 
 def local_options(command: Command) -> Command:
-    """`--local-solutions`, `--local-timeout` and `--no-cache`."""
+    """`--local-solutions`, `--local-timeout`, `--ace` and `--no-cache`."""
     for option in reversed(
         (
             click.option(
@@ -30,7 +30,13 @@ def local_options(command: Command) -> Command:
                 default=60.0,
                 show_default=True,
                 metavar="SECONDS",
-                help="Longest time to compile one robot.",
+                help="Longest time that ACE may take to compile one robot.",
+            ),
+            click.option(
+                "--ace",
+                "always_ace",
+                is_flag=True,
+                help="Have ACE solve small problems too, which are enumerated without it otherwise.",
             ),
             click.option(
                 "--no-cache",
@@ -43,10 +49,10 @@ def local_options(command: Command) -> Command:
     return command
 
 
-def limits(local_solutions: int, local_timeout: float) -> Limits:
+def limits(local_solutions: int, local_timeout: float, *, always_ace: bool) -> Limits:
     """The limits that the options ask for."""
     from robochoc.solver.compile import Limits
 
     if not local_timeout > 0:
         raise click.UsageError("--local-timeout takes a number of seconds")
-    return Limits(local_solutions, local_timeout)
+    return Limits(local_solutions, local_timeout, always_ace)

@@ -45,6 +45,7 @@ def replay(
     local_timeout: float,
     *,
     as_json: bool,
+    always_ace: bool,
     no_cache: bool,
 ) -> int:
     """Drive the same protocol objects through the packets in JOURNAL, and compare all that they say and do.
@@ -60,7 +61,7 @@ def replay(
     means = Means(
         team=read_team(folder) if folder else None,
         settings=protocol_settings(settings),
-        limits=limits(local_solutions, local_timeout),
+        limits=limits(local_solutions, local_timeout, always_ace=always_ace),
         cache=None if no_cache else SolutionCache(),
     )
     with failures_told(journal):

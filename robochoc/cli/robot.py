@@ -90,7 +90,8 @@ def robot(
             proof = identity_of(file.stem, place, identity, token, given["patience"])
             manner = Manner(given["patience"], sniffed=given["sniff"], stage=stage)
             cache = None if given["no_cache"] else SolutionCache()
-            with Compiler(limits(given["local_solutions"], given["local_timeout"]), cache) as compiler:
+            bounds = limits(given["local_solutions"], given["local_timeout"], always_ace=given["always_ace"])
+            with Compiler(bounds, cache) as compiler:
                 ending = join(itself, place, proof, manner, compiler)
             if ending.failed:
                 raise Failure(LOST, f"{file.stem}: {ending.why}")

@@ -230,7 +230,9 @@ def solve(
     with failures_told("--channel"):
         channel = channel_for(settings.pop("channel"))
     options = Options(
-        local=limits(settings.pop("local_solutions"), settings.pop("local_timeout")),
+        local=limits(
+            settings.pop("local_solutions"), settings.pop("local_timeout"), always_ace=settings.pop("always_ace")
+        ),
         cache=not settings.pop("no_cache"),
         settings=protocol_settings(settings.pop("settings_given")),
         runtime=Runtime(settings.pop("runtime")),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 from lxml import etree
 
 from robochoc.problem import Team
@@ -9,18 +11,18 @@ from robochoc.solver.ace import AceProcess
 from robochoc.solver.merged import identifiers, merged
 
 
-def xcsp3(team: Team) -> bytes:
+def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
     """The merged problem of `team` as an XCSP3-core document: tables over the true values, and allDifferent.
 
     Variables get names that XCSP3 allows; the attribute `note` says whose variable each is. With costs it is a COP:
-    what soft constraints charge are variables too, and their sum is to be minimised. Raises `Unsupported`,
-    and `SolverLost` when pycsp3, which writes it in a process of its own, fails.
+    what soft constraints charge are variables too, and their sum is to be minimised. Whoever exports many teams may
+    lend a `solver`. Raises `Unsupported`, and `SolverLost` when pycsp3, which writes it in a process of its own, fails.
     """
     network, costs = merged(team)
     names = list(team.variables)
     charged = [f"cost{number}" for number in range(1, len(costs) + 1)]
-    with AceProcess(java=False) as solver:
-        document = solver.export(network, identifiers([*names, *charged]), costs)
+    with nullcontext(solver) if solver else AceProcess(java=False) as writer:
+        document = writer.export(network, identifiers([*names, *charged]), costs)
     root = etree.fromstring(document, etree.XMLParser(huge_tree=True, resolve_entities=False, no_network=True))
     for element, name in zip(root.iterfind("variables/var"), names, strict=False):
         element.set("note", f"{name} of {team.owner[name]}")

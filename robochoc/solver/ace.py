@@ -1,13 +1,12 @@
 """ACE, in a process of its own: tasks go out, solutions come back, and whatever dies is noticed.
 
 ACE (https://github.com/xcsp3team/ace, bundled with pycsp3) is a Java program. One process with one warm JVM serves
-all tasks of a run; it is started by the first of them. What runs there is `solver/ace_process.py`.
+all tasks of a run; it is started by the first that is not small. What runs there is `solver/ace_process.py`; what is
+small is enumerated here (`solver/enumeration.py`).
 """
 
 from __future__ import annotations
 
-import itertools
-import math
 import os
 import select
 import shutil
@@ -18,9 +17,8 @@ import sys
 import tempfile
 import time
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -42,7 +40,9 @@ from robochoc.solver.ace_words import (
     codes_of,
 )
 from robochoc.solver.encoding import Codes, Network
+from robochoc.solver.enumeration import STEPS_BEFORE_ACE, STEPS_EACH, Budget, OutOfSteps, cheapest, enumerated
 from robochoc.solver.propagation import propagated
+from robochoc.solver.question import Answer, Means, Question
 
 CHUNK = 1 << 20
 LAST_WORDS_S = 1.0
@@ -66,33 +66,24 @@ class SolverTimeout(Exception):  # noqa: N818 - a limit that was reached
         self.best = best
 
 
-@dataclass(frozen=True)
-class Answer:
-    """The number of solutions, whether there are no others, and (unless only counted) the solutions.
-
-    `asked` is false when propagation alone had the answer.
-    """
-
-    found: int
-    complete: bool
-    solutions: tuple[Codes, ...]
-    asked: bool = True
-
-
 class AceProcess:
-    """A solver's process, started by the first task. Closed, or left as a context, it is gone, with all its files.
+    """A solver's process, started by the first task that is not small; small ones are enumerated without it.
 
-    Without `java` it can only `export`.
+    With `always`, small ones go to ACE as well. Closed, or left as a context, the process is gone, with all its
+    files. Without `java` it can only `export`.
     """
 
-    def __init__(self, *, java: bool = True) -> None:
+    def __init__(self, *, java: bool = True, always: bool = False) -> None:
         self._java = java
+        self._always = always
+        self._steps_left = STEPS_BEFORE_ACE
+        self._enumerated: Answer | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._folder: Path | None = None
         self._socket: socket.socket | None = None
         self._lifeline = -1
         self._buffer = bytearray()
-        self._question: _Question | None = None
+        self._question: Question | None = None
         self._tasks = 0
         self._searching = False
         self._decoder = msgspec.msgpack.Decoder(FromSolver)
@@ -111,7 +102,7 @@ class AceProcess:
         return self._process.pid if self._process else None
 
     def start(self) -> None:
-        """Start the process, if there is none, so that it is warm when the first task comes."""
+        """Start the process, if there is none, so that it is warm when a task comes for it."""
         if self._socket is None:
             self._start()
 
@@ -150,11 +141,13 @@ class AceProcess:
         """Give the solver a task, whose `answer` is to be asked for before the next. Raises `SolverLost`.
 
         With `costs`, the answer is one solution, for which the codes of the variables at these places sum up to the
-        least. False when there was nothing left to ask, and so nothing to wait for.
+        least. False when there was nothing left to ask ACE, and so nothing to wait for: propagation had the answer,
+        or the network was enumerated here.
         """
         limit = 1 if costs else limit
-        self._question = question = _Question.of(propagated(network), limit, count_only=count_only, costs=costs)
-        if question.trivial:
+        self._question = question = Question.of(propagated(network), limit, count_only=count_only, costs=costs)
+        self._enumerated = None if question.trivial or self._always else self._small(question)
+        if question.trivial or self._enumerated:
             return False
         if self._tasks == TASKS:
             self.close()
@@ -171,7 +164,9 @@ class AceProcess:
         if question is None:
             raise ValueError("the solver has no task")
         if question.trivial:
-            return question.answered(1, complete=True, solutions=[()])
+            return question.answered(1, complete=True, solutions=[()], means=Means.PROPAGATION)
+        if self._enumerated:
+            return self._enumerated
         word = self._hear(deadline)
         if not isinstance(word, Solved):
             raise SolverLost(f"the solver answered with a {type(word).__name__}")
@@ -179,7 +174,7 @@ class AceProcess:
             raise SolverLost("the constraint solver stopped before it had seen everything")
         numbers = array("i")
         numbers.frombytes(word.solutions)
-        return question.answered(word.found, complete=word.complete, solutions=question.rows(numbers))
+        return question.answered(word.found, complete=word.complete, solutions=question.rows(numbers), means=Means.ACE)
 
     def give_up(self) -> SolverTimeout:
         """End the process: there is no time left for the task in hand. What it has found so far goes with it."""
@@ -191,7 +186,8 @@ class AceProcess:
         if question is None or b"</values>" not in said:
             return SolverTimeout()
         width = len(question.asked.domains)
-        best = question.answered(1, complete=False, solutions=question.rows(codes_of(said, width)[-width:]))
+        rows = question.rows(codes_of(said, width)[-width:])
+        best = question.answered(1, complete=False, solutions=rows, means=Means.ACE)
         return SolverTimeout(best.solutions[0])
 
     def export(self, network: Network, names: Sequence[str], costs: Codes = ()) -> bytes:
@@ -224,6 +220,26 @@ class AceProcess:
         self._buffer.clear()
         self._tasks = 0
         self._searching = False
+
+    def _small(self, question: Question) -> Answer | None:
+        """The answer by enumeration; None when it takes too many steps.
+
+        What it takes is at most what it takes to ask ACE, where that runs, and to start it, where it does not.
+        """
+        budget = Budget(STEPS_EACH + (self._steps_left if self._socket is None else 0))
+        try:
+            if question.costs:
+                best = cheapest(question.asked, budget, question.costs)
+                found, complete, solutions = int(best is not None), True, [best] if best else []
+            else:
+                found, complete, solutions = enumerated(
+                    question.asked, budget, limit=question.limit, count_only=question.count_only
+                )
+        except OutOfSteps:
+            return None
+        finally:
+            self._steps_left -= max(0, budget.used - STEPS_EACH)
+        return question.answered(found, complete=complete, solutions=solutions, means=Means.ENUMERATION)
 
     # The process
 
@@ -312,61 +328,6 @@ class AceProcess:
         if status is not None and status < 0:
             fate = f"was killed by {signal.Signals(-status).name}"
         raise SolverLost(f"the constraint solver's process {fate}" + (f" ({said})" if said else ""))
-
-
-@dataclass(frozen=True)
-class _Question:
-    """What of a network has to be asked, and how the answer for the whole follows.
-
-    `asked` is the network of the variables at `places`: those that a table looks at after propagation. The others
-    are `free`: every combination of their values goes with every solution.
-    """
-
-    asked: Network
-    places: Codes
-    free: dict[int, Codes]
-    limit: int | None
-    count_only: bool
-    costs: Codes
-    """Of the variables at `places`, those whose codes are minimised. The `free` ones' least come first of all."""
-
-    @property
-    def trivial(self) -> bool:
-        """Whether nothing has to be asked: no variable depends on another any more."""
-        return not self.places
-
-    @classmethod
-    def of(cls, network: Network, limit: int | None, *, count_only: bool, costs: Codes) -> Self:
-        bound = {place for table in network.tables for place in table.scope}
-        bound.update(place for scope in network.different for place in scope)
-        places = tuple(sorted(bound))
-        at = {place: index for index, place in enumerate(places)}
-        asked = Network(
-            tuple(network.domains[place] for place in places),
-            tuple(replace(table, scope=tuple([at[place] for place in table.scope])) for table in network.tables),
-            tuple(tuple([at[place] for place in scope]) for scope in network.different),
-        )
-        free = {place: domain for place, domain in enumerate(network.domains) if place not in bound}
-        return cls(asked, places, free, limit, count_only, tuple([at[place] for place in costs if place in at]))
-
-    def rows(self, numbers: Sequence[int]) -> list[Codes]:
-        """The solutions of `asked` whose codes stand one after the other in `numbers`."""
-        width = len(self.asked.domains)
-        return [tuple(numbers[start : start + width]) for start in range(0, len(numbers), width)]
-
-    def answered(self, found: int, *, complete: bool, solutions: Sequence[Codes]) -> Answer:
-        """The answer for the whole, from that for `asked`."""
-        total = found * math.prod(len(domain) for domain in self.free.values())
-        wanted = total if self.limit is None else min(total, self.limit)
-        whole = () if self.count_only else tuple(itertools.islice(self._combined(solutions), wanted))
-        return Answer(wanted, complete and wanted == total, whole, asked=not self.trivial)
-
-    def _combined(self, solutions: Sequence[Codes]) -> Iterator[Codes]:
-        order = sorted(range(len(self.places) + len(self.free)), key=[*self.places, *self.free].__getitem__)
-        for solution in solutions:
-            for rest in itertools.product(*self.free.values()):
-                flat = (*solution, *rest)
-                yield tuple([flat[index] for index in order])
 
 
 def _task(network: Network, limit: int | None, *, count_only: bool, strategy: Strategy) -> Task:

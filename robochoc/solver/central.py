@@ -1,4 +1,4 @@
-"""The central judge: a whole team's problem as one, decided, counted or minimised by ACE.
+"""The central judge: a whole team's problem as one, decided, counted or minimised; by ACE, if it is not small.
 
 It sees every file, which no robot does. What it is for: to hold a team's verdict against an independent one, and to
 say how many solutions there are. Robots that share nothing are solved apart; what is left goes to ACE with cliques
@@ -16,12 +16,13 @@ from dataclasses import dataclass, field
 
 from robochoc.outcome import Verdict
 from robochoc.problem import Kind, Team
-from robochoc.solver.ace import AceProcess, Answer, SolverTimeout
+from robochoc.solver.ace import AceProcess, SolverTimeout
 from robochoc.solver.ace_words import Strategy
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.cliques import strengthened
 from robochoc.solver.encoding import Codes, Component, Network, components
 from robochoc.solver.priced import Priced, charged_anyway, priced, with_robots_aside
+from robochoc.solver.question import Answer, Means
 from robochoc.solver.symmetry import broken, orbits, symmetries
 
 LONGEST_TABLE = 20_000
@@ -30,6 +31,8 @@ TABLE_PATIENCE_S = 20.0
 """So long, all in all, may it take to make tables of cliques."""
 MOST_ORBITS = 20_000
 """So many solutions up to symmetry are looked at one by one to be counted; of more only the number is asked."""
+MANY_ROWS = 100_000
+"""For a team whose tables have so many rows ACE is started at once, while the first task is still made ready."""
 HEDGE_S = 5.0
 """After so long without an answer the other strategy is tried beside."""
 _TICK_S = 0.2
@@ -64,9 +67,10 @@ class _Wanted:
 
 
 class Judge:
-    """Decides teams by ACE. `deadline` is on the monotonic clock; `progress` is called while it lasts.
+    """Decides teams, small ones by enumeration, others by ACE (with `always_ace` all).
 
-    A `solver` that is warm may be lent; it is left running.
+    `deadline` is on the monotonic clock; `progress` is called while ACE works. A `solver` that is warm may be lent;
+    it is left running, and says itself whether small tasks go to ACE.
     """
 
     def __init__(
@@ -75,8 +79,11 @@ class Judge:
         deadline: float | None = None,
         progress: Callable[[], None] | None = None,
         solver: AceProcess | None = None,
+        *,
+        always_ace: bool = False,
     ) -> None:
         self._solver = solver
+        self._always_ace = always_ace
         self._cache = cache
         self._deadline = deadline
         self._progress = progress
@@ -94,11 +101,11 @@ class Judge:
         if team.kind is Kind.DISWCSP and not count:
             return self._minimum(team, priced(team.variables.values(), list(team.constraints())))
         with ExitStack() as processes:
-            ace = self._solver or processes.enter_context(AceProcess())
-            spare = processes.enter_context(AceProcess())
-            if any(len(constraint.variables) > 1 for constraint in team.constraints()):
-                ace.start()
+            ace = self._solver or processes.enter_context(AceProcess(always=self._always_ace))
+            spare = processes.enter_context(AceProcess(always=True))
             parts = components(team.variables.values(), team.constraints())
+            if sum(len(table.rows) for part in parts for table in part.network.tables) > MANY_ROWS:
+                ace.start()
             parts.sort(key=lambda part: math.prod(len(domain) for domain in part.network.domains))
             found = []
             for part in parts:
@@ -122,7 +129,7 @@ class Judge:
         assignment: dict[str, int] | None = {}
         proven = True
         with ExitStack() as processes:
-            ace = self._solver or processes.enter_context(AceProcess())
+            ace = self._solver or processes.enter_context(AceProcess(always=self._always_ace))
             for part in parts:
                 codes, optimal = self._cheapest(part, ace)
                 if codes is None and optimal:
@@ -212,7 +219,7 @@ class Judge:
             return None
         if not answer.complete or answer.found > LONGEST_TABLE:
             return None
-        if self._cache:
+        if self._cache and answer.means is Means.ACE:
             self._cache.put(clique, answer.solutions)
         return answer.solutions
 

@@ -1,4 +1,4 @@
-"""Compiles the domains of a team's robots: what private constraints connect goes to ACE, once for equal problems."""
+"""Compiles the domains of a team's robots: what private constraints connect is enumerated, or goes to ACE."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from types import TracebackType
 from typing import Self
 
 from robochoc.problem import Robot
-from robochoc.solver.ace import AceProcess, Answer, SolverLost, SolverTimeout
+from robochoc.solver.ace import AceProcess, SolverLost, SolverTimeout
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.domain import MOST_SOLUTIONS, CompiledDomain, TooManySolutions, compiled_domain
 from robochoc.solver.encoding import Codes, Network, Unsupported
+from robochoc.solver.question import Answer, Means
 
 PATIENCE_S = 60.0
 """How long the compilation of one robot may take, unless more is asked for."""
@@ -21,10 +22,14 @@ PATIENCE_S = 60.0
 
 @dataclass(frozen=True)
 class Limits:
-    """What compiling one robot may come to: a number of local solutions, and seconds."""
+    """What compiling one robot may come to: a number of local solutions, and seconds of ACE's time.
+
+    With `always_ace`, ACE solves small local problems too.
+    """
 
     solutions: int = MOST_SOLUTIONS
     time_s: float = PATIENCE_S
+    always_ace: bool = False
 
 
 class Source(StrEnum):
@@ -33,7 +38,11 @@ class Source(StrEnum):
     DIRECT = "direct"
     EQUAL = "equal"
     CACHE = "cache"
+    ENUMERATED = "enumerated"
     ACE = "ace"
+
+
+_SOURCES = {Means.PROPAGATION: Source.DIRECT, Means.ENUMERATION: Source.ENUMERATED, Means.ACE: Source.ACE}
 
 
 class CompileTimeout(Exception):  # noqa: N818 - a limit that was reached
@@ -83,7 +92,7 @@ class Compiler:
         self._limits = limits or Limits()
         self._cache = cache
         self._deadline = deadline
-        self._ace = solver or AceProcess()
+        self._ace = solver or AceProcess(always=self._limits.always_ace)
         self._lent = solver is not None
         self._known: dict[Network, tuple[Codes, ...]] = {}
         self._too_slow: set[Network] = set()
@@ -128,8 +137,8 @@ class Compiler:
             source = Source.CACHE
         if known is None:
             answer = self._solved(robot, network, limit)
-            known, source = answer.solutions, Source.ACE if answer.asked else Source.DIRECT
-            if self._cache is not None and answer.complete:
+            known, source = answer.solutions, _SOURCES[answer.means]
+            if self._cache is not None and answer.complete and source is Source.ACE:
                 self._cache.put(network, known)
         self._known[network] = known
         if len(known) > self._limits.solutions:

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from robochoc.problem import Constraint, Kind, Team
 from robochoc.solver.cliques import strengthened
 from robochoc.solver.encoding import Codes, Component, Network, Table, Unsupported, components, is_soft
 from robochoc.solver.priced import HIGHEST, charged_anyway, charges_on
+from robochoc.solver.propagation import propagated
+
+LEAST_VALUE, GREATEST_VALUE = -(2**31) + 10, 2**31 - 11
+"""Values that ACE 2.6 reads: of 32 bits, but for a few that it keeps for itself (tried with ACE, one by one)."""
+WIDEST = 2**31 - 1
+"""So far apart may the values of one domain be; ACE counts what is between them, too."""
 
 
 def merged(team: Team) -> tuple[Network, Codes]:
@@ -18,7 +24,7 @@ def merged(team: Team) -> tuple[Network, Codes]:
     Unary constraints are folded into domains, cliques of `ne` are said outright. What soft constraints charge are
     variables too, after the others: those at the places that are returned, whose sum is what the problem costs.
     Raises `Unsupported` for a team that changes over time, and when a constraint is too large to be a table, or
-    charges too much.
+    charges too much, or a value is none that XCSP3's solvers take.
     """
     if team.dynamic:
         raise Unsupported(f"{team.name} has a scenario.xml; an XCSP3 file holds one problem, not its changes")
@@ -28,14 +34,13 @@ def merged(team: Team) -> tuple[Network, Codes]:
     different: list[tuple[int, ...]] = []
     soft = [constraint for constraint in team.constraints() if is_soft(constraint) and constraint.variables]
     charges: list[Table] = []
+    impossible = False
     for part in components(team.variables.values(), team.constraints(), [one.variables for one in soft]):
         places = [place[name] for name in part.names]
         said = strengthened(part.network, lambda _: None)
         for name, codes in zip(part.names, said.domains, strict=True):
-            if codes:
-                domains[name] = part.decoded(codes)
-            else:  # no format has an empty domain: forbid each value of the one it had
-                tables.append(Table((place[name],), allowed=False, rows=tuple((value,) for value in domains[name])))
+            domains[name] = part.decoded(codes) or domains[name]  # no format has an empty domain
+        impossible = impossible or part.network.impossible
         tables += [_over_values(table, part, places) for table in said.tables]
         different += [tuple([places[member] for member in scope]) for scope in said.different]
         if not part.network.impossible:
@@ -49,7 +54,40 @@ def merged(team: Team) -> tuple[Network, Codes]:
         raise Unsupported(f"{team.name} has costs that add up to more than {HIGHEST:,}, too much for XCSP3's solvers")
     costs = tuple(range(len(domains), len(domains) + len(paid)))
     tables += [replace(table, scope=(*table.scope, cost)) for table, cost in zip(charges, costs, strict=False)]
-    return Network((*domains.values(), *paid), tuple(tables), tuple(different)), costs
+    _refuse_far_values(team, domains)
+    network = Network((*domains.values(), *paid), tuple(tables), tuple(different))
+    return _readable(network, impossible=impossible), costs
+
+
+def _readable(network: Network, *, impossible: bool) -> Network:
+    """Return `network` such that ACE takes it: with the same variables, domains and solutions.
+
+    ACE 2.6 dies where its first propagation empties a table, miscounts where forbidden tuples meet a domain of one
+    value (see `solver/propagation.py`), refuses an instance without constraints, and leaves out variables that stand
+    in none.
+    """
+    if impossible or (safe := propagated(network)).impossible:
+        nothing = tuple([(value,) for value in network.domains[0]])
+        network = Network(network.domains, (Table((0,), allowed=False, rows=nothing),))
+    elif any(not table.allowed for table in network.tables):
+        network = safe
+    bound = {place for table in network.tables for place in table.scope}.union(*network.different)
+    free = [place for place in range(len(network.domains)) if place not in bound]
+    anything = [Table((place,), allowed=True, rows=tuple([(v,) for v in network.domains[place]])) for place in free]
+    return replace(network, tables=(*network.tables, *anything))
+
+
+def _refuse_far_values(team: Team, domains: Mapping[str, Codes]) -> None:
+    """Raise `Unsupported` when values of `domains` are none that ACE reads."""
+    for name, values in domains.items():
+        far = [f"{value:,}" for value in (values[0], values[-1]) if not LEAST_VALUE <= value <= GREATEST_VALUE]
+        if far or values[-1] - values[0] > WIDEST:
+            told = far[0] if far else f"{values[0]:,} and {values[-1]:,}"
+            raise Unsupported(
+                f"{team.name} has a variable {name} with the value {told}; XCSP3's solvers compute with 32 bits: ACE"
+                f" takes values from {LEAST_VALUE:,} to {GREATEST_VALUE:,}, and in one domain no further apart than"
+                f" {WIDEST:,}; shift the problem's values, or scale them"
+            )
 
 
 def _charges(part: Component, places: Sequence[int], soft: Sequence[Constraint]) -> Iterator[Table]:
@@ -76,7 +114,4 @@ def identifiers(names: Sequence[str]) -> list[str]:
 
 def _over_values(table: Table, part: Component, places: Sequence[int]) -> Table:
     scope = tuple([places[member] for member in table.scope])
-    if table.allowed and not table.rows:  # nothing is allowed: all is forbidden
-        rows = tuple(itertools.product(*(part.network.domains[member] for member in table.scope)))
-        table = replace(table, allowed=False, rows=rows)
     return Table(scope, table.allowed, tuple(part.decoded(row) for row in table.rows))

@@ -1,0 +1,273 @@
+"""Enumerates small networks in this process, so that no Java has to be started for them.
+
+A depth-first search that keeps every table arc consistent: a table's rows are the bits of one integer, those of a
+value another, and what is left of the table is their conjunction (Demeulenaere, Hartert, Lecoutre, Perez, Perron,
+Regin and Schaus, "Compact-Table", CP 2016). The variable with the fewest values comes next. Where costs are
+minimised, it is branch and bound: what the cost variables come to at least is the bound.
+
+How much may be done is counted in steps, never in seconds: the same network is settled here, or is not, on every
+machine. Nobody predicts it: the search begins, and breaks off when the steps are used up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+from robochoc.solver.encoding import Codes, Network, Table
+
+STEPS_EACH = 100_000
+"""So many steps a task may always take: about as long as ACE takes where it runs already."""
+STEPS_BEFORE_ACE = 1_500_000
+"""So many steps more all tasks may take together before ACE is started: about as long as it takes to start."""
+
+ROWS_A_STEP = 256
+"""A step looks at one value in a table of so many rows; in a longer table that takes more steps."""
+PLACES_A_STEP = 4
+"""At every node a step copies what is left of so many domains and tables. That bounds the memory, too."""
+
+
+class OutOfSteps(Exception):  # noqa: N818 - a limit that was reached
+    """The steps are used up, and the search has not seen everything."""
+
+
+class Budget:
+    """A number of steps, of which `used` are used up."""
+
+    def __init__(self, steps: int) -> None:
+        self.steps = steps
+        self.used = 0
+
+    def spend(self, steps: int) -> None:
+        """Use `steps` more. Raises `OutOfSteps` when there are not so many left; none are left then."""
+        self.used += steps
+        if self.used > self.steps:
+            self.used = self.steps
+            raise OutOfSteps
+
+
+class Found(NamedTuple):
+    """How many solutions there are, whether there are no others, and (unless only counted) which, in order."""
+
+    count: int
+    complete: bool
+    solutions: list[Codes]
+
+
+def enumerated(network: Network, budget: Budget, *, limit: int | None, count_only: bool) -> Found:
+    """Return the solutions of `network`, up to `limit`, in lexicographic order.
+
+    `network` is propagated. Raises `OutOfSteps` when the budget does not suffice.
+    """
+    search = _Search(network, budget)
+    solutions: list[Codes] = []
+    count = 0
+    for found in search.solutions():
+        several = found if limit is None else found[: limit + 1 - count]
+        count += len(several)
+        if not count_only:
+            solutions += several
+        if limit is not None and count > limit:
+            return Found(limit, complete=False, solutions=sorted(solutions)[:limit])
+        if count == limit and limit == 1:  # whoever asks for one does not ask whether it is alone
+            return Found(1, complete=False, solutions=solutions)
+    return Found(count, complete=True, solutions=sorted(solutions))
+
+
+def cheapest(network: Network, budget: Budget, costs: Codes) -> Codes | None:
+    """Return a solution of `network` in which the codes at the places `costs` sum up to the least, if there is one.
+
+    `network` is propagated. Raises `OutOfSteps` when the budget does not suffice.
+    """
+    return _Search(network, budget).cheapest(costs)
+
+
+class _Search:
+    """One network, made ready: bit i of a domain stands for its i-th code, bit i of a table for its i-th row."""
+
+    def __init__(self, network: Network, budget: Budget) -> None:
+        self._budget = budget
+        self._code = [{1 << index: code for index, code in enumerate(domain)} for domain in network.domains]
+        self._bit = [{code: 1 << index for index, code in enumerate(domain)} for domain in network.domains]
+        self._looking: list[list[tuple[int, int]]] = [[] for _ in network.domains]
+        self._apart: list[set[int]] = [set() for _ in network.domains]
+        self._scopes = [table.scope for table in network.tables]
+        self._weights = [1 + len(table.rows) // ROWS_A_STEP for table in network.tables]
+        made: dict[tuple[int, tuple[Codes, ...]], list[dict[int, int]]] = {}
+        self._rows: list[list[dict[int, int]]] = []
+        for number, table in enumerate(network.tables):
+            for index, place in enumerate(table.scope):
+                self._looking[place].append((number, index))
+            alike = id(table.rows), tuple([network.domains[place] for place in table.scope])
+            if alike not in made:
+                made[alike] = self._by_value(table)
+            self._rows.append(made[alike])
+        for scope in network.different:
+            for place in scope:
+                self._apart[place].update(other for other in scope if other != place)
+        self._node_steps = 1 + (len(network.domains) + len(network.tables)) // PLACES_A_STEP
+        self._domains = [(1 << len(domain)) - 1 for domain in network.domains]
+        self._left = [(1 << len(table.rows)) - 1 for table in network.tables]
+
+    def _by_value(self, table: Table) -> list[dict[int, int]]:
+        """For each variable of `table` and each bit of its domain, the rows that have the value."""
+        if not table.allowed:  # propagation leaves only those of which more is allowed than anybody should list
+            self._budget.spend(self._budget.steps + 1)
+        weight = 1 + len(table.rows) // ROWS_A_STEP
+        self._budget.spend(sum(len(table.rows) + weight * len(self._bit[place]) for place in table.scope))
+        found = []
+        for index, place in enumerate(table.scope):
+            size = (len(table.rows) + 7) // 8
+            rows = {code: bytearray(size) for code in self._bit[place]}
+            for number, row in enumerate(table.rows):
+                rows[row[index]][number >> 3] |= 1 << (number & 7)
+            found.append({self._bit[place][code]: int.from_bytes(bits, "little") for code, bits in rows.items()})
+        return found
+
+    def solutions(self) -> Iterator[list[Codes]]:
+        """Yield all solutions, several at a time. Raises `OutOfSteps`."""
+        place, bit = 0, self._domains[0]
+        stack = [(self._domains, self._left, place, bit)]
+        while stack:
+            domains, left, place, bit = stack.pop()
+            domains, left = [*domains], [*left]  # the node's siblings have the same
+            domains[place] = bit
+            if not self._propagates(domains, left, [place]):
+                continue
+            place, others = self._next(domains)
+            bits = [*_bits(domains[place])]
+            if others:
+                stack += [(domains, left, place, bit) for bit in reversed(bits)]
+            else:  # one variable is left at most, and every value that it has agrees with all others
+                self._budget.spend(len(domains) * len(bits))
+                yield [self._codes(_with(domains, place, bit)) for bit in bits]
+
+    def cheapest(self, costs: Codes) -> Codes | None:
+        """Return the first of the cheapest solutions. Raises `OutOfSteps`."""
+        best: Codes | None = None
+        least: int | None = None
+        stack = [(self._domains, self._left)]
+        while stack:
+            domains, left = stack.pop()
+            if least is not None and not self._below(domains, left, costs, least):
+                continue
+            place, _ = self._next(domains)
+            if _is_one(domains[place]):
+                best, least = self._codes(domains), self._bound(domains, costs)
+                continue
+            children = [(_with(domains, place, bit), [*left]) for bit in _bits(domains[place])]
+            alive = [child for child in children if self._propagates(*child, [place])]
+            alive.sort(key=lambda child: self._bound(child[0], costs), reverse=True)
+            stack += alive
+        return best
+
+    def _below(self, domains: list[int], left: list[int], costs: Codes, least: int) -> bool:
+        """Whether something may cost less than `least`; what cannot is taken from the domains of the costs."""
+        spare = least - 1 - self._bound(domains, costs)
+        if spare < 0:
+            return False
+        shrunk = []
+        for place in costs:
+            domain, codes = domains[place], self._code[place]
+            most = codes[domain & -domain] + spare
+            high = domain
+            while high and codes[1 << (high.bit_length() - 1)] > most:
+                high ^= 1 << (high.bit_length() - 1)
+            if high != domain:
+                domains[place] = high
+                shrunk.append(place)
+        return self._propagates(domains, left, shrunk) and self._bound(domains, costs) < least
+
+    def _bound(self, domains: Sequence[int], costs: Codes) -> int:
+        """What the variables at `costs` come to at least."""
+        return sum([self._code[place][domains[place] & -domains[place]] for place in costs])
+
+    def _next(self, domains: Sequence[int]) -> tuple[int, bool]:
+        """The variable with the fewest values, but more than one (the first, if none has); whether there are others."""
+        best, fewest, found = 0, 0, 0
+        for place, domain in enumerate(domains):
+            if domain & (domain - 1):
+                found += 1
+                size = domain.bit_count()
+                if found == 1 or size < fewest:
+                    best, fewest = place, size
+        return best, found > 1
+
+    def _codes(self, domains: Sequence[int]) -> Codes:
+        return tuple([codes[domain] for codes, domain in zip(self._code, domains, strict=True)])
+
+    def _propagates(self, domains: list[int], left: list[int], shrunk: Iterable[int]) -> bool:
+        """Take away what has no support any more, where the domains at `shrunk` are smaller; False: one is empty."""
+        self._budget.spend(self._node_steps)
+        waiting = dict.fromkeys(shrunk)
+        while waiting:
+            place, _ = waiting.popitem()
+            if _is_one(domains[place]) and not self._told(domains, place, waiting):
+                return False
+            for number, index in self._looking[place]:
+                if not self._revised(domains, left, number, index, waiting):
+                    return False
+        return True
+
+    def _told(self, domains: list[int], place: int, waiting: dict[int, None]) -> bool:
+        """Take the one value of the variable at `place` from those that differ from it."""
+        code = self._code[place][domains[place]]
+        for other in self._apart[place]:
+            smaller = domains[other] & ~self._bit[other].get(code, 0)
+            if smaller != domains[other]:
+                if not smaller:
+                    return False
+                domains[other] = smaller
+                waiting[other] = None
+        return True
+
+    def _revised(self, domains: list[int], left: list[int], number: int, index: int, waiting: dict[int, None]) -> bool:
+        """Take from table `number` what its variable `index` has lost, and from the others what that supported."""
+        rows, scope = self._rows[number], self._scopes[number]
+        kept, steps = 0, 0
+        values, domain = rows[index], domains[scope[index]]
+        while domain:
+            bit = domain & -domain
+            domain ^= bit
+            kept |= values[bit]
+            steps += 1
+        kept &= left[number]
+        if kept != left[number]:
+            left[number] = kept
+            for other, place in enumerate(scope):
+                if other == index:
+                    continue
+                domain = smaller = domains[place]
+                values = rows[other]
+                while domain:
+                    bit = domain & -domain
+                    domain ^= bit
+                    steps += 1
+                    if not values[bit] & kept:
+                        smaller ^= bit
+                if smaller != domains[place]:
+                    if not smaller:
+                        return False
+                    domains[place] = smaller
+                    waiting[place] = None
+        self._budget.spend(steps * self._weights[number])
+        return True
+
+
+def _is_one(domain: int) -> bool:
+    return not domain & (domain - 1)
+
+
+def _bits(domain: int) -> Iterator[int]:
+    """Yield the bits of `domain`, the lowest first."""
+    while domain:
+        bit = domain & -domain
+        domain ^= bit
+        yield bit
+
+
+def _with(domains: Sequence[int], place: int, bit: int) -> list[int]:
+    """Return `domains` with one value for the variable at `place`."""
+    chosen = [*domains]
+    chosen[place] = bit
+    return chosen
