@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from robochoc.defaults import suits
 from robochoc.epochs import Field
-from robochoc.formats import read_robot, read_team
+from robochoc.formats import check_team, read_robot, read_team
 from robochoc.observers.events import Observer
 from robochoc.options import Options, Runtime, Withdrawal
 from robochoc.orders import Order
@@ -35,9 +35,12 @@ _MASTER, _AGENT = "Master", "Agent"
 
 @dataclass(frozen=True)
 class Problem:
-    """A team that was read and found valid: `team` is its data."""
+    """A valid team: `team` is its data. Raises `InvalidInput` for one that was built in Python and is not."""
 
     team: Team
+
+    def __post_init__(self) -> None:
+        check_team(self.team)
 
     def solve(
         self,

@@ -20,6 +20,7 @@ from robochoc.communication.simulator import Simulation
 from robochoc.communication.timed import Timed
 from robochoc.defaults import FIRST_FIT, MINIMISES
 from robochoc.epochs import Announcer, Field, Journey, Opening, Played
+from robochoc.formats import check_team
 from robochoc.observers.checker import has_local_solution
 from robochoc.observers.events import Observer
 from robochoc.observers.objective import aside_cost
@@ -57,9 +58,11 @@ def solve(
 
     Who solves many teams may lend a `solver` that stays warm between them. A `field` is told of each epoch's answer,
     and says what happens next: the problem changes over time. When a limit is reached, the verdict is
-    `unknown`. Raises `UnknownProtocol`, `Unsupported`, `RobotsLost` (processes), `CompileFailed` and `SolverLost`
-    (the constraint solver), `SolverMissing`, and `Refuted` when a second opinion does not agree.
+    `unknown`. Raises `InvalidInput` for a team that is not valid, wherever it comes from; `UnknownProtocol`,
+    `Unsupported`, `RobotsLost` (processes), `CompileFailed` and `SolverLost` (the constraint solver), `SolverMissing`,
+    and `Refuted` when a second opinion does not agree.
     """
+    check_team(team)
     try:
         if field:
             refuse_field(team, options)

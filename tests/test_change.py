@@ -175,7 +175,7 @@ def test_the_last_value_may_go() -> None:
 
 def test_values_that_cannot_go_or_come() -> None:
     team = team_of({"A": (1, 2, 4)}, [])
-    assert refused(team, RemoveValue("A", 3)).hint == "its domain is 1 2 4"
+    assert refused(team, RemoveValue("A", 3)).hint == "its domain is 1..2 4"
     assert refused(team, *(RemoveValue("A", value) for value in (1, 2, 4, 4))).hint == "its domain is empty"
     assert "already" in refused(team, AddValue("A", 4)).message
     assert refused(team, AddValue("X", 4)).missing == "X"

@@ -105,7 +105,7 @@ def test_copies_in_other_words_are_checked_and_dropped() -> None:
     assert child.constraints == ()
     assert len(team["A2"].shared) == 3
     assert len(list(team.constraints())) == 5
-    assert {constraint.model for constraint in team["A1"].private} == {None}
+    assert {constraint.model for constraint in team["A1"].private} == {Model.TKC}  # as their file says
 
 
 def test_a_team_in_priority_order(tmp_path: Path) -> None:
@@ -275,13 +275,18 @@ def test_what_is_written_is_read_back(tmp_path: Path, robot: Robot) -> None:
     assert read_robot(file) == robot
 
 
-def test_what_cannot_be_written_is_refused() -> None:
+def test_two_domains_of_one_name_are_told_apart_in_the_file(tmp_path: Path) -> None:
     values = (Variable("V1", Domain("D1", (range(3),))), Variable("V2", Domain("D1", (range(4),))))
-    with pytest.raises(ValueError, match="D1"):
-        robot_xml(Robot("Robot1", values))
+    (tmp_path / "Robot1.xml").write_bytes(robot_xml(Robot("Robot1", values)))
+    again = read_robot(tmp_path / "Robot1.xml").variables
+    assert [(one.domain.name, list(one.domain)) for one in again] == [("D1", [0, 1, 2]), ("D1.2", [0, 1, 2, 3])]
+
+
+def test_what_cannot_be_written_is_refused() -> None:
+    values = (Variable("V1", Domain("D1", (range(3),))),)
     soft = Relation("R", 1, Semantics.SOFT, ((1,),), (0.5,), 0)
     with pytest.raises(ValueError, match="no integer"):
-        robot_xml(Robot("Robot1", values[:1], private=(Constraint("C", soft, ("V1",), ("V1",), None),)))
+        robot_xml(Robot("Robot1", values, private=(Constraint("C", soft, ("V1",), ("V1",), None),)))
 
 
 # --- speed --------------------------------------------------------------------------------------------------------

@@ -7,16 +7,24 @@ import shutil
 from pathlib import Path
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput
+from robochoc.formats.robot import robot_in
+from robochoc.formats.validation import check_writable
 from robochoc.formats.writer import robot_xml
-from robochoc.problem import Team
+from robochoc.problem import Robot, Team
+
+_SURELY_READ = 1024 * 1024
+"""Bytes of a file that meets no limit of its reader, if the robot is valid."""
 
 
 def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
     """Write one XML file per robot into `folder`, which comes into being complete, or not at all.
 
-    Raises `InvalidInput` when something is there already, unless `replace` is set and it is a team's folder (one
-    that holds nothing but XML files); raises `OSError` when the folder cannot be written.
+    Raises `InvalidInput` when the team is not valid, or says what robots' files cannot; when something is there
+    already, unless `replace` is set and it is a team's folder (one that holds nothing but XML files). Raises `OSError`
+    when the folder cannot be written.
     """
+    check_writable(team)
+    files = {robot.name: _file(robot) for robot in team.robots}
     if folder.exists() or folder.is_symlink():
         _may_replace(folder, replace=replace)
     folder = folder.resolve()
@@ -25,8 +33,8 @@ def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
     old = new.with_suffix(".old")
     try:
         new.mkdir()
-        for robot in team.robots:
-            (new / f"{robot.name}.xml").write_bytes(robot_xml(robot))
+        for name, content in files.items():
+            (new / f"{name}.xml").write_bytes(content)
         if folder.exists():
             folder.rename(old)
         new.rename(folder)
@@ -35,6 +43,14 @@ def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
             old.rename(folder)
         for rest in (new, old):
             shutil.rmtree(rest, ignore_errors=True)
+
+
+def _file(robot: Robot) -> bytes:
+    """The robot's file. Raises `InvalidInput` when no reader would take it: it may be too large."""
+    content = robot_xml(robot)
+    if len(content) > _SURELY_READ:
+        robot_in(content, robot.name)
+    return content
 
 
 def _may_replace(folder: Path, *, replace: bool) -> None:

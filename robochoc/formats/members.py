@@ -1,15 +1,14 @@
-"""The files of a team side by side: what the fourth layer's checks ask."""
+"""The robots of a team side by side, read from files or built in Python: what the checks of a whole team ask."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from pathlib import Path
 
-from robochoc.formats.robot import RobotFile
-from robochoc.problem import CycleError, Robot, priority_order
+from robochoc.formats.places import Place, Places
+from robochoc.problem import Child, Constraint, CycleError, Parent, Robot, priority_order
 
 
 class Role(StrEnum):
@@ -25,26 +24,39 @@ class Role(StrEnum):
 
 
 @dataclass(frozen=True)
+class Member:
+    """A robot, and where its parts stand; with what only its file says, if it has one."""
+
+    robot: Robot
+    places: Places
+    copies: Mapping[str, tuple[Constraint, ...]] = field(default_factory=dict)
+    """By child: the TKC constraints that the original platform's files repeat with the parent."""
+    unsaid: frozenset[str] = frozenset()
+    """The children for which `variable` is left out: what they must be told follows from the scopes."""
+
+
+@dataclass(frozen=True)
 class Entry:
-    """A line of a robot's file that lists a neighbour."""
+    """What lists a neighbour: a line of a robot's file, or an object."""
 
     robot: Robot
     other: str
     role: Role
-    line: int
+    place: Place
 
 
 @dataclass(frozen=True)
 class Members:
-    """The robots of a team, as far as their own files can be read.
+    """The robots of a team, as far as each is right by itself.
 
-    `broken` names the robots whose files have mistakes of their own. They are there, but nothing is known of them:
-    a check that would need them says nothing, so that one mistake is told once.
+    `broken` names the robots that have mistakes of their own. They are there, but nothing is known of them: a check
+    that would need them says nothing, so that one mistake is told once. `order` is the robots' order, where something
+    else than the links says it: a team that was built in Python has one.
     """
 
-    folder: Path
-    files: Mapping[str, RobotFile]
+    files: Mapping[str, Member]
     broken: frozenset[str]
+    order: tuple[str, ...] = ()
 
     @property
     def robots(self) -> Iterator[Robot]:
@@ -55,10 +67,9 @@ class Members:
     def entries(self) -> dict[tuple[str, str], Entry]:
         """Who lists whom, by the names of the two."""
         return {
-            (robot.name, neighbour.name): Entry(robot, neighbour.name, role, neighbour.line)
-            for robot in self.robots
-            for role, neighbours in ((Role.PARENT, robot.parents), (Role.CHILD, robot.children))
-            for neighbour in neighbours
+            (name, neighbour.name): Entry(member.robot, neighbour.name, role, member.places.neighbour(neighbour))
+            for name, member in self.files.items()
+            for role, neighbour in _listed(member.robot)
         }
 
     def is_parent(self, parent: str, child: str) -> bool:
@@ -88,33 +99,48 @@ class Members:
         return owners
 
     @cached_property
-    def rank(self) -> Mapping[str, int] | None:
-        """Each robot's place in the priority order; None while some mistake leaves the order open."""
+    def ranks(self) -> tuple[Mapping[str, int], ...]:
+        """Each robot's place in the priority order; empty while some mistake leaves the order open.
+
+        The links may leave several orders: there is the one that readers of files take, and `order`, if there is one.
+        """
         if self.broken or not all(self.has_all_parents(name) for name in self.files):
-            return None
+            return ()
         try:
-            order = priority_order(self.agreed)
+            orders = {priority_order(self.agreed), self.order or priority_order(self.agreed)}
         except CycleError:
-            return None
-        return {name: place for place, name in enumerate(order)}
+            return ()
+        return tuple({name: place for place, name in enumerate(order)} for order in orders)
 
     @cached_property
-    def _used(self) -> dict[str, dict[str, int]]:
-        """For each robot the variables in the constraints it holds, and the first line that uses each."""
-        used: dict[str, dict[str, int]] = {}
+    def own(self) -> dict[str, dict[str, None]]:
+        """The variables of each robot."""
+        return {robot.name: dict.fromkeys(variable.name for variable in robot.variables) for robot in self.robots}
+
+    @cached_property
+    def _used(self) -> dict[str, dict[str, Constraint]]:
+        """For each robot the variables in the constraints it holds, and the first that uses each."""
+        used: dict[str, dict[str, Constraint]] = {}
         for robot in self.robots:
-            lines = used[robot.name] = {}
+            first = used[robot.name] = {}
             for constraint in robot.shared:
                 for variable in constraint.variables:
-                    lines.setdefault(variable, constraint.line)
+                    first.setdefault(variable, constraint)
         return used
 
-    def needed(self, parent: str, child: str) -> dict[str, int]:
-        """The variables of `parent` in constraints that `child` holds, with the line that needs each."""
+    def needed(self, parent: str, child: str) -> dict[str, Constraint]:
+        """The variables of `parent` in constraints that `child` holds, with the constraint that needs each."""
         used = self._used[child]
-        return {variable: used[variable] for variable in self.files[parent].lines if variable in used}
+        return {variable: used[variable] for variable in self.own[parent] if variable in used}
 
-    def place(self, robot: str, variable: str = "") -> str:
-        """File and line of a robot, or of a variable of its, for a message about two robots."""
-        file = self.files[robot]
-        return f"{file.robot.file}:{file.lines.get(variable, file.line)}"
+    def place(self, robot: str, variable: str = "") -> Place:
+        """Where a robot stands, or a variable of its, for a message about two robots."""
+        places = self.files[robot].places
+        return places.variable(variable) if variable else places.robot()
+
+
+def _listed(robot: Robot) -> Iterator[tuple[Role, Parent | Child]]:
+    for parent in robot.parents:
+        yield Role.PARENT, parent
+    for child in robot.children:
+        yield Role.CHILD, child

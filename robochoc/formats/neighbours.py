@@ -1,4 +1,4 @@
-"""Who is in a team, and who is whose parent: what two files say of each other (FORMAT.md, "The team")."""
+"""Who is in a team, and who is whose parent: what two robots say of each other (FORMAT.md, "The team")."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from collections import Counter
 from collections.abc import Iterator
 
 from robochoc.formats.diagnostics import Diagnostic, shortened, suggestion
-from robochoc.formats.members import Entry, Members
+from robochoc.formats.members import Members
 from robochoc.problem import CycleError, priority_order
 
 
-def missing_files(members: Members) -> Iterator[Diagnostic]:
-    """Neighbours that have no file."""
+def missing_robots(members: Members) -> Iterator[Diagnostic]:
+    """Neighbours that are not there."""
     known = dict.fromkeys([*members.files, *sorted(members.broken)])
     for entry in members.entries.values():
         if entry.other not in known:
             name = shortened(entry.other)
-            message = f"the {entry.role} '{name}' has no file: there is no {members.folder / name}.xml"
-            hint = f"write that file or delete this agent; {suggestion(name, known, 'robots')}"
-            yield Diagnostic(entry.robot.file, entry.line, message, hint)
+            absent, step = members.files[entry.robot.name].places.absent(name)
+            hint = f"{step}; {suggestion(name, known, 'robots')}"
+            yield entry.place.mistake(f"the {entry.role} '{name}' {absent}", hint)
 
 
 def disagreements(members: Members) -> Iterator[Diagnostic]:
@@ -29,10 +29,10 @@ def disagreements(members: Members) -> Iterator[Diagnostic]:
         if answer is None and other in members.files:
             message = f"the {entry.role} '{other}' does not list '{name}' as its {entry.role.opposite}"
             hint = f'add <agent name="{name}"> there, among the {entry.role.opposite} agents ({members.place(other)})'
-            yield Diagnostic(entry.robot.file, entry.line, message, hint)
+            yield entry.place.mistake(message, hint)
         elif answer and answer.role is entry.role and name < other:
             message = f"'{other}' is listed as {entry.role}, but lists '{name}' as {entry.role} itself"
-            yield Diagnostic(entry.robot.file, entry.line, message, f"change it here or at {_place(answer)}")
+            yield entry.place.mistake(message, f"change it here or at {answer.place}")
 
 
 def cycles(members: Members) -> Iterator[Diagnostic]:
@@ -46,8 +46,9 @@ def cycles(members: Members) -> Iterator[Diagnostic]:
             for parent, child in zip(error.cycle, (*error.cycle[1:], error.cycle[0]), strict=True):
                 parents[child].discard(parent)
                 links.append(members.entries[child, parent])
-            hint = f"one of these parents must go: the one here, or at {' or '.join(map(_place, links[1:]))}"
-            yield Diagnostic(links[0].robot.file, links[0].line, f"the parents form a cycle: {error}", hint)
+            elsewhere = " or ".join(str(link.place) for link in links[1:])
+            hint = f"one of these parents must go: the one here, or at {elsewhere}"
+            yield links[0].place.mistake(f"the parents form a cycle: {error}", hint)
         else:
             return
 
@@ -60,7 +61,7 @@ def mixed_kinds(members: Members) -> Iterator[Diagnostic]:
             other = next(other for other in members.robots if other.kind is usual[0][0])
             message = f"the robot is a {robot.kind}, but '{other.name}' is a {other.kind}"
             hint = f"a team is one or the other: change the type here or at {members.place(other.name)}"
-            yield Diagnostic(robot.file, members.files[robot.name].line, message, hint)
+            yield members.place(robot.name).mistake(message, hint)
 
 
 def shared_variables(members: Members) -> Iterator[Diagnostic]:
@@ -69,8 +70,17 @@ def shared_variables(members: Members) -> Iterator[Diagnostic]:
         for other in others:
             message = f"the variable '{shortened(variable)}' is also one of '{first}'"
             hint = f"names of variables are unique in a team: rename it here or at {members.place(first, variable)}"
-            yield Diagnostic(members.files[other].robot.file, members.files[other].lines[variable], message, hint)
+            yield members.place(other, variable).mistake(message, hint)
 
 
-def _place(entry: Entry) -> str:
-    return f"{entry.robot.file}:{entry.line}"
+def out_of_order(members: Members) -> Iterator[Diagnostic]:
+    """Robots that stand before one of their parents, where the team says an order of its own."""
+    rank = {name: place for place, name in enumerate(members.order)}
+    if not members.ranks:
+        return  # the links themselves have a mistake
+    for name, parents in members.agreed.items() if rank else ():
+        late = next((parent for parent in parents if rank[parent] > rank[name]), None)
+        if late is not None:
+            message = f"the robot stands before its parent '{late}' in the team"
+            hint = "the robots of a team stand in priority order, parents before their children"
+            yield members.place(name).mistake(message, hint)

@@ -9,10 +9,15 @@ from pathlib import Path
 
 from lxml import etree
 
-from robochoc.formats.constraints import Context, is_name, read_private, read_shared
+from robochoc.formats.constraints import Context, read_private, read_shared
+from robochoc.formats.definitions import check_semantics, refuse_predefined
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput, MistakeError, Report, shortened, suggestion
 from robochoc.formats.extension import check_count, read_domain, read_relation
-from robochoc.formats.intension import PREDEFINED, read_predicate, read_topic
+from robochoc.formats.intension import read_predicate, read_topic
+from robochoc.formats.members import Member
+from robochoc.formats.names import check_robot_name, check_unique
+from robochoc.formats.places import FilePlaces
+from robochoc.formats.rules import NEIGHBOURS_ONCE, check_told, refuse_nothing_to_decide, repeated
 from robochoc.formats.xml import attribute, line, parsed_xml, read_xml
 from robochoc.problem import (
     Child,
@@ -30,19 +35,10 @@ from robochoc.problem import (
 )
 
 
-@dataclass(frozen=True)
-class RobotFile:
+@dataclass(frozen=True, kw_only=True)
+class RobotFile(Member):
     """A robot, and what its file says beyond it: that is the team's to check, and then no longer needed."""
 
-    robot: Robot
-    line: int
-    """Where the file says what kind of problem it is."""
-    copies: Mapping[str, tuple[Constraint, ...]]
-    """By child: the TKC constraints that the original platform's files repeat with the parent."""
-    unsaid: frozenset[str]
-    """The children for which `variable` is left out: what they must be told follows from the scopes."""
-    lines: Mapping[str, int]
-    """Where the robot's variables stand."""
     context: Context
     """What constraints that a scenario adds can refer to."""
 
@@ -73,10 +69,10 @@ def robot_in(content: bytes, name: str) -> Robot:
 
 def _check_name(name: str, path: Path) -> None:
     """Raise `InvalidInput` unless `name`, which the file at `path` gives its robot, can be one."""
-    if not is_name(name):
-        message = f"'{shortened(name)}' cannot be a robot's name"
-        hint = "rename the file: a letter, then letters, digits, '.' and '_'"
-        raise InvalidInput([Diagnostic(str(path), 0, message, hint)])
+    try:
+        check_robot_name(name, "rename the file")
+    except MistakeError as mistake:
+        raise InvalidInput([Diagnostic(str(path), 0, mistake.message, mistake.hint)]) from None
 
 
 class _Reader:
@@ -107,7 +103,8 @@ class _Reader:
         unsaid = frozenset(
             attribute(agent, "name") for agent in self._agents("agents_children") if agent.get("variable") is None
         )
-        return RobotFile(robot, line(presentation), copies, unsaid, self._own, context)
+        places = FilePlaces(file, line(presentation), self._own)
+        return RobotFile(robot, places, copies, unsaid, context=context)
 
     def _elements(self, section: str, tag: str, count: str) -> Iterator[etree._Element]:
         """The elements of a section of the instance, whose count is checked."""
@@ -120,7 +117,7 @@ class _Reader:
         domains: dict[str, Domain | None] = {}
         for element in self._elements("domains", "domain", "nbDomains"):
             with self._report.at(line(element)):
-                self._check_unique("domain", attribute(element, "name"), domains)
+                check_unique("domain", attribute(element, "name"), domains)
                 domains[attribute(element, "name")] = None
                 domains[attribute(element, "name")] = read_domain(element)
         return domains
@@ -130,7 +127,7 @@ class _Reader:
         for element in self._elements("variables", "variable", "nbVariables"):
             name, domain = attribute(element, "name"), attribute(element, "domain")
             with self._report.at(line(element)):
-                self._check_unique("variable", name, self._own)
+                check_unique("variable", name, self._own)
                 self._own[name] = line(element)
                 if domain not in domains:
                     raise MistakeError(f"unknown domain '{shortened(domain)}'", suggestion(domain, domains, "domains"))
@@ -138,8 +135,8 @@ class _Reader:
                 if values is not None:
                     variables.append(Variable(name, values))
         if not self._own:
-            element = next(self._instance.iterchildren("variables"))
-            self._report.add(line(element), "the robot has no variable", 'add <variable name="V1.1" domain="D1"/>')
+            with self._report.at(line(next(self._instance.iterchildren("variables")))):
+                refuse_nothing_to_decide(self._own)
             self._report.finish()  # whatever else is wrong may follow from it
         return tuple(variables)
 
@@ -148,7 +145,7 @@ class _Reader:
         for element in self._elements("topics", "topic", "nbTopics"):
             with self._report.at(line(element)):
                 topic = read_topic(element, self._own)
-                self._check_unique("topic", topic.name, topics)
+                check_unique("topic", topic.name, topics)
                 topics[topic.name] = topic
         return tuple(topics.values())
 
@@ -156,9 +153,8 @@ class _Reader:
         definitions: dict[str, Relation | Predicate | None] = {}
         for element in self._elements("relations", "relation", "nbRelations"):
             self._define(element, read_relation, definitions)
-            if attribute(element, "semantics") == Semantics.SOFT and kind is not Kind.DISWCSP:
-                hint = 'write type="DisWCSP" in the presentation, or semantics="supports" or "conflicts"'
-                self._report.add(line(element), "a soft relation in a DisCSP", hint)
+            with self._report.at(line(element)):
+                check_semantics(Semantics(attribute(element, "semantics")), kind)
         for element in self._elements("predicates", "predicate", "nbPredicates"):
             self._define(element, read_predicate, definitions)
         return definitions
@@ -171,10 +167,9 @@ class _Reader:
     ) -> None:
         name = attribute(element, "name")
         with self._report.at(line(element)):
-            self._check_unique("definition", name, definitions)
+            check_unique("definition", name, definitions)
             definitions[name] = None
-            if name in PREDEFINED:
-                raise MistakeError(f"'{name}' is a predefined predicate", "give your own another name")
+            refuse_predefined(name)
             definitions[name] = read(element)
 
     def _constraints(
@@ -215,30 +210,9 @@ class _Reader:
             if agent.get("variable") is not None:
                 told = tuple((agent.get("variable") or "").split())
                 with self._report.at(line(agent)):
-                    self._check_told(told)
+                    check_told(told, self._own)
             yield Child(name, told, parts, line(agent))
 
-    def _check_told(self, told: tuple[str, ...]) -> None:
-        seen: set[str] = set()
-        for variable in told:
-            if variable not in self._own:
-                hint = suggestion(variable, self._own, "own variables")
-                raise MistakeError(
-                    f"the child is to be told '{shortened(variable)}', which is not the robot's own", hint
-                )
-            if variable in seen:
-                raise MistakeError(f"the child is to be told '{shortened(variable)}' twice", "name it once")
-            seen.add(variable)
-
     def _check_neighbours(self, parents: tuple[Parent, ...], children: tuple[Child, ...]) -> None:
-        seen: dict[str, str] = {self._name: "the robot itself"}
-        for role, neighbours in (("parent", parents), ("child", children)):
-            for neighbour in neighbours:
-                if neighbour.name in seen:
-                    message = f"the {role} '{shortened(neighbour.name)}' is {seen[neighbour.name]}"
-                    self._report.add(neighbour.line, message, "list every neighbour once, as parent or as child")
-                seen.setdefault(neighbour.name, f"listed as {role} already")
-
-    def _check_unique(self, what: str, name: str, known: Mapping[str, object]) -> None:
-        if name in known:
-            raise MistakeError(f"a second {what} '{shortened(name)}'", "names are unique in a file: rename one of them")
+        for neighbour, message in repeated(self._name, parents, children):
+            self._report.add(neighbour.line, message, NEIGHBOURS_ONCE)

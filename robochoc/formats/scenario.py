@@ -13,6 +13,7 @@ from robochoc.change import BadChange, changed
 from robochoc.formats.constraints import Context, read_shared
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput, MistakeError, Report, shortened
 from robochoc.formats.robot import RobotFile, read_robot_file
+from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
 from robochoc.formats.xml import attribute, line, read_xml
 from robochoc.problem import (
     AddAgent,
@@ -20,7 +21,6 @@ from robochoc.problem import (
     AddValue,
     Change,
     Event,
-    Model,
     RemoveAgent,
     RemoveConstraint,
     RemoveValue,
@@ -87,7 +87,7 @@ class _Reader:
                         self._apply(change, place)
                         changes.append(change)
         if self._team and not self._team.robots:
-            self._report.add(line(element), "all robots have left after this event", "keep one, or add another")
+            self._report.add(line(element), *NOBODY_LEFT)
             self._team = None
         after = attribute(element, "after")
         return Event(tuple(changes), None if after == "solved" else int(after.split()[0]))
@@ -144,10 +144,8 @@ class _Reader:
             with self._report.at(line(child)):
                 self._missed.add(attribute(child, "name"))
                 constraint = read_shared(child, context)
-                if constraint and constraint.model is Model.PKC:
-                    message = "a partially known constraint (PKC) in a scenario"
-                    raise MistakeError(message, 'each side would need its part: write model="TKC"')
                 if constraint:
+                    check_brought(constraint)
                     self._missed.discard(constraint.name)
                     yield line(child), AddConstraint(agent, parent, constraint)
 
@@ -192,11 +190,11 @@ def _change(element: etree._Element) -> Change:
 
 def _refuse_parts(robot: Robot) -> None:
     """Raise `InvalidInput` where an added robot brings its part of partially known constraints."""
-    hint = 'the parent could not bring its part: write model="TKC"'
-    message = "a partially known constraint (PKC) of a robot that a scenario adds"
-    parts = [one for one in robot.shared if one.model is Model.PKC]
-    if parts:
-        raise InvalidInput([Diagnostic(robot.file, one.line, message, hint) for one in parts])
+    report = Report(robot.file)
+    for constraint in robot.shared:
+        with report.at(constraint.line):
+            check_newcomers_constraint(constraint)
+    report.finish()
 
 
 def _without_line(robot: Robot, number: int) -> Robot:

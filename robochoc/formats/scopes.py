@@ -18,7 +18,7 @@ def misplaced(members: Members) -> Iterator[Diagnostic]:
                 for constraint in parent.constraints:
                     mistake = _foreign(members, near, parent, constraint) or _place(members, robot, parent, constraint)
                     if mistake:
-                        yield Diagnostic(robot.file, constraint.line, *mistake)
+                        yield members.files[robot.name].places.constraint(constraint).mistake(*mistake)
 
 
 def _foreign(members: Members, near: set[str], parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
@@ -26,7 +26,7 @@ def _foreign(members: Members, near: set[str], parent: Parent, constraint: Const
     for name in constraint.variables:
         owners = members.owners.get(name, [])
         if not owners and not members.broken:
-            known = members.files[parent.name].lines
+            known = members.own[parent.name]
             hint = f"{suggestion(name, known, 'variables')} ({members.place(parent.name)})"
             return f"no robot has the variable '{shortened(name)}'", hint
         if len(owners) == 1 and owners[0] not in near:
@@ -48,11 +48,10 @@ def _place(members: Members, robot: Robot, parent: Parent, constraint: Constrain
     if constraint.model is Model.PKC and len(others) > 1:
         message = "a PKC constraint over more than two robots"
         return message, f"only '{robot.name}' and '{parent.name}' ({members.place(parent.name)}) can share its parts"
-    if members.rank:
-        lowest = max(others, key=members.rank.__getitem__)
-        if lowest != parent.name:
-            message = f"the constraint stands under '{parent.name}', the lowest parent of its scope is '{lowest}'"
-            return message, f"move it to '{lowest}' ({members.place(lowest)})"
+    lowest = [max(others, key=rank.__getitem__) for rank in members.ranks]
+    if lowest and parent.name not in lowest:
+        message = f"the constraint stands under '{parent.name}', the lowest parent of its scope is '{lowest[0]}'"
+        return message, f"move it to '{lowest[0]}' ({members.place(lowest[0])})"
     return None
 
 
@@ -64,11 +63,11 @@ def misplaced_parts(members: Members) -> Iterator[Diagnostic]:
                 for part in child.constraints:
                     mistake = _foreign_to_both(members, robot, child.name, part) or _unshown(members, child.name, part)
                     if mistake:
-                        yield Diagnostic(robot.file, part.line, *mistake)
+                        yield members.files[robot.name].places.constraint(part).mistake(*mistake)
 
 
 def _foreign_to_both(members: Members, robot: Robot, child: str, part: Constraint) -> tuple[str, str] | None:
-    own, others = members.files[robot.name].lines, members.files[child].lines
+    own, others = members.own[robot.name], members.own[child]
     for name in part.variables:
         if name not in own and name not in others:
             hint = f"{suggestion(name, others, 'variables')} ({members.place(child)})"
@@ -80,11 +79,11 @@ def _unshown(members: Members, child: str, part: Constraint) -> tuple[str, str] 
     """A variable of `child` in its parent's part that the child, by its own file, shows to nobody."""
     if members.broken:
         return None
-    file = members.files[child]
-    below = (members.needed(child, other.name) for other in file.robot.children if other.name in members.files)
-    shown = {*file.robot.interface}.union(*below)
+    robot = members.files[child].robot
+    below = (members.needed(child, other.name) for other in robot.children if other.name in members.files)
+    shown = {*robot.interface}.union(*below)
     for name in part.variables:
-        if name in file.lines and name not in shown:
+        if name in members.own[child] and name not in shown:
             message = f"the part looks at '{shortened(name)}', which '{child}' shows to nobody"
             return message, f"let '{child}' hold its part of the PKC as well ({members.place(child, name)})"
     return None
@@ -99,6 +98,6 @@ def untold(members: Members) -> Iterator[Diagnostic]:
                 lacking = [name for name in needed if name not in child.variables]
                 if lacking:
                     message = f"the child '{child.name}' must also be told {shortened(' '.join(lacking))}"
-                    where = f"{members.files[child.name].robot.file}:{needed[lacking[0]]}"
+                    where = members.files[child.name].places.constraint(needed[lacking[0]])
                     hint = f'write variable="{shortened(" ".join([*child.variables, *lacking]))}", as {where} needs it'
-                    yield Diagnostic(robot.file, child.line, message, hint)
+                    yield members.files[robot.name].places.neighbour(child).mistake(message, hint)

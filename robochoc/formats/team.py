@@ -5,22 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
 
-from robochoc.formats.copies import differing_copies
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput, encodable
 from robochoc.formats.members import Members
-from robochoc.formats.neighbours import cycles, disagreements, missing_files, mixed_kinds, shared_variables
 from robochoc.formats.robot import RobotFile, read_robot_file
 from robochoc.formats.scenario import SCENARIO, has_scenario, read_scenario
-from robochoc.formats.scopes import misplaced, misplaced_parts, untold
+from robochoc.formats.validation import between, note_valid
 from robochoc.problem import Robot, Team, natural, priority_order
 
 _NEXT_STEP = "give a folder with one XML file per robot; 'robochoc generate queens3d --n 4' writes one"
-
-MAX_BETWEEN = 1000
-"""So many mistakes between the files of one team are told."""
 
 
 def find_teams(path: Path | str) -> list[Path]:
@@ -51,9 +45,9 @@ def read_team(folder: Path | str) -> Team:
             files[path.stem] = read_robot_file(path)
         except InvalidInput as invalid:
             found.extend(invalid.diagnostics)
-    members = Members(folder, files, frozenset(path.stem for path in paths) - files.keys())
-    found.extend(islice(_mistakes(members), MAX_BETWEEN))
-    team = None if found else _whole(members)
+    members = Members(files, frozenset(path.stem for path in paths) - files.keys())
+    found.extend(between(members))
+    team = None if found else _whole(folder, members)
     if has_scenario(folder):
         try:
             scenario = read_scenario(folder, team, files)
@@ -62,6 +56,7 @@ def read_team(folder: Path | str) -> Team:
             found.extend(invalid.diagnostics)
     if team is None or found:
         raise InvalidInput(found)
+    note_valid(team)
     return team
 
 
@@ -77,23 +72,9 @@ def robot_names(folder: Path | str) -> tuple[str, ...]:
     return names
 
 
-def _whole(members: Members) -> Team:
+def _whole(folder: Path, members: Members) -> Team:
     order = priority_order(members.agreed)
-    return Team(encodable(members.folder.resolve().name), tuple(_informed(members, name) for name in order))
-
-
-def _mistakes(members: Members) -> Iterator[Diagnostic]:
-    """Everything that two files of a team can get wrong between them."""
-    yield from missing_files(members)
-    yield from disagreements(members)
-    yield from cycles(members)
-    yield from mixed_kinds(members)
-    yield from shared_variables(members)
-    scopes = list(misplaced(members))
-    yield from scopes
-    yield from misplaced_parts(members)
-    yield from untold(members)
-    yield from differing_copies(members, {mistake.file for mistake in scopes})
+    return Team(encodable(folder.resolve().name), tuple(_informed(members, name) for name in order))
 
 
 def _informed(members: Members, name: str) -> Robot:

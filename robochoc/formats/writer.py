@@ -9,7 +9,8 @@ from typing import TypeVar
 from lxml import etree
 
 from robochoc.expression import text
-from robochoc.formats.intension import PREDEFINED
+from robochoc.formats.definitions import PREDEFINED
+from robochoc.formats.labels import with_names_apart
 from robochoc.problem import (
     INFINITE,
     Constraint,
@@ -26,9 +27,10 @@ from robochoc.problem import (
 def robot_xml(robot: Robot) -> bytes:
     """`robot` as the content of its XML file: what `read_robot` reads back.
 
-    Raises `ValueError` when the robot cannot be written: two of its domains or definitions have one name, or a cost
-    is no integer.
+    Where two different domains or definitions have one name, one of them gets another. Raises `ValueError` when the
+    robot cannot be written: a cost is no integer, or a name holds what XML cannot.
     """
+    robot = with_names_apart(robot)
     instance = etree.Element("instance")
     presentation = etree.SubElement(instance, "presentation", type=robot.kind)
     if robot.weight != Robot.weight:
@@ -129,8 +131,7 @@ def _write_neighbours(instance: etree._Element, robot: Robot) -> None:
     section = etree.SubElement(neighbours, "agents_children")
     for child in robot.children:
         agent = etree.SubElement(section, "agent", name=child.name)
-        if child.variables or child.constraints:
-            agent.set("variable", " ".join(child.variables))
+        agent.set("variable", " ".join(child.variables))
         _write_constraints(agent, child.constraints)
 
 
@@ -138,11 +139,7 @@ _Named = TypeVar("_Named", Domain, Relation | Predicate)
 
 
 def _by_name(things: Iterable[_Named]) -> Mapping[str, _Named]:
-    named: dict[str, _Named] = {}
-    for thing in things:
-        if named.setdefault(thing.name, thing) != thing:
-            raise ValueError(f"two different definitions are called '{thing.name}': rename one of them")
-    return named
+    return {thing.name: thing for thing in things}
 
 
 def _terms(terms: Sequence[Term]) -> str:

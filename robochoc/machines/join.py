@@ -11,6 +11,7 @@ from robochoc.authority.enrolment import EnrolmentFailed, NobodyThere, enrol, re
 from robochoc.authority.identity import BadIdentity, Identity, default_folder
 from robochoc.communication.network.post import Post
 from robochoc.communication.network.robot import Ending, Manner, NetworkRobot
+from robochoc.formats import check_robot
 from robochoc.machines.place import Place
 from robochoc.problem import Robot
 from robochoc.registry import spoken
@@ -59,8 +60,9 @@ def _enrolled(name: str, place: Place, folder: Path, token: str, patience_s: flo
 def join(robot: Robot, place: Place, identity: Identity, manner: Manner, compiler: Compiler) -> Ending:
     """Be `robot` in one run of the master at `place`. `compiler` compiles its domain.
 
-    Raises `CannotConnect`, and what compiling raises.
+    Raises `InvalidInput` for a robot that is not valid by itself, `CannotConnect`, and what compiling raises.
     """
+    check_robot(robot)
     manner.stage("compiling")
     manner = replace(manner, compiled=lambda shown: compiler.compile(shown).domain)
     own = CompiledRobot(robot, manner.compiled)

@@ -8,17 +8,15 @@ scenario has emptied. Two things are not kept, as no robot looks at them: what d
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable
 from dataclasses import replace
-from itertools import count
-from typing import TypeVar
 
 import msgspec
 
-from robochoc.formats import PREDEFINED, InvalidInput, robot_in, robot_xml
+from robochoc.formats import InvalidInput, robot_in, robot_xml
 from robochoc.formats.constraints import is_name
 from robochoc.observers.events import Given
-from robochoc.problem import INFINITE, Constraint, Domain, Predicate, Relation, Robot, Team, Variable
+from robochoc.problem import INFINITE, Constraint, Domain, Relation, Robot, Team, Variable
 from robochoc.solver.explanation import Void
 from robochoc.solver.part import NO_BRIEF, Brief
 
@@ -136,21 +134,16 @@ def _with_domain(robot: Robot, names: Collection[str], ranges: tuple[range, ...]
 
 
 def _writable(robot: Robot) -> Robot:
-    """`robot` as a file can say it: no domain is empty, and nothing shares a name. Raises `ValueError`."""
+    """`robot` as a file can say it: no domain is empty. Raises `ValueError`."""
     for name in (robot.name, *(variable.name for variable in robot.variables)):
         if not is_name(name):
             raise ValueError(f"{name!r} cannot be a name in a file")
     empty = [variable.name for variable in robot.variables if not variable.domain]
     if empty:
         robot = replace(robot, variables=_with_domain(robot, empty, _STAND_IN))
-    constraints = list(_constraints(robot))
-    for constraint in constraints:
+    for constraint in _constraints(robot):
         _check_costs(constraint)
-    domains = _names(variable.domain for variable in robot.variables)
-    definitions = _names((constraint.definition for constraint in constraints), PREDEFINED)
-    if domains is None and definitions is None:
-        return robot
-    return _renamed(robot, domains or {}, definitions or {})
+    return robot
 
 
 def _constraints(robot: Robot) -> Iterable[Constraint]:
@@ -167,46 +160,6 @@ def _check_costs(constraint: Constraint) -> None:
     for cost in costs:
         if type(cost) is float and cost != INFINITE:
             raise ValueError(f"the cost {cost} of {constraint.name} is no integer")
-
-
-_Named = TypeVar("_Named", Domain, Relation | Predicate)
-
-
-def _names(things: Iterable[_Named], predefined: Mapping[str, _Named] = {}) -> dict[_Named, str] | None:
-    """Names that tell `things` apart, for those whose own do not; None where all own names do."""
-    first: dict[str, _Named] = dict(predefined)
-    names: dict[_Named, str] = {}
-    for thing in things:
-        present = first.setdefault(thing.name, thing)
-        if present is not thing and present != thing:
-            names.setdefault(thing, "")
-    taken = {*first}
-    for thing in list(names):
-        name = next(name for number in count(2) if (name := f"{thing.name}.{number}") not in taken)
-        names[thing] = name
-        taken.add(name)
-    return names or None
-
-
-def _renamed(robot: Robot, domains: Mapping[Domain, str], definitions: Mapping[Relation | Predicate, str]) -> Robot:
-    def told(constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
-        return tuple(
-            replace(one, definition=replace(one.definition, name=definitions[one.definition]))
-            if one.definition in definitions
-            else one
-            for one in constraints
-        )
-
-    return replace(
-        robot,
-        variables=tuple(
-            replace(one, domain=replace(one.domain, name=domains[one.domain])) if one.domain in domains else one
-            for one in robot.variables
-        ),
-        private=told(robot.private),
-        parents=tuple(replace(one, constraints=told(one.constraints)) for one in robot.parents),
-        children=tuple(replace(one, constraints=told(one.constraints)) for one in robot.children),
-    )
 
 
 # What strangers say

@@ -1,0 +1,183 @@
+"""What holds of domains, relations, predicates and topics, whoever made them (FORMAT.md, "One robot").
+
+Expressions have no rules here: a tree is written down and handed to the parser, whose rules are the only ones.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from functools import lru_cache
+
+from robochoc.expression import Apply, Constant, Expression, ExpressionError, Name, Type, parse, text
+from robochoc.expression.parser import MAX_DEPTH, MAX_NODES
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.names import BEYOND, check_cost, check_integer, check_word, digits
+from robochoc.problem import Domain, Kind, Predicate, Relation, Semantics, Term, Topic
+
+MAX_VALUES = 100_000
+"""Of a domain."""
+MAX_TUPLES = 1_000_000
+"""Of a relation."""
+
+_PARAMETER = re.compile(r"[A-Za-z_][A-Za-z0-9_.]*")
+_OPERATORS = {"eq": "eq", "ne": "ne", "neq": "ne", "lt": "lt", "le": "le", "gt": "gt", "ge": "ge"}
+
+PREDEFINED: dict[str, Predicate] = {
+    name: Predicate(name, ("X", "Y"), Apply(operator, (Name("X"), Name("Y")))) for name, operator in _OPERATORS.items()
+}
+"""Predicates on two terms that every file may refer to without defining them; `neq` is Figure 2's name for `ne`."""
+
+
+def check_domain(domain: Domain) -> None:
+    """Raise `MistakeError` unless the ranges are ascending and apart, and hold some values but not too many."""
+    name = shortened(domain.name)
+    for part in domain.ranges:
+        check_integer(part.start)
+        check_integer(part.stop - 1)
+        if part.step != 1 or not part:
+            wrong = f"the range {part.start}..{part.stop - 1} is empty" if part.step == 1 else f"{part} has a step"
+            raise MistakeError(wrong, "let each range hold every integer between its ends")
+    if sum(part.stop - part.start for part in domain.ranges) > MAX_VALUES:
+        raise MistakeError(f"domain {name} has more than {MAX_VALUES} values", "make it smaller")
+    if not domain.ranges:
+        raise MistakeError(f"domain {name} has no value", "write ranges: 1..4 7 9..12")
+    for before, part in zip(domain.ranges, domain.ranges[1:], strict=False):
+        if part.start < before.stop:
+            if part.stop <= before.start:
+                raise MistakeError(f"the ranges of domain {name} are not in order", "let them ascend")
+            raise MistakeError(f"the value {part.start} stands twice in the domain", "let its ranges not overlap")
+
+
+def refuse_predefined(name: str) -> None:
+    """Raise `MistakeError` when a definition of one's own would be called `name`, and that means something else."""
+    if name in PREDEFINED:
+        raise MistakeError(f"'{shortened(name)}' is a predefined predicate", "give your own another name")
+
+
+def check_semantics(semantics: Semantics, kind: Kind) -> None:
+    """Raise `MistakeError` where a robot of that `kind` cannot have such a relation."""
+    if semantics is Semantics.SOFT and kind is not Kind.DISWCSP:
+        hint = 'write type="DisWCSP" in the presentation, or semantics="supports" or "conflicts"'
+        raise MistakeError("a soft relation in a DisCSP", hint)
+
+
+def check_relation(relation: Relation) -> None:
+    """Raise `MistakeError` unless its tuples have its arity, stand once, and cost something if it is soft."""
+    check_tuple_count(len(relation.tuples))
+    if relation.semantics is not Semantics.SOFT and (relation.default_cost != 0 or relation.costs):
+        wrong = "defaultCost" if relation.default_cost != 0 else "costs"
+        hint = "a soft relation has one, an integer or 'infinity'; no other has"
+        raise MistakeError(f"{wrong} in a {relation.semantics} relation", hint)
+    if relation.arity < 1:
+        number = relation.arity if relation.arity > -BEYOND else "less than 0"
+        raise MistakeError(f"a relation of arity {number}", "its tuples need a value for each variable of the scope")
+    _check_tuples(relation)
+    if relation.semantics is Semantics.SOFT:
+        if len(relation.costs) != len(relation.tuples):
+            message = f"{len(relation.tuples)} tuples, but {len(relation.costs)} costs"
+            raise MistakeError(message, "write cost:tuple, 5:1 2|3:2 2")
+        for cost in (*relation.costs, relation.default_cost):
+            check_cost(cost)
+
+
+def check_tuple_count(number: int) -> None:
+    """Raise `MistakeError` when a relation has too many tuples."""
+    if number > MAX_TUPLES:
+        raise MistakeError(f"{number} tuples are more than {MAX_TUPLES}", "write a predicate instead")
+
+
+def _check_tuples(relation: Relation) -> None:
+    for values in relation.tuples:
+        for value in values:
+            check_integer(value)
+        if len(values) != relation.arity:
+            message = f"the tuple '{shown(values)}' has {len(values)} values instead of {relation.arity}"
+            raise MistakeError(message, "separate values by a blank, and tuples by '|'")
+    if len(set(relation.tuples)) < len(relation.tuples):
+        seen: set[tuple[int, ...]] = set()
+        for values in relation.tuples:
+            if values in seen:
+                raise MistakeError(f"the tuple '{shown(values)}' stands twice", "delete one of them")
+            seen.add(values)
+
+
+def check_predicate(predicate: Predicate) -> None:
+    """Raise `MistakeError` unless it is a Boolean expression over its parameters, and nothing else."""
+    check_formal(predicate.parameters)
+    check_expression(f"predicate {shortened(predicate.name)}", predicate.body, predicate.parameters, Type.BOOLEAN)
+
+
+def check_formal(names: Sequence[str]) -> None:
+    """Raise `MistakeError` unless `names` can be a predicate's parameters."""
+    seen: set[str] = set()
+    for name in names:
+        if not _PARAMETER.fullmatch(name):
+            raise MistakeError(f"'{shortened(name)}' is no name for a parameter", "write int X int Y")
+        if name in seen:
+            raise MistakeError(f"two parameters are called '{shortened(name)}'", "rename one of them")
+        seen.add(name)
+
+
+def check_topic(topic: Topic, own: Collection[str]) -> None:
+    """Raise `MistakeError` unless `topic` says where to by integer expressions over the `own` variables."""
+    check_word(topic.name)
+    check_word(topic.type)
+    for axis, expression in (("x", topic.x), ("y", topic.y), ("z", topic.z)):
+        if expression is not None:
+            check_expression(f"{axis} of the topic", expression, tuple(own), Type.INTEGER)
+
+
+def check_expression(what: str, expression: Expression, names: Sequence[str], wanted: Type) -> None:
+    """Raise `MistakeError` unless `expression` is what its own text says: the parser's rules are the only ones.
+
+    `what` is of this expression, over `names`, which should yield a `wanted` value.
+    """
+    try:
+        _check_size(expression)
+        said = text(expression)
+        again = parsed(said, tuple(names), wanted)
+    except ExpressionError as error:
+        raise expression_mistake(what, error) from None
+    if again != expression:
+        raise MistakeError(f"{what}: '{shortened(said)}' says something else", "use the operators of XCSP 2.1")
+
+
+@lru_cache(maxsize=256)
+def parsed(said: str, names: tuple[str, ...], wanted: Type) -> Expression:
+    """Like `parse`. The robots of a team mostly say the same: equal texts are parsed once and share one tree."""
+    return parse(said, names, wanted)
+
+
+def expression_mistake(what: str, error: ExpressionError, line: int = 0) -> MistakeError:
+    """What is wrong with the expression of `what`, which stands in that `line`."""
+    message = f"{what}: {error.message}, at character {error.position + 1}"
+    return MistakeError(message, error.hint or "see FORMAT.md, 'Functional expressions'", line)
+
+
+def _check_size(expression: object) -> None:
+    """Raise `ExpressionError` for a tree that cannot be written down, before anybody tries."""
+    waiting: list[tuple[object, int]] = [(expression, 1)]
+    nodes = 0
+    while waiting:
+        node, depth = waiting.pop()
+        nodes += 1
+        if nodes > MAX_NODES:
+            raise ExpressionError("the expression is too long", 0, f"{MAX_NODES} operators and terms are allowed")
+        if depth > MAX_DEPTH:
+            raise ExpressionError("the expression is nested too deeply", 0, f"{MAX_DEPTH} levels are allowed")
+        match node:
+            case Apply(operator=str(), arguments=tuple(arguments)):
+                waiting += [(argument, depth + 1) for argument in reversed(arguments)]
+            case Name(name=str()):
+                pass
+            case Constant(value=int(value)) if not isinstance(value, bool):
+                if not -BEYOND < value < BEYOND:
+                    raise ExpressionError(f"an integer of {digits(value)} digits", 0, "18 digits are allowed")
+            case _:
+                raise ExpressionError(f"a {type(node).__name__} where a term should stand", 0, "use Constant or Name")
+
+
+def shown(terms: Sequence[Term]) -> str:
+    """A scope or a tuple, as it stands in a message."""
+    return shortened(" ".join(map(str, terms)))

@@ -1,0 +1,83 @@
+"""What can be a name, and what a number, in a robot's data (FORMAT.md, "One robot")."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.problem import INFINITE
+
+MAX_WEIGHT = 1_000_000
+"""Of a robot."""
+BEYOND = 10**18
+"""Integers have at most 18 digits."""
+MAX_NAME = 251
+"""Characters of a robot's name: with `.xml` it is a file's, and no file system takes a longer one."""
+RESERVED = "scenario"
+"""No robot's name: the file of that name says how a team changes."""
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.]*")
+_WORD = re.compile(r"[^ \t\r\n]+")
+_NO_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that no XML file can hold."""
+
+
+def is_name(word: str) -> bool:
+    """Whether `word` can be a robot's or a variable's name."""
+    return _NAME.fullmatch(word) is not None
+
+
+def check_name(name: str) -> None:
+    """Raise `MistakeError` unless `name` can be a variable's or a neighbour's name."""
+    if not is_name(name):
+        hint = "expected a name: a letter, then letters, digits, '.' and '_'"
+        raise MistakeError(f"the name '{shortened(name)}' is not allowed", hint)
+
+
+def check_robot_name(name: str, hint: str = "rename it") -> None:
+    """Raise `MistakeError` unless `name` can be a robot's. `hint` says how to give it another."""
+    if not is_name(name) or name == RESERVED or len(name) > MAX_NAME:
+        what = f"'{shortened(name)}' cannot be a robot's name"
+        raise MistakeError(what, f"{hint}: a letter, then letters, digits, '.' and '_'")
+
+
+def check_word(word: str) -> None:
+    """Raise `MistakeError` unless `word` can be the name of anything else."""
+    if not _WORD.fullmatch(word) or _NO_XML.search(word):
+        raise MistakeError(f"the name '{shortened(word)}' is not allowed", "expected a name without blanks")
+
+
+def check_integer(value: int) -> None:
+    """Raise `MistakeError` where `value` has more digits than are allowed."""
+    if not -BEYOND < value < BEYOND:
+        raise MistakeError(f"an integer of {digits(value)} digits", "at most 18 digits, and a sign")
+
+
+def check_cost(cost: float) -> None:
+    """Raise `MistakeError` unless `cost` is an integer of 0 or more, or infinite."""
+    if cost == INFINITE:
+        return
+    if not isinstance(cost, int):
+        raise MistakeError(f"the cost {cost} is no integer", "costs are integers of 0 or more, or 'infinity'")
+    check_integer(cost)
+    if cost < 0:
+        raise MistakeError(f"the cost {cost} is negative", "costs are 0 or more, or 'infinity'")
+
+
+def check_weight(weight: int) -> None:
+    """Raise `MistakeError` unless a robot can have this `weight`."""
+    if not 1 <= weight <= MAX_WEIGHT:
+        shown = weight if abs(weight) < BEYOND else f"of {digits(weight)} digits"
+        raise MistakeError(f"the weight {shown} is not allowed", f"expected an integer from 1 to {MAX_WEIGHT}")
+
+
+def check_unique(what: str, name: str, known: Collection[str]) -> None:
+    """Raise `MistakeError` when `name` is in `known`; `what` has that name."""
+    if name in known:
+        raise MistakeError(f"a second {what} '{shortened(name)}'", "names are unique in a file: rename one of them")
+
+
+def digits(value: int) -> int:
+    """How many there are, more or less: Python writes no integer of more than a few thousand."""
+    return max(19, int(value.bit_length() * 0.30103) + 1)

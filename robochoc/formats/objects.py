@@ -1,0 +1,206 @@
+"""A robot that was built in Python, object by object: the same rules as for a file, with names instead of lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import contextmanager
+
+from robochoc.formats.definitions import (
+    PREDEFINED,
+    check_domain,
+    check_predicate,
+    check_relation,
+    check_semantics,
+    check_topic,
+    refuse_predefined,
+)
+from robochoc.formats.diagnostics import MAX_PER_FILE, Diagnostic, MistakeError, shortened
+from robochoc.formats.names import check_name, check_robot_name, check_unique, check_weight, check_word
+from robochoc.formats.places import ObjectPlaces, Place
+from robochoc.formats.rules import (
+    NEIGHBOURS_ONCE,
+    check_constraint,
+    check_private,
+    check_shared,
+    check_terms,
+    check_told,
+    refuse_no_model,
+    refuse_nothing_to_decide,
+    refuse_private_part,
+    repeated,
+)
+from robochoc.formats.shapes import ShapeError, check_shape
+from robochoc.problem import Constraint, Domain, Kind, Model, Predicate, Relation, Robot
+
+Definition = Domain | Relation | Predicate
+
+
+class Objects:
+    """Checks robots one after the other. What they share, domains and definitions, is looked at once."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, tuple[Definition, bool]] = {}
+        """By `id`: the object, which is kept so that the number stays its own, and whether it is right."""
+        self._found: list[Diagnostic] = []
+
+    def mistakes(self, robot: Robot) -> list[Diagnostic]:
+        """Return what is wrong with `robot` by itself: nothing of its neighbours is looked at."""
+        self._found = []
+        if self._is_made_right(robot):
+            for _ in self._steps(robot, ObjectPlaces(robot.name)):
+                if len(self._found) > MAX_PER_FILE:
+                    del self._found[MAX_PER_FILE:]
+                    self._note(ObjectPlaces(robot.name).robot(), "and more mistakes", "mend those above first")
+                    break
+        return self._found
+
+    def mistakes_of_constraint(self, constraint: Constraint, robot: Robot) -> list[Diagnostic]:
+        """Return what is wrong with a constraint that `robot` is to share from now on."""
+        self._found = []
+        own = dict.fromkeys(variable.name for variable in robot.variables)
+        self._shared(constraint, own, robot.kind, ObjectPlaces(robot.name))
+        return self._found
+
+    def _is_made_right(self, robot: Robot) -> bool:
+        try:
+            check_shape(robot, Robot)
+        except ShapeError as error:
+            name = robot.name if isinstance(getattr(robot, "name", None), str) else "?"
+            place = ObjectPlaces(name).robot()
+            self._note(place, f"{error.path.lstrip('.')}: {error}".lstrip(": "), "build it as its class says")
+            return False
+        return True
+
+    def _steps(self, robot: Robot, places: ObjectPlaces) -> Iterator[None]:
+        """Look at one object after the other."""
+        own = dict.fromkeys(variable.name for variable in robot.variables)
+        self._ask(places.robot(), lambda: check_robot_name(robot.name))
+        self._ask(places.robot(), lambda: check_weight(robot.weight))
+        yield from self._variables(robot, places)
+        if not own:
+            return  # whatever else is wrong may follow from it
+        yield from self._topics(robot, own, places)
+        for constraint in robot.private:
+            self._private(constraint, own, robot.kind, places)
+            yield
+        for parent in robot.parents:
+            self._ask(places.neighbour(parent), lambda name=parent.name: check_name(name))  # type: ignore[misc]
+            for constraint in parent.constraints:
+                self._shared(constraint, own, robot.kind, places)
+                yield
+        yield from self._children(robot, own, places)
+        for neighbour, message in repeated(robot.name, robot.parents, robot.children):
+            self._note(places.neighbour(neighbour), message, NEIGHBOURS_ONCE)
+            yield
+
+    def _variables(self, robot: Robot, places: ObjectPlaces) -> Iterator[None]:
+        self._ask(places.robot(), lambda: refuse_nothing_to_decide(robot.variables))
+        seen: set[str] = set()
+        for variable in robot.variables:
+            with self._at(places.variable(variable.name)):
+                check_name(variable.name)
+                check_unique("variable", variable.name, seen)
+            seen.add(variable.name)
+            self._defined(variable.domain, places)
+            yield
+        for name in robot.shown:
+            if name not in seen:
+                message = f"the robot is to show '{shortened(name)}', which is not its own"
+                self._note(places.robot(), message, "only a change of the team needs `shown`: leave it out")
+            yield
+
+    def _topics(self, robot: Robot, own: Collection[str], places: ObjectPlaces) -> Iterator[None]:
+        seen: set[str] = set()
+        for topic in robot.topics:
+            with self._at(places.part("topic", topic.name)):
+                check_topic(topic, own)
+                check_unique("topic", topic.name, seen)
+            seen.add(topic.name)
+            yield
+
+    def _children(self, robot: Robot, own: Collection[str], places: ObjectPlaces) -> Iterator[None]:
+        for child in robot.children:
+            with self._at(places.neighbour(child)):
+                check_name(child.name)
+                check_told(child.variables, own)
+            for constraint in child.constraints:
+                if constraint.model is Model.TKC:
+                    message = f"a totally known constraint (TKC) with the child '{shortened(child.name)}'"
+                    hint = "the child holds it; with the parent stands its part of a PKC only"
+                    self._note(places.constraint(constraint), message, hint)
+                else:
+                    self._shared(constraint, own, robot.kind, places)
+                yield
+
+    def _private(self, constraint: Constraint, own: Collection[str], kind: Kind, places: ObjectPlaces) -> None:
+        with self._at(places.constraint(constraint)):
+            refuse_private_part(constraint.model)
+            if self._applied(constraint, kind, places):
+                check_private(constraint, own)
+
+    def _shared(self, constraint: Constraint, own: Collection[str], kind: Kind, places: ObjectPlaces) -> None:
+        with self._at(places.constraint(constraint)):
+            refuse_no_model(constraint.model)
+            if self._applied(constraint, kind, places):
+                check_shared(constraint, own)
+
+    def _applied(self, constraint: Constraint, kind: Kind, places: ObjectPlaces) -> bool:
+        """Look at a constraint, whoever holds it. False: its definition is to blame. Raises `MistakeError`."""
+        definition = constraint.definition
+        check_word(constraint.name)
+        check_terms(constraint.scope)
+        check_terms(constraint.parameters)
+        right = self._defined(definition, places)
+        if isinstance(definition, Relation):
+            check_semantics(definition.semantics, kind)
+        if right:
+            check_constraint(constraint, kind)
+        return right
+
+    def _defined(self, thing: Definition, places: ObjectPlaces) -> bool:
+        """Whether a domain or a definition is right; the first who has it is told what is wrong."""
+        known = self._known.get(id(thing))
+        if known is None:
+            before = len(self._found)
+            with self._at(places.part(type(thing).__name__.lower(), thing.name)):
+                _check_defined(thing)
+            known = self._known[id(thing)] = (thing, len(self._found) == before)
+        return known[1]
+
+    def _ask(self, place: Place, question: Callable[[], None]) -> None:
+        with self._at(place):
+            question()
+
+    @contextmanager
+    def _at(self, place: Place) -> Iterator[None]:
+        try:
+            yield
+        except MistakeError as mistake:
+            self._note(place, mistake.message, mistake.hint)
+
+    def _note(self, place: Place, message: str, hint: str) -> None:
+        self._found.append(place.mistake(message, hint))
+
+
+def _check_defined(thing: Definition) -> None:
+    check_word(thing.name)
+    if isinstance(thing, Domain):
+        check_domain(thing)
+        return
+    if PREDEFINED.get(thing.name) == thing:
+        return
+    refuse_predefined(thing.name)
+    if isinstance(thing, Relation):
+        check_relation(thing)
+    else:
+        check_predicate(thing)
+
+
+def repeated_robots(robots: Iterable[Robot]) -> Iterator[Diagnostic]:
+    """Robots of one name."""
+    seen: set[str] = set()
+    for robot in robots:
+        if robot.name in seen:
+            message = f"a second robot '{shortened(robot.name)}'"
+            yield ObjectPlaces(robot.name).robot().mistake(message, "names of robots are unique: rename one of them")
+        seen.add(robot.name)

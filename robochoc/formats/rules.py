@@ -1,0 +1,145 @@
+"""What holds of a robot's constraints and neighbours, whoever made it (FORMAT.md, "One robot").
+
+With `names` and `definitions` this is the one list of rules on a robot. The readers of files ask them of each element
+that they have read, `objects` asks them of every object of a robot that was built in Python. What two robots can get
+wrong between them is in `neighbours` and `scopes`; what only a file can (XML, schema, counts, references) stands with
+its readers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+
+from robochoc.formats.definitions import shown
+from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
+from robochoc.formats.names import check_cost, check_integer, is_name
+from robochoc.problem import INFINITE, Child, Constraint, Kind, Model, Parent, Predicate, Relation, Term
+
+NEIGHBOURS_ONCE = "list every neighbour once, as parent or as child"
+"""What to do about neighbours that are `repeated`."""
+NOBODY_LEFT = ("all robots have left after this event", "keep one, or add another")
+"""What is wrong with an event of a scenario after which there is no team, and what to do."""
+
+
+def check_terms(terms: Sequence[Term]) -> None:
+    """Raise `MistakeError` unless each of a scope's `terms` can be a variable's name or an integer."""
+    for term in terms:
+        if isinstance(term, int):
+            check_integer(term)
+        elif not is_name(term):
+            hint = "separate names and integers by blanks"
+            raise MistakeError(f"'{shortened(term)}' is neither a variable's name nor an integer", hint)
+
+
+def check_constraint(constraint: Constraint, kind: Kind) -> None:
+    """Raise `MistakeError` unless its definition takes its terms, and a robot of that `kind` may charge its cost."""
+    if not constraint.variables:
+        raise MistakeError("a constraint without variables in its scope", 'write scope="V1.1 V2.1"')
+    _check_application(constraint.definition, constraint.scope, constraint.parameters)
+    if constraint.cost == INFINITE:
+        return
+    if kind is not Kind.DISWCSP:
+        raise MistakeError("a cost in a DisCSP", 'write type="DisWCSP" in the presentation, or delete the cost')
+    if isinstance(constraint.definition, Relation):
+        raise MistakeError("a cost on a relation", 'a soft relation names the costs of its tuples: semantics="soft"')
+    check_cost(constraint.cost)
+
+
+def refuse_private_part(model: Model | None) -> None:
+    """Raise `MistakeError` for a private constraint of which a neighbour would hold a part."""
+    if model is Model.PKC:
+        raise MistakeError("a private constraint with model PKC", "a private constraint is its robot's alone: no model")
+
+
+def check_private(constraint: Constraint, own: Collection[str]) -> None:
+    """Raise `MistakeError` unless an intra-agent constraint is over `own` variables only."""
+    for name in constraint.variables:
+        if name not in own:
+            hint = suggestion(name, own, "variables") + "; shared constraints stand under agents_parent"
+            raise MistakeError(f"a private constraint over '{shortened(name)}', which is not the robot's own", hint)
+
+
+def refuse_no_model(model: Model | str | None) -> None:
+    """Raise `MistakeError` for a shared constraint of which nobody says who knows it."""
+    if not model:
+        raise MistakeError("a shared constraint lacks its model", 'write model="TKC" or model="PKC"')
+
+
+def check_shared(constraint: Constraint, own: Collection[str]) -> None:
+    """Raise `MistakeError` unless a constraint with a neighbour is over `own` variables and others'."""
+    mine = [name for name in constraint.variables if name in own]
+    if not mine:
+        hint = suggestion(constraint.variables[0], own, "own variables")
+        raise MistakeError(f"the scope '{shown(constraint.scope)}' has no variable of this robot", hint)
+    if len(mine) == len(constraint.variables):
+        hint = "name one, or put the constraint into the <constraints> of the instance: it is private"
+        raise MistakeError(f"the scope '{shown(constraint.scope)}' has no variable of the neighbour", hint)
+
+
+def _check_application(definition: Relation | Predicate, scope: tuple[Term, ...], parameters: tuple[Term, ...]) -> None:
+    """Raise `MistakeError` unless the definition takes so many terms, and scope and parameters are about the same."""
+    if isinstance(definition, Relation) and parameters != scope:
+        raise MistakeError(
+            f"parameters '{shown(parameters)}' differ from the scope '{shown(scope)}'",
+            "a relation's tuples follow the scope: leave the parameters out",
+        )
+    takes = definition.arity if isinstance(definition, Relation) else len(definition.parameters)
+    if len(parameters) != takes:
+        raise MistakeError(
+            f"{shortened(definition.name)} takes {takes} terms, but '{shown(parameters)}' has {len(parameters)}",
+            "give it as many as it takes",
+        )
+    if parameters == scope:
+        return
+    in_scope, passed = set(scope), set(parameters)
+    for term in parameters:
+        if isinstance(term, str) and term not in in_scope:
+            raise MistakeError(f"the parameter '{shortened(term)}' is not in the scope", "add it to the scope")
+    for term in scope:
+        if term not in passed:
+            raise MistakeError(
+                f"'{shortened(str(term))}' is in the scope but not among the parameters",
+                "delete it there, or add it to the parameters",
+            )
+
+
+def refuse_nothing_to_decide(variables: Collection[object]) -> None:
+    """Raise `MistakeError` for a robot without variables."""
+    if not variables:
+        raise MistakeError("the robot has no variable", 'add <variable name="V1.1" domain="D1"/>')
+
+
+def check_told(told: Sequence[str], own: Collection[str]) -> None:
+    """Raise `MistakeError` unless a child is `told` of `own` variables, of each once."""
+    seen: set[str] = set()
+    for variable in told:
+        if variable not in own:
+            hint = suggestion(variable, own, "own variables")
+            raise MistakeError(f"the child is to be told '{shortened(variable)}', which is not the robot's own", hint)
+        if variable in seen:
+            raise MistakeError(f"the child is to be told '{shortened(variable)}' twice", "name it once")
+        seen.add(variable)
+
+
+def repeated(name: str, parents: Sequence[Parent], children: Sequence[Child]) -> Iterator[tuple[Parent | Child, str]]:
+    """Neighbours of the robot `name` that are listed before, or are itself; and what is wrong with each."""
+    seen = {name: "the robot itself"}
+    for role, neighbours in (("parent", parents), ("child", children)):
+        for neighbour in neighbours:
+            if neighbour.name in seen:
+                yield neighbour, f"the {role} '{shortened(neighbour.name)}' is {seen[neighbour.name]}"
+            seen.setdefault(neighbour.name, f"listed as {role} already")
+
+
+def check_brought(constraint: Constraint) -> None:
+    """Raise `MistakeError` for a partially known constraint that a scenario adds to two robots."""
+    if constraint.model is Model.PKC:
+        message = "a partially known constraint (PKC) in a scenario"
+        raise MistakeError(message, 'each side would need its part: write model="TKC"')
+
+
+def check_newcomers_constraint(constraint: Constraint) -> None:
+    """Raise `MistakeError` for a partially known constraint of a robot that a scenario adds."""
+    if constraint.model is Model.PKC:
+        message = "a partially known constraint (PKC) of a robot that a scenario adds"
+        raise MistakeError(message, 'the parent could not bring its part: write model="TKC"')

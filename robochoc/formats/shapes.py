@@ -1,0 +1,128 @@
+"""Whether Python objects are made as their dataclasses say: an `int` where an `int` belongs, tuples and no lists.
+
+Python does not look at annotations. What a reader of files makes is right by construction; what a program builds need
+not be, and everything behind counts on it: that a value is hashable, that nobody can change it afterwards, that it is
+written down as it was meant.
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import cache
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+from robochoc.expression import Apply, Constant, Name
+from robochoc.formats.diagnostics import shortened
+
+_LEAVES = (Apply, Constant, Name)
+"""Expressions: they may be too deep to be walked, and have a check of their own."""
+
+_Check = Callable[[object], None]
+
+
+class ShapeError(TypeError):
+    """An object is not made as it should be: `path` leads to the part that is wrong."""
+
+    def __init__(self, value: object, expected: str) -> None:
+        self.path = ""
+        shown = f"'{shortened(value)}'" if isinstance(value, str) else f"a {type(value).__name__}"
+        super().__init__(f"{shown} where {expected} should stand")
+
+    def inside(self, step: str) -> ShapeError:
+        """Return the same mistake, one `step` deeper."""
+        self.path = f"{step}{self.path}"
+        return self
+
+
+def check_shape(value: object, kind: type) -> None:
+    """Raise `ShapeError` unless `value` is an object of the dataclass `kind`, and all its parts are as it says."""
+    _check(kind)(value)
+
+
+@cache
+def _check(hint: Any) -> _Check:  # noqa: ANN401 - an annotation
+    if get_origin(hint) in {Union, types.UnionType}:
+        return _any_of(hint)
+    if get_origin(hint) is tuple:
+        return _tuple_of(get_args(hint)[0])
+    if hint is float:
+        return _exactly("a number", int, float)
+    if hint is int:
+        return _exactly("an integer", int)
+    return _Parts(hint) if is_dataclass(hint) and hint not in _LEAVES else _instance_of(hint)
+
+
+def _exactly(expected: str, *kinds: type) -> _Check:
+    """Numbers: True is an `int`, and is written as no number is."""
+
+    def check(value: object) -> None:
+        if type(value) not in kinds:
+            raise ShapeError(value, expected)
+
+    return check
+
+
+def _instance_of(kind: type) -> _Check:
+    def check(value: object) -> None:
+        if not isinstance(value, kind):
+            expected = f"one of {kind.__name__}" if issubclass(kind, Enum) else f"a {kind.__name__}"
+            raise ShapeError(value, expected.replace("a NoneType", "None"))
+
+    return check
+
+
+def _any_of(hint: Any) -> _Check:  # noqa: ANN401 - an annotation
+    options = get_args(hint)
+    checks = {option: _check(option) for option in options if option not in _LEAVES}
+    expected = " or ".join("None" if option is type(None) else option.__name__ for option in options)
+
+    def check(value: object) -> None:
+        found = next((option for option in options if isinstance(value, option)), None)
+        if found is None:
+            raise ShapeError(value, expected)
+        if found in checks:
+            checks[found](value)
+
+    return check
+
+
+def _tuple_of(item: Any) -> _Check:  # noqa: ANN401 - an annotation
+    check_item = _check(item)
+
+    def check(value: object) -> None:
+        if not isinstance(value, tuple):
+            raise ShapeError(value, "a tuple")
+        if item is int and all(type(one) is int for one in value):
+            return
+        for number, one in enumerate(value):
+            try:
+                check_item(one)
+            except ShapeError as error:
+                raise error.inside(f"[{number}]") from None
+
+    return check
+
+
+class _Parts:
+    """A dataclass, field by field."""
+
+    def __init__(self, kind: Any) -> None:  # noqa: ANN401 - a dataclass
+        self._kind = kind
+        self._whole = _instance_of(kind)
+
+    def __call__(self, value: object) -> None:
+        self._whole(value)
+        for name, check in _fields_of(self._kind):
+            try:
+                check(getattr(value, name))
+            except ShapeError as error:
+                raise error.inside(f".{name}") from None
+
+
+@cache
+def _fields_of(kind: Any) -> tuple[tuple[str, _Check], ...]:  # noqa: ANN401 - a dataclass
+    hints = get_type_hints(kind)
+    return tuple((field.name, _check(hints[field.name])) for field in fields(kind))

@@ -1,0 +1,213 @@
+"""Whether a team is valid, whoever made it: the rules of FORMAT.md, asked of the data.
+
+A team that was read is valid: its reader has asked the same. A team that was built in Python, by hand, by a generator
+or by a change, is looked at when somebody wants to solve or to write it. What has been found valid is remembered for
+as long as that very object lives: teams cannot be changed, and `dataclasses.replace` makes another object.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
+
+from robochoc.change import BadChange, changed
+from robochoc.formats.copies import differing_copies
+from robochoc.formats.diagnostics import Diagnostic, InvalidInput, MistakeError, shortened
+from robochoc.formats.members import Member, Members
+from robochoc.formats.names import check_integer
+from robochoc.formats.neighbours import (
+    cycles,
+    disagreements,
+    missing_robots,
+    mixed_kinds,
+    out_of_order,
+    shared_variables,
+)
+from robochoc.formats.objects import Objects, repeated_robots
+from robochoc.formats.places import ObjectPlaces, Place
+from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
+from robochoc.formats.scopes import misplaced, misplaced_parts, untold
+from robochoc.formats.shapes import ShapeError, check_shape
+from robochoc.problem import AddAgent, AddConstraint, AddValue, Change, Event, RemoveValue, Robot, Team, priority_order
+
+MAX_BETWEEN = 1000
+"""So many mistakes between the robots of one team are told."""
+
+_valid: dict[int, weakref.ref[Team]] = {}
+"""The teams that are known to be valid, by `id`. To hash a team would take as long as to look at it."""
+
+
+def check_team(team: Team) -> None:
+    """Raise `InvalidInput` with every mistake of `team`, unless it is valid (FORMAT.md).
+
+    The messages are those for files; where a file's have its name and a line, these have the robot, and what of it is
+    wrong. A team that was found valid before is not looked at again.
+    """
+    if is_known_valid(team):
+        return
+    found = _of_the_whole(team) or _mistakes(team) or list(_of_the_scenario(team))
+    if found:
+        raise InvalidInput(found)
+    note_valid(team)
+
+
+def check_writable(team: Team) -> None:
+    """Raise `InvalidInput` unless `team` is valid, and robots' files can say all of it.
+
+    They have no order but the links', no scenario, and do not say what changes have left of a variable's neighbours.
+    """
+    check_team(team)
+    found = [
+        ObjectPlaces(robot.name)
+        .robot()
+        .mistake(
+            f"it shows '{shortened(robot.shown[0])}', though nothing else of it says so",
+            "a file cannot say that: it is what a change has left",
+        )
+        for robot in team.robots
+        if robot.shown
+    ]
+    if team.scenario:
+        place = Place(f"team {shortened(team.name)}")
+        found.append(place.mistake("its scenario is no robot's", "write it as scenario.xml, and the team without it"))
+    if found:
+        raise InvalidInput(found)
+    by_links = priority_order({robot.name: [parent.name for parent in robot.parents] for robot in team.robots})
+    if by_links != team.order:
+        check_team(replace(team, robots=tuple(team[name] for name in by_links)))
+
+
+def check_robot(robot: Robot) -> None:
+    """Raise `InvalidInput` with every mistake that `robot` has by itself; its neighbours are not there to be asked."""
+    found = Objects().mistakes(robot)
+    if found:
+        raise InvalidInput(found)
+
+
+def note_valid(team: Team) -> None:
+    """Remember that `team` has been found valid, or was made by somebody who has asked all that is asked here."""
+    key = id(team)
+    _valid[key] = weakref.ref(team, lambda _: _valid.pop(key, None))
+
+
+def is_known_valid(team: Team) -> bool:
+    """Whether this very object has been found valid before."""
+    known = _valid.get(id(team))
+    return known is not None and known() is team
+
+
+def between(members: Members) -> list[Diagnostic]:
+    """Return what the robots of a team get wrong between them."""
+    return list(islice(_between(members), MAX_BETWEEN))
+
+
+def _between(members: Members) -> Iterator[Diagnostic]:
+    yield from missing_robots(members)
+    yield from disagreements(members)
+    yield from cycles(members)
+    yield from out_of_order(members)
+    yield from mixed_kinds(members)
+    yield from shared_variables(members)
+    scopes = list(misplaced(members))
+    yield from scopes
+    yield from misplaced_parts(members)
+    yield from untold(members)
+    yield from differing_copies(members, {mistake.file for mistake in scopes})
+
+
+def _of_the_whole(team: Team) -> list[Diagnostic]:
+    """What leaves nothing else to be asked: no robots, or objects that are none."""
+    given: object = team
+    place = Place("the team")
+    try:
+        check_shape(replace(given, robots=()) if isinstance(given, Team) else given, Team)
+        place = Place(f"team {shortened(team.name)}")
+        robots: object = team.robots
+        if not isinstance(robots, tuple):
+            raise ShapeError(robots, "a tuple").inside(".robots")
+        team.name.encode()
+    except ShapeError as error:
+        where = error.path.lstrip(".")
+        return [place.mistake(f"{where}: {error}" if where else str(error), "build it as its class says")]
+    except UnicodeEncodeError:
+        return [place.mistake("its name has no UTF-8 form", "give it another")]
+    if not team.robots:
+        return [place.mistake("there is no robot here", "a team has one robot or more")]
+    return []
+
+
+def _mistakes(team: Team) -> list[Diagnostic]:
+    objects = Objects()
+    found: list[Diagnostic] = []
+    right: dict[str, Member] = {}
+    broken: set[str] = set()
+    for robot in team.robots:
+        mistakes = objects.mistakes(robot)
+        found += mistakes
+        name = getattr(robot, "name", None)
+        if mistakes and isinstance(name, str):
+            broken.add(name)
+        elif not mistakes:
+            right.setdefault(robot.name, Member(robot, ObjectPlaces(robot.name)))
+    named = [robot for robot in team.robots if isinstance(getattr(robot, "name", None), str)]
+    twice = list(repeated_robots(named))
+    for name in broken:
+        right.pop(name, None)
+    if twice or len(named) < len(team.robots):
+        return [*found, *twice]
+    return [*found, *between(Members(right, frozenset(broken), team.order))]
+
+
+# Changes over time
+
+
+def _of_the_scenario(team: Team) -> Iterator[Diagnostic]:
+    """The first event that cannot be, with all that is wrong with it: what comes after would follow from it."""
+    now = replace(team, scenario=()) if team.scenario else team
+    for number, event in enumerate(team.scenario, start=1):
+        place = Place(f"event {number} of the scenario")
+        found = list(_of_the_time(event, place))
+        for change in event.changes:
+            mistakes = list(_of_the_change(now, change, place))
+            found += mistakes
+            if not mistakes:
+                try:
+                    now = changed(now, [change])
+                except BadChange as bad:
+                    found.append(place.mistake(bad.message, bad.hint))
+        if not found and not now.robots:
+            found.append(place.mistake(*NOBODY_LEFT))
+        if found:
+            yield from found
+            return
+
+
+def _of_the_time(event: Event, place: Place) -> Iterator[Diagnostic]:
+    try:
+        check_integer(event.after or 0)
+    except MistakeError as mistake:
+        yield place.mistake(mistake.message, mistake.hint)
+    if event.after is not None and event.after < 0:
+        yield place.mistake("an event after less than no message", "expected None, or a number of messages")
+
+
+def _of_the_change(team: Team, change: Change, place: Place) -> Iterator[Diagnostic]:
+    """What is wrong with a change whatever the team is like."""
+    try:
+        match change:
+            case AddAgent(robot):
+                yield from Objects().mistakes(robot)
+                for constraint in robot.shared:
+                    check_newcomers_constraint(constraint)
+            case AddConstraint(agent, _, constraint):
+                check_brought(constraint)
+                if agent in team:
+                    yield from Objects().mistakes_of_constraint(constraint, team[agent])
+            case AddValue(_, value) | RemoveValue(_, value):
+                check_integer(value)
+            case _:
+                pass
+    except MistakeError as mistake:
+        yield place.mistake(mistake.message, mistake.hint)
