@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -60,6 +59,8 @@ def named(group: str, name: str) -> list[EntryPoint]:
 
 def missing(group: str, kind: str, name: str) -> str:
     """That nothing of that name is installed, what is, and what may have been meant."""
+    import difflib  # noqa: PLC0415 - start-up: only mistakes need it
+
     names = names_in(group)
     near = difflib.get_close_matches(name.lower(), names, 1)
     hint = f"; did you mean {near[0]!r}?" if near else ""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
-import shutil
 from pathlib import Path
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput
@@ -17,6 +15,9 @@ def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
     Raises `InvalidInput` when something is there already, unless `replace` is set and it is a team's folder (one
     that holds nothing but XML files); raises `OSError` when the folder cannot be written.
     """
+    import secrets  # noqa: PLC0415 - start-up: only who writes a team needs them
+    import shutil  # noqa: PLC0415 - the same
+
     if folder.exists() or folder.is_symlink():
         _may_replace(folder, replace=replace)
     folder = folder.resolve()
