@@ -6,8 +6,9 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
 from typing import NamedTuple
+
+from robochoc.entry_points import EntryPoint, entry_points
 
 Fault = Callable[[object], str]
 """Why something that was loaded cannot be used; empty when it can."""
@@ -31,7 +32,7 @@ def entries(group: str) -> Sequence[EntryPoint]:
 
 @lru_cache(maxsize=8)
 def _read(group: str, _path: tuple[tuple[str, int], ...]) -> tuple[EntryPoint, ...]:
-    return tuple(entry_points(group=group))
+    return tuple(entry_points(group))
 
 
 def _changed_ns(place: str) -> int:
