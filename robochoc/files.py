@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import secrets
-import shutil
 from contextlib import suppress
 from pathlib import Path
 
@@ -129,6 +127,8 @@ class Unfinished:
 
     def _copied(self) -> Path:
         """The same once more, with a name: for systems that give none to what had none."""
+        import shutil  # noqa: PLC0415 - start-up: seldom needed
+
         self._named = _beside(self._target)
         mode = os.fstat(self.stream.fileno()).st_mode & 0o777
         self.stream.seek(0)
@@ -218,4 +218,6 @@ def _write_all(descriptor: int, content: bytes) -> None:
 
 def _beside(target: Path) -> Path:
     """A hidden name in the same folder that nobody has; short enough whatever `target` is called."""
+    import secrets  # noqa: PLC0415 - start-up: who only reads needs no names
+
     return target.with_name(f".{secrets.token_hex(8)}.part")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import sys
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
 from typing import NamedTuple
+
+from robochoc.entry_points import EntryPoint, entry_points
 
 Fault = Callable[[object], str]
 """Why something that was loaded cannot be used; empty when it can."""
@@ -32,7 +32,7 @@ def entries(group: str) -> Sequence[EntryPoint]:
 
 @lru_cache(maxsize=8)
 def _read(group: str, _path: tuple[tuple[str, int], ...]) -> tuple[EntryPoint, ...]:
-    return tuple(entry_points(group=group))
+    return tuple(entry_points(group))
 
 
 def _changed_ns(place: str) -> int:
@@ -60,6 +60,8 @@ def named(group: str, name: str) -> list[EntryPoint]:
 
 def missing(group: str, kind: str, name: str) -> str:
     """That nothing of that name is installed, what is, and what may have been meant."""
+    import difflib  # noqa: PLC0415 - start-up: only mistakes need it
+
     names = names_in(group)
     near = difflib.get_close_matches(name.lower(), names, 1)
     hint = f"; did you mean {near[0]!r}?" if near else ""

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
-from robochoc.communication.channel import ChannelModel
 from robochoc.defaults import SATISFIES
 from robochoc.orders import Order
 from robochoc.solver.compile import Limits
+
+if TYPE_CHECKING:
+    from robochoc.communication.channel import ChannelModel
 
 CENTRAL = "central"
 """The protocol that is none: one model of all files, which ACE decides."""

@@ -15,7 +15,6 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from enum import StrEnum
-from fractions import Fraction
 from random import Random
 from typing import assert_never
 
@@ -160,6 +159,8 @@ def _dom_deg(graph: Graph, team: Team) -> tuple[str, ...]:
     The domain is the declared one: of a robot with several variables, all combinations of their values. What its
     private constraints leave of it is known only when it has been compiled.
     """
+    from fractions import Fraction  # noqa: PLC0415 - start-up: no other order needs it
+
     size = {robot.name: math.prod(len(variable.domain) for variable in robot.variables) for robot in team.robots}
 
     def key(name: str) -> tuple[bool, Fraction, object]:

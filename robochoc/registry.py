@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint
 from typing import cast
 
 from robochoc.defaults import FIRST_FIT, MINIMISES
+from robochoc.entry_points import EntryPoint
 from robochoc.installed import all_in, loaded, missing, named, names_in
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import DynamicProtocol, Protocol, Settings
@@ -23,15 +23,27 @@ class UnknownProtocol(LookupError):  # noqa: N818 - named for what was asked for
 
 @dataclass(frozen=True)
 class Offer:
-    """What the package `package` offers as the protocol `name`: the class at `place`, or why there is none."""
+    """What a package offers as a protocol: the class that `entry` stands for, or why there is none."""
 
-    name: str
-    place: str
-    """Module and class, as the package names them: `robochoc.protocols.abt:ABT`."""
-    package: str
+    entry: EntryPoint
     protocol: type[Protocol] | None
     broken: str = ""
     """Why it cannot be used; empty when it can."""
+
+    @property
+    def name(self) -> str:
+        """What the protocol is called."""
+        return self.entry.name
+
+    @property
+    def place(self) -> str:
+        """Module and class, as the package names them: `robochoc.protocols.abt:ABT`."""
+        return self.entry.value
+
+    @property
+    def package(self) -> str:
+        """Name and version of the package."""
+        return f"{self.entry.dist.name} {self.entry.dist.version}" if self.entry.dist else "unknown"
 
 
 def protocol_names() -> tuple[str, ...]:
@@ -82,9 +94,8 @@ def speaker(class_name: str, likely: Iterable[str] = ()) -> tuple[str, type[Prot
 
 
 def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> Offer:
-    package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "unknown"
     found = loaded(entry, namesakes, _fault)
-    return Offer(entry.name, entry.value, package, cast("type[Protocol] | None", found.what), found.broken)
+    return Offer(entry, cast("type[Protocol] | None", found.what), found.broken)
 
 
 def _fault(loaded: object) -> str:

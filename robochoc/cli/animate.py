@@ -11,7 +11,7 @@ from robochoc.cli.paths import InputPath, OutputFile
 from robochoc.cli.saved import saved_outcome, team_of, team_option
 
 
-@click.command(short_help="Make the 3D scene of a saved result or journal.")
+@click.command()
 @click.argument("saved", type=InputPath(), metavar="RESULT.json|JOURNAL")
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="The page to write; needed unless --serve.")
 @team_option

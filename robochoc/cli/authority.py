@@ -36,7 +36,7 @@ def _lasting(_context: click.Context, _parameter: click.Parameter, hours: float)
     return hours
 
 
-@click.group(short_help="Say who may take part on several machines: enrol, list, revoke.")
+@click.group()
 def authority() -> None:
     """The Authority: it says who may take part, and certifies the keys of those who may.
 

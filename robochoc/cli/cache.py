@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 
-@click.group(short_help="Show or clear the cache of solved local problems.")
+@click.group()
 def cache() -> None:
     """The cache of local problems that were solved before, in your cache folder (XDG_CACHE_HOME, or ~/.cache).
 

@@ -22,24 +22,24 @@ Exit status:
 
 
 COMMANDS = {
-    "animate": "animate",
-    "authority": "authority",
-    "cache": "cache",
-    "compile": "compile_team",
-    "directory": "directory",
-    "export": "export",
-    "fly": "fly",
-    "generate": "generate",
-    "journal": "journal",
-    "master": "master",
-    "protocols": "protocols",
-    "replay": "replay",
-    "robot": "robot",
-    "sniff": "sniff",
-    "solve": "solve",
-    "validate": "validate",
+    "animate": ("animate", "Make the 3D scene of a saved result or journal."),
+    "authority": ("authority", "Say who may take part on several machines: enrol, list, revoke."),
+    "cache": ("cache", "Show or clear the cache of solved local problems."),
+    "compile": ("compile_team", "Compile robots' local problems, and show what they come to."),
+    "directory": ("directory", "Ask a running master who is there, and offers what."),
+    "export": ("export", "Write a team's whole problem for other solvers."),
+    "fly": ("fly", "Fly a saved result: simulated drones, a page, ROS."),
+    "generate": ("generate", "Write a team of a known family."),
+    "journal": ("journal", "What is in a journal, and exports of it."),
+    "master": ("master", "Lead a team whose robots are on machines of their own."),
+    "protocols": ("protocols", "List the protocols that are installed, or explain one."),
+    "replay": ("replay", "Play a journal again, and say where the protocol does something else."),
+    "robot": ("robot", "Be one robot, on its own machine, in a master's run."),
+    "sniff": ("sniff", "Look into what robots said: a page on this machine."),
+    "solve": ("solve", "Solve teams, each robot in its own process."),
+    "validate": ("validate", "Check teams, and tell every mistake with file and line."),
 }
-"""What a command is called in the module of its name."""
+"""What each command is called in the module of its name, and its line in `robochoc --help`, which imports none."""
 
 
 class Commands(click.Group):
@@ -53,8 +53,13 @@ class Commands(click.Group):
         """The command of that name, if there is one."""
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = resolve_name(f"robochoc.cli.{cmd_name}:{COMMANDS[cmd_name]}")
+        command: click.Command = resolve_name(f"robochoc.cli.{cmd_name}:{COMMANDS[cmd_name][0]}")
         return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click's
+        """Write a line for each command, as click does, without importing any."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from robochoc.solver.compile import Limits
 
 
-@click.command("compile", short_help="Compile robots' local problems, and show what they come to.")
+@click.command("compile")
 @click.argument("paths", nargs=-1, required=True, type=InputPath(), metavar="TEAM ...")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a team.")
 @local_options

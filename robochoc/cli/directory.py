@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from robochoc.services.descriptions import AgentDescription
 
 
-@click.command(short_help="Ask a running master who is there, and offers what.")
+@click.command()
 @click.option(
     "--master", "place", type=PlaceType(), required=True, metavar="HOST:PORT", help="Where the master listens."
 )

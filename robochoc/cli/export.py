@@ -10,7 +10,7 @@ from robochoc.cli.failure import failures_told
 from robochoc.cli.paths import InputPath, OutputFile
 
 
-@click.command(short_help="Write a team's whole problem for other solvers.")
+@click.command()
 @click.argument("folder", type=InputPath(), metavar="TEAM")
 @click.option("--format", "kind", type=click.Choice(["xcsp3"]), default="xcsp3", show_default=True)
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File to write  [default: standard output]")

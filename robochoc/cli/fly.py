@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from robochoc.ros.mission import Mission
 
 
-@click.command(short_help="Fly a saved result: simulated drones, a page, ROS.")
+@click.command()
 @click.argument("saved", type=InputPath(), metavar="RESULT.json|JOURNAL")
 @team_option
 @ros_options

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from robochoc.problem import Team
 
 
-@click.group(short_help="Write a team of a known family.")
+@click.group()
 def generate() -> None:
     """Write a team of a known family as a folder of XML files."""
 

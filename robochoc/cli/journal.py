@@ -25,7 +25,7 @@ MOST_IN_PAGE = 100_000
 """Messages: with more, the page would be too large for browsers to open at once."""
 
 
-@click.group(short_help="What is in a journal, and exports of it.")
+@click.group()
 def journal() -> None:
     """What 'robochoc solve --journal FILE' has written: all that robots said to each other, took in and decided."""
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from robochoc.outcome import Outcome
 
 
-@click.command(cls=SolveCommand, short_help="Lead a team whose robots are on machines of their own.")
+@click.command(cls=SolveCommand)
 @click.option(
     "--listen",
     "place",

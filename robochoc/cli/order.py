@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,6 +29,8 @@ class OrderName(click.Path):
         if word in NAMES:
             return word
         if not word or not os.path.lexists(word):
+            import difflib
+
             near = difflib.get_close_matches(word, NAMES, 1)
             hint = f"did you mean '{near[0]}'?" if near else f"orders: {', '.join(NAMES)}"
             self.fail(f"'{word}' is no order and no file; {hint}", param, ctx)

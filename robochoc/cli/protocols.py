@@ -9,7 +9,7 @@ import click
 from robochoc.cli.failure import USAGE, Failure
 
 
-@click.command(short_help="List the protocols that are installed, or explain one.")
+@click.command()
 @click.argument("name", required=False)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a protocol.")
 def protocols(name: str | None, *, as_json: bool) -> None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from robochoc.replay import Means, Replayed
 
 
-@click.command(short_help="Play a journal again, and say where the protocol does something else.")
+@click.command()
 @click.argument("journal", type=InputPath(), metavar="JOURNAL")
 @click.option(
     "--team",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from robochoc.machines.place import Place
 
 
-@click.command(short_help="Be one robot, on its own machine, in a master's run.")
+@click.command()
 @click.argument("file", type=InputPath())
 @click.option(
     "--master", "place", type=PlaceType(), required=True, metavar="HOST:PORT", help="Where the master listens."

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from robochoc.view.sniffer.session import Session
 
 
-@click.command(short_help="Look into what robots said: a page on this machine.")
+@click.command()
 @click.argument("journal", type=InputPath(), metavar="[JOURNAL]", required=False)
 @master_options
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port of the page; 0 is any free one.")

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from robochoc.view.scene import Scene
 
 
-@click.command(cls=SolveCommand, short_help="Solve teams, each robot in its own process.")
+@click.command(cls=SolveCommand)
 @click.argument("paths", nargs=-1, required=True, type=InputPath(), metavar="PATH ...")
 @click.option(
     "--protocol",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from robochoc.problem import Robot
 
 
-@click.command(short_help="Check teams, and tell every mistake with file and line.")
+@click.command()
 @click.argument("paths", nargs=-1, type=InputPath(), metavar="[PATH ...]")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a team.")
 @click.pass_context

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
@@ -60,6 +59,8 @@ class Watch:
         """
         if self._watching is None:
             return []
+        import tempfile
+
         from robochoc.view.sniffer.viewer import Viewer
 
         file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - the stack closes it

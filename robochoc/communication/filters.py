@@ -10,10 +10,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint
 from typing import cast
 
 from robochoc.authority.keyring import KeyRing
+from robochoc.entry_points import EntryPoint
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.installed import all_in, loaded, missing, named
 

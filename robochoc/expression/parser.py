@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import re
 from collections.abc import Collection, Sequence
@@ -293,6 +292,8 @@ def _too_deep(position: int) -> ExpressionError:
 
 
 def _nearest(word: str, known: Collection[str]) -> str:
+    import difflib  # noqa: PLC0415 - start-up: only mistakes need it
+
     close = difflib.get_close_matches(word[:32], list(itertools.islice(known, 100)), n=1)
     return f"did you mean '{close[0]}'?" if close else ""
 

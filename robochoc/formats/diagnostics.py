@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import os
 from collections.abc import Collection, Iterable, Iterator
@@ -79,6 +78,8 @@ def suggestion(word: str, known: Collection[str], what: str) -> str:
     """A hint for an unknown name: the known one that looks like it, or all of them; `what` is their plural."""
     if not known:
         return f"there are no {what}"
+    import difflib  # noqa: PLC0415 - start-up: only mistakes need it
+
     some = list(itertools.islice(known, 100))
     close = difflib.get_close_matches(word[:40], some, n=1)
     return f"did you mean '{close[0]}'?" if close else f"known {what}: {shortened(' '.join(some))}"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
-import shutil
 from pathlib import Path
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput
@@ -23,6 +21,9 @@ def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
     already, unless `replace` is set and it is a team's folder (one that holds nothing but XML files). Raises `OSError`
     when the folder cannot be written.
     """
+    import secrets  # noqa: PLC0415 - start-up: only who writes a team needs them
+    import shutil  # noqa: PLC0415 - the same
+
     check_writable(team)
     files = {robot.name: _file(robot) for robot in team.robots}
     if folder.exists() or folder.is_symlink():

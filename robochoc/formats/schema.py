@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable
 from functools import cache
@@ -84,6 +83,8 @@ def check_schema(tree: etree._Element, file: str, schema: etree.XMLSchema) -> No
     """Raise `InvalidInput` unless `tree`, read from `file`, is valid."""
     if schema.validate(tree):
         return
+    import difflib  # noqa: PLC0415 - start-up: only mistakes need it
+
     report = Report(file)
     unknown: dict[str | None, list[str]] = {}
     for entry in entries(schema.error_log):

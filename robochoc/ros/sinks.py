@@ -6,10 +6,10 @@ the name. Whoever opens one closes it.
 
 from __future__ import annotations
 
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import cast
 
+from robochoc.entry_points import EntryPoint
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.installed import loaded, missing, named
 from robochoc.ros.sink import Sink, SinkFailed

@@ -8,11 +8,10 @@ runs at the same time see whole files only. Nothing in it is ever executed or un
 
 from __future__ import annotations
 
-import hashlib
 from array import array
 from collections.abc import Iterator
 from contextlib import suppress
-from importlib.util import find_spec
+from functools import cached_property
 from pathlib import Path
 
 import msgspec
@@ -40,8 +39,16 @@ class SolutionCache:
     """The cache in `folder` (made when it is needed). What it cannot read or write it does without."""
 
     def __init__(self, folder: Path | None = None) -> None:
-        self.folder = folder or cache_folder()
-        self._versions = (FORMAT, _solver_version())
+        self._folder = folder
+
+    @cached_property
+    def folder(self) -> Path:
+        """Where its files are; looked up when it is needed first: most robots need no solver."""
+        return self._folder or cache_folder()
+
+    @cached_property
+    def _versions(self) -> tuple[int, str]:
+        return FORMAT, _solver_version()
 
     def key(self, network: Network) -> str:
         """The name of `network`: equal for equal networks, whatever robot or team they belong to."""
@@ -113,11 +120,15 @@ def _read(content: bytes, key: str, width: int) -> tuple[Codes, ...] | None:
 
 
 def _digest(content: bytes) -> bytes:
+    import hashlib  # noqa: PLC0415 - start-up: most robots need no cache
+
     return hashlib.blake2b(content, digest_size=_DIGEST_BYTES).digest()
 
 
 def _solver_version() -> str:
     """What pycsp3 says it is, without importing it (it patches built-in types), or package metadata (slow)."""
+    from importlib.util import find_spec  # noqa: PLC0415 - start-up: the same
+
     found = find_spec("pycsp3")
     if found is None or found.origin is None:
         return "none"
