@@ -7,15 +7,11 @@ from dataclasses import replace
 
 from robochoc.anytime import absent, best_of, bound_of, joined, tree_of
 from robochoc.communication.run_result import RunResult
-from robochoc.observers.checker import cost, could_join, objections
+from robochoc.observers.checker import Refuted, cost, could_join, objections
 from robochoc.outcome import Epoch, Outcome, Verdict
 from robochoc.problem import Kind, Team
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled_team import CompiledTeam
-
-
-class Refuted(Exception):  # noqa: N818 - named for what happened to the claim
-    """The checker refutes what the protocol claims: a fault of the protocol, or ours."""
 
 
 def answered(epoch: Epoch, team: Team, result: RunResult, traits: Traits, compiled: CompiledTeam) -> Epoch:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from robochoc.anytime import absent
-from robochoc.observers.checker import cost
+from robochoc.observers.checker import Refuted, cost, has_local_solution
 from robochoc.options import Options, Withdrawal
 from robochoc.outcome import Epoch, Verdict
 from robochoc.problem import INFINITE, Kind, Team
-from robochoc.solver.ace import SolverLost
 from robochoc.solver.central import Judge, Judgement
+from robochoc.solver.failures import SolverLost
 
 
 def decided(judge: Judge, team: Team, options: Options, aside: int) -> Epoch:
@@ -27,6 +27,29 @@ def decided(judge: Judge, team: Team, options: Options, aside: int) -> Epoch:
         price = aside
         judgement = judge.judge(team, aside=price)
     return _told(judgement, team, price)
+
+
+def confirmed(
+    judge: Judge,
+    team: Team,
+    protocol: str,
+    alone: str | None = None,
+    *,
+    total: float = INFINITE,
+    aside: int | None = None,
+) -> bool:
+    """Return whether `judge` agrees with `protocol`: the least cost is `total`, or (infinite) there is no solution.
+
+    A robot that had none `alone` is looked at by the checker as well, as judge and compiler share their encoding.
+    Raises `Refuted` when one of them finds something else.
+    """
+    opinion = judge.judge(team, aside=aside)
+    against = contradiction(opinion, total)
+    if against or (alone is not None and has_local_solution(team[alone])):
+        claim = "no solution" if total == INFINITE else f"a solution of the least cost, {total:,}"
+        found = f"{team.name} has {claim}, and a judge has found {against or 'one'}"
+        raise Refuted(f"{protocol} says that {found}")
+    return opinion.verdict is not Verdict.UNKNOWN
 
 
 def contradiction(opinion: Judgement, total: float) -> str | None:

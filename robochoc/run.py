@@ -6,25 +6,21 @@ import itertools
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TypedDict, assert_never
+from typing import TYPE_CHECKING
 
-from robochoc.answers import Refuted, answered, check, placed
+from robochoc.answers import answered, check, placed
 from robochoc.anytime import absent
 from robochoc.change import changed_by, described
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress
-from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.session import Epoch as Given
 from robochoc.communication.session import Session
-from robochoc.communication.simulator import Simulation
-from robochoc.communication.timed import Timed
 from robochoc.defaults import FIRST_FIT, MINIMISES
 from robochoc.epochs import Announcer, Field, Journey, Opening, Played
 from robochoc.formats import check_team
-from robochoc.observers.checker import has_local_solution
+from robochoc.observers.checker import Refuted
 from robochoc.observers.events import Observer
 from robochoc.observers.objective import aside_cost
-from robochoc.opinion import contradiction, decided, total_cost
 from robochoc.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.orders import CannotTurn, Order, favourable, order_of
 from robochoc.outcome import Epoch, Metrics, Outcome, Verdict
@@ -33,14 +29,18 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.refusals import instead, refuse_central, refuse_field, refuse_unfit
 from robochoc.registry import protocol_named, spoken
-from robochoc.solver.ace import AceProcess, SolverTimeout
+from robochoc.runtimes import opened
 from robochoc.solver.cache import SolutionCache
-from robochoc.solver.central import Judge
 from robochoc.solver.compile import Compiler, CompileTimeout, Source
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain, TooManySolutions
 from robochoc.solver.encoding import TooMuch, Unsupported
+from robochoc.solver.failures import SolverTimeout
 from robochoc.solver.part import Brief
+
+if TYPE_CHECKING:
+    from robochoc.solver.ace import AceProcess
+    from robochoc.solver.central import Judge
 
 __all__ = ["CENTRAL", "OnLoss", "Options", "Refuted", "Runtime", "ScheduleName", "Withdrawal", "solve"]
 
@@ -225,6 +225,8 @@ class _Run:
             return replace(outcome, reason=self._limit(None, sum(spent.messages.values())))
         if outcome.verdict is not Verdict.OPTIMAL or brief.aside is None:
             return outcome
+        from robochoc.opinion import total_cost  # noqa: PLC0415 - start-up: seldom asked for
+
         total = total_cost(journey.team, outcome.assignment, brief.aside)
         return replace(outcome, confirmed=self._confirmed(journey.team, total=total, aside=int(brief.aside)))
 
@@ -275,6 +277,8 @@ class _Run:
 
     def centrally(self) -> Outcome:
         """One model of all files, decided by ACE; if the problem changes over time, one for each epoch."""
+        from robochoc.solver.ace import AceProcess  # noqa: PLC0415 - start-up: robots need it seldom
+
         refuse_central(self._team, self._options)
         self._outcome = replace(self._outcome, runtime=CENTRAL)
         count = None
@@ -290,6 +294,8 @@ class _Run:
 
     def _judged(self, team: Team, opened: str) -> int | None:
         """One epoch, decided by ACE; the number of solutions if that was asked for."""
+        from robochoc.opinion import decided  # noqa: PLC0415 - start-up: seldom asked for
+
         began = time.monotonic()
         count = None
         if self._options.count:
@@ -307,22 +313,16 @@ class _Run:
     def _confirmed(
         self, team: Team, alone: str | None = None, *, total: float = INFINITE, aside: int | None = None
     ) -> bool:
-        """Whether the central judge comes to the same: that the least cost is `total`, or that there is no solution.
-
-        A robot that had none `alone` is looked at by the checker as well, as judge and compiler share their encoding.
-        Raises `Refuted` when one of them finds something else.
-        """
+        """Whether the central judge comes to the same, if it is asked for. Raises `Refuted` (see `confirmed`)."""
         if not self._options.verify:
             return False
-        opinion = self._judge().judge(team, aside=aside)
-        against = contradiction(opinion, total)
-        if against or (alone is not None and has_local_solution(team[alone])):
-            claim = "no solution" if total == INFINITE else f"a solution of the least cost, {total:,}"
-            found = f"{team.name} has {claim}, and a judge has found {against or 'one'}"
-            raise Refuted(f"{self._options.protocol} says that {found}")
-        return opinion.verdict is not Verdict.UNKNOWN
+        from robochoc.opinion import confirmed  # noqa: PLC0415 - start-up: seldom asked for
+
+        return confirmed(self._judge(), team, self._options.protocol, alone, total=total, aside=aside)
 
     def _judge(self) -> Judge:
+        from robochoc.solver.central import Judge  # noqa: PLC0415 - start-up: seldom asked for
+
         always = self._options.local.always_ace
         show = lambda: self._show("ACE decides the whole team")  # noqa: E731 - it is one word for the judge
         return Judge(self._cache, self._deadline, show, self._solver, always_ace=always)
@@ -364,26 +364,7 @@ class _Run:
 
     def _session(self, protocol: type[Protocol], team: CompiledTeam, brief: Brief) -> Session:
         """`protocol` in the runtime asked for."""
-        watchers: _Watchers = {"observer": self._observer, "progress": self._progress}
-        if self._options.runtime is Runtime.PROCESSES:
-            from robochoc.communication.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
-
-            survive = self._options.on_loss is OnLoss.WITHDRAW
-            return ProcessesRun(team, protocol, survive=survive, brief=brief, **watchers)
-        if self._options.runtime is Runtime.NETWORK:
-            return self._network(protocol, team, brief)
-        return Simulation(team, protocol, _schedule(self._options), brief=brief, **watchers)
-
-    def _network(self, protocol: type[Protocol], team: CompiledTeam, brief: Brief) -> Session:
-        try:
-            from robochoc.communication.network.conditions import Conditions  # noqa: PLC0415 - one runtime is enough
-            from robochoc.communication.network.local import LocalNetwork  # noqa: PLC0415 - and it is an extra
-        except ModuleNotFoundError as missing:
-            raise Unsupported(f"--runtime network needs {missing.name}; say: pip install 'robochoc[network]'") from None
-        survive = self._options.on_loss is OnLoss.WITHDRAW
-        conditions = Conditions(filters=self._options.filters, survive=survive)
-        watchers: _Watchers = {"observer": self._observer, "progress": self._progress}
-        return LocalNetwork(team, protocol, conditions=conditions, brief=brief, **watchers)
+        return opened(protocol, team, brief, self._options, self._observer, self._progress)
 
     def _left_s(self) -> float | None:
         return None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
@@ -393,24 +374,7 @@ class _Run:
             self._progress(Progress(0, time.monotonic() - self._began, stage))
 
 
-class _Watchers(TypedDict):
-    observer: Observer | None
-    progress: Callable[[Progress], None] | None
-
-
 def _without(outcome: Outcome, journey: Journey) -> Outcome:
     """`outcome`, without the robots that were lost on the way."""
     lost = tuple(journey.withdrawn)
     return replace(outcome, withdrawn=lost, lost=lost)
-
-
-def _schedule(options: Options) -> Schedule:
-    if options.channel:
-        return Timed(options.seed, options.channel)
-    match options.schedule:
-        case ScheduleName.CONCURRENT:
-            return Concurrent(options.seed, options.delay)
-        case ScheduleName.RANDOM:
-            return RandomChannels(options.seed)
-        case never:
-            assert_never(never)

@@ -30,9 +30,10 @@ from robochoc.problem import Constraint, Relation, Semantics
 from robochoc.run import Options, solve
 from robochoc.solver import ace as front
 from robochoc.solver import propagation
-from robochoc.solver.ace import AceProcess, SolverLost, SolverMissing, SolverTimeout
+from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_words import Strategy
 from robochoc.solver.encoding import LONGEST_ALLOWED, Codes, Network, Table
+from robochoc.solver.failures import SolverLost, SolverMissing, SolverTimeout
 
 STRATEGIES: tuple[Strategy, Strategy] = ("default", "static")
 TABLES_AT_MOST = (LONGEST_ALLOWED, 5)

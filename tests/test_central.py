@@ -24,11 +24,12 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.outcome import Verdict
 from robochoc.problem import Constraint, Predicate, Relation, Semantics, Team
 from robochoc.run import Options, Refuted, Runtime, solve
-from robochoc.solver.ace import AceProcess, SolverLost
+from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_words import Solved
 from robochoc.solver.central import Judge, Judgement
 from robochoc.solver.cliques import cliques, strengthened
 from robochoc.solver.encoding import Codes, Component, Network, Table
+from robochoc.solver.failures import SolverLost
 from robochoc.solver.merged import identifiers
 from robochoc.solver.symmetry import Symmetry, broken, orbits, symmetries
 

@@ -36,10 +36,11 @@ from robochoc.problem import INFINITE, Constraint, Predicate, Relation, Semantic
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run import Options, Refuted, Runtime, Withdrawal, solve
-from robochoc.solver.ace import AceProcess, SolverLost
+from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_words import Solved
 from robochoc.solver.central import Judge, Judgement
 from robochoc.solver.encoding import Unsupported
+from robochoc.solver.failures import SolverLost
 
 CENTRAL = Options(protocol="central")
 FEWEST = replace(CENTRAL, withdraw=Withdrawal.FEWEST)

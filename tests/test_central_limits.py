@@ -20,9 +20,10 @@ from robochoc.observers.checker import cost, objections
 from robochoc.outcome import Outcome, Verdict
 from robochoc.problem import Constraint, Relation, Semantics
 from robochoc.run import Options, solve
-from robochoc.solver.ace import AceProcess, SolverTimeout
+from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import Judge, Judgement
 from robochoc.solver.encoding import Codes, Network, Table
+from robochoc.solver.failures import SolverTimeout
 from robochoc.solver.priced import priced
 
 CENTRAL = Options(protocol="central")

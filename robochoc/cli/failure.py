@@ -70,10 +70,10 @@ def _status(error: Exception) -> int | None:
     from robochoc.formats import InvalidInput
     from robochoc.registry import UnknownProtocol
     from robochoc.run import Refuted
-    from robochoc.solver.ace import SolverLost, SolverMissing
     from robochoc.solver.compile import CompileFailed, CompileTimeout
     from robochoc.solver.domain import TooManySolutions
     from robochoc.solver.encoding import Unsupported
+    from robochoc.solver.failures import SolverLost, SolverMissing
 
     statuses: dict[int, tuple[type[Exception], ...]] = {
         INVALID: (InvalidInput,),

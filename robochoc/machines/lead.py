@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 from msgspec import UNSET
 
-from robochoc.answers import Refuted
 from robochoc.anytime import bound_of, joined, tree_of
 from robochoc.authority.authority import Authority
 from robochoc.authority.enrolment_server import EnrolmentServer
@@ -29,6 +28,7 @@ from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.defaults import FIRST_FIT, MINIMISES, SATISFIES, suits
 from robochoc.machines.place import LOOPBACK, Place
+from robochoc.observers.checker import Refuted
 from robochoc.observers.events import Began, Observer
 from robochoc.options import Withdrawal
 from robochoc.outcome import Outcome, Verdict

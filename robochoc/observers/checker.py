@@ -15,6 +15,10 @@ PLACES = 20_000
 """Values to be tried for the variables of a robot that stepped aside."""
 
 
+class Refuted(Exception):  # noqa: N818 - named for what happened to the claim
+    """What a protocol claims is refuted by the checker, or by a second opinion: a fault of the protocol, or ours."""
+
+
 def objections(team: Team, assignment: Assignment, withdrawn: Collection[str] = ()) -> Iterator[str]:
     """Why `assignment` is no answer for the robots of `team` that have not withdrawn; nothing when it is one.
 

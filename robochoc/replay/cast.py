@@ -19,12 +19,13 @@ from robochoc.problem import Robot, Team
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.registry import UnknownProtocol, speaker, spoken
 from robochoc.replay.steps import Run
-from robochoc.solver.ace import AceProcess, SolverLost, SolverMissing, SolverTimeout
+from robochoc.solver.ace import AceProcess
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import CompileFailed, Compiler, CompileTimeout, Limits
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
 from robochoc.solver.domain import CompiledDomain, TooManySolutions
 from robochoc.solver.encoding import Unsupported
+from robochoc.solver.failures import SolverLost, SolverMissing, SolverTimeout
 from robochoc.solver.part import Brief, Part
 
 _UNCOMPILED = (

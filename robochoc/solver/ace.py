@@ -41,6 +41,7 @@ from robochoc.solver.ace_words import (
 )
 from robochoc.solver.encoding import Codes, Network
 from robochoc.solver.enumeration import STEPS_BEFORE_ACE, STEPS_EACH, Budget, OutOfSteps, cheapest, enumerated
+from robochoc.solver.failures import SolverLost, SolverMissing, SolverTimeout
 from robochoc.solver.propagation import propagated
 from robochoc.solver.question import Answer, Means, Question
 
@@ -48,22 +49,6 @@ CHUNK = 1 << 20
 LAST_WORDS_S = 1.0
 TASKS = 400
 """After so many the process is replaced: ACE keeps parts of every problem that it has seen."""
-
-
-class SolverMissing(Exception):  # noqa: N818 - named for what is missing
-    """There is no Java to run ACE with; says how to get it."""
-
-
-class SolverLost(Exception):  # noqa: N818 - named for what happened
-    """The solver's process died, or failed at the task; says what is known about it."""
-
-
-class SolverTimeout(Exception):  # noqa: N818 - a limit that was reached
-    """The time was over before the solver's answer. `best` is the cheapest solution so far, where one was sought."""
-
-    def __init__(self, best: Codes | None = None) -> None:
-        super().__init__()
-        self.best = best
 
 
 class AceProcess:

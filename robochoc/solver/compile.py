@@ -7,14 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from robochoc.problem import Robot
-from robochoc.solver.ace import AceProcess, SolverLost, SolverTimeout
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.domain import MOST_SOLUTIONS, CompiledDomain, TooManySolutions, compiled_domain
 from robochoc.solver.encoding import Codes, Network, Unsupported
-from robochoc.solver.question import Answer, Means
+from robochoc.solver.failures import SolverLost, SolverTimeout
+
+if TYPE_CHECKING:
+    from robochoc.solver.ace import AceProcess
+    from robochoc.solver.question import Answer
 
 PATIENCE_S = 60.0
 """How long the compilation of one robot may take, unless more is asked for."""
@@ -40,9 +43,6 @@ class Source(StrEnum):
     CACHE = "cache"
     ENUMERATED = "enumerated"
     ACE = "ace"
-
-
-_SOURCES = {Means.PROPAGATION: Source.DIRECT, Means.ENUMERATION: Source.ENUMERATED, Means.ACE: Source.ACE}
 
 
 class CompileTimeout(Exception):  # noqa: N818 - a limit that was reached
@@ -92,8 +92,8 @@ class Compiler:
         self._limits = limits or Limits()
         self._cache = cache
         self._deadline = deadline
-        self._ace = solver or AceProcess(always=self._limits.always_ace)
-        self._lent = solver is not None
+        self._lent = solver
+        self._own: AceProcess | None = None
         self._known: dict[Network, tuple[Codes, ...]] = {}
         self._too_slow: set[Network] = set()
 
@@ -103,8 +103,8 @@ class Compiler:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if not self._lent:
-            self._ace.close()
+        if self._own:
+            self._own.close()
 
     def compile(self, robot: Robot) -> Compilation:
         """The compiled domain of `robot`.
@@ -137,7 +137,7 @@ class Compiler:
             source = Source.CACHE
         if known is None:
             answer = self._solved(robot, network, limit)
-            known, source = answer.solutions, _SOURCES[answer.means]
+            known, source = answer.solutions, _source(answer)
             if self._cache is not None and answer.complete and source is Source.ACE:
                 self._cache.put(network, known)
         self._known[network] = known
@@ -148,7 +148,7 @@ class Compiler:
     def _solved(self, robot: str, network: Network, limit: float) -> Answer:
         deadline = limit if self._deadline is None else min(limit, self._deadline)
         try:
-            return self._ace.solve(network, limit=self._limits.solutions + 1, strategy="static", deadline=deadline)
+            return self._solver().solve(network, limit=self._limits.solutions + 1, strategy="static", deadline=deadline)
         except SolverTimeout as timeout:
             if self._deadline is not None and self._deadline <= limit:
                 raise
@@ -156,3 +156,21 @@ class Compiler:
             raise CompileTimeout(robot, self._limits.time_s) from timeout
         except SolverLost as lost:
             raise CompileFailed(robot, str(lost)) from lost
+
+    def _solver(self) -> AceProcess:
+        """The solver that was lent, or one of our own, which is made when the first network asks for it."""
+        from robochoc.solver.ace import AceProcess  # noqa: PLC0415 - start-up: most robots need no solver
+
+        if self._lent:
+            return self._lent
+        if self._own is None:
+            self._own = AceProcess(always=self._limits.always_ace)
+        return self._own
+
+
+def _source(answer: Answer) -> Source:
+    """Return what the solver's `answer` comes from."""
+    from robochoc.solver.question import Means  # noqa: PLC0415 - start-up: most robots need no solver
+
+    sources = {Means.PROPAGATION: Source.DIRECT, Means.ENUMERATION: Source.ENUMERATED, Means.ACE: Source.ACE}
+    return sources[answer.means]

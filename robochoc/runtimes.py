@@ -1,0 +1,79 @@
+"""The three runtimes: a session for a protocol and a team in the one that the options ask for.
+
+Each is imported when it is asked for: a run needs one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypedDict, assert_never
+
+from robochoc.communication.run_result import Progress
+from robochoc.communication.session import Session
+from robochoc.observers.events import Observer
+from robochoc.options import OnLoss, Options, Runtime, ScheduleName
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.encoding import Unsupported
+from robochoc.solver.part import Brief
+
+if TYPE_CHECKING:
+    from robochoc.communication.schedule import Schedule
+
+
+class _Rest(TypedDict):
+    brief: Brief
+    observer: Observer | None
+    progress: Callable[[Progress], None] | None
+
+
+def opened(
+    protocol: type[Protocol],
+    team: CompiledTeam,
+    brief: Brief,
+    options: Options,
+    observer: Observer | None,
+    progress: Callable[[Progress], None] | None,
+) -> Session:
+    """Return a session of `protocol` in the runtime of `options`. Raises `Unsupported` when it is not installed."""
+    rest: _Rest = {"brief": brief, "observer": observer, "progress": progress}
+    match options.runtime:
+        case Runtime.PROCESSES:
+            from robochoc.communication.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
+
+            return ProcessesRun(team, protocol, survive=options.on_loss is OnLoss.WITHDRAW, **rest)
+        case Runtime.SIMULATOR:
+            from robochoc.communication.simulator import Simulation  # noqa: PLC0415 - one runtime is enough
+
+            return Simulation(team, protocol, schedule_of(options), **rest)
+        case Runtime.NETWORK:
+            return _network(protocol, team, options, rest)
+        case never:
+            assert_never(never)
+
+
+def _network(protocol: type[Protocol], team: CompiledTeam, options: Options, rest: _Rest) -> Session:
+    try:
+        from robochoc.communication.network.conditions import Conditions  # noqa: PLC0415 - one runtime is enough
+        from robochoc.communication.network.local import LocalNetwork  # noqa: PLC0415 - and it is an extra
+    except ModuleNotFoundError as missing:
+        raise Unsupported(f"--runtime network needs {missing.name}; say: pip install 'robochoc[network]'") from None
+    conditions = Conditions(filters=options.filters, survive=options.on_loss is OnLoss.WITHDRAW)
+    return LocalNetwork(team, protocol, conditions=conditions, **rest)
+
+
+def schedule_of(options: Options) -> Schedule:
+    """Return the simulator's schedule that `options` ask for."""
+    if options.channel:
+        from robochoc.communication.timed import Timed  # noqa: PLC0415 - start-up: seldom asked for
+
+        return Timed(options.seed, options.channel)
+    from robochoc.communication.schedule import Concurrent, RandomChannels  # noqa: PLC0415 - start-up: the simulator's
+
+    match options.schedule:
+        case ScheduleName.CONCURRENT:
+            return Concurrent(options.seed, options.delay)
+        case ScheduleName.RANDOM:
+            return RandomChannels(options.seed)
+        case never:
+            assert_never(never)

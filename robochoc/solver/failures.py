@@ -1,0 +1,21 @@
+"""How the constraint solver fails. A file of its own, as whoever only has to know these starts no solver."""
+
+from __future__ import annotations
+
+from robochoc.solver.encoding import Codes
+
+
+class SolverMissing(Exception):  # noqa: N818 - named for what is missing
+    """There is no Java to run ACE with; says how to get it."""
+
+
+class SolverLost(Exception):  # noqa: N818 - named for what happened
+    """The solver's process died, or failed at the task; says what is known about it."""
+
+
+class SolverTimeout(Exception):  # noqa: N818 - a limit that was reached
+    """The time was over before the solver's answer. `best` is the cheapest solution so far, where one was sought."""
+
+    def __init__(self, best: Codes | None = None) -> None:
+        super().__init__()
+        self.best = best
