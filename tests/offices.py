@@ -114,7 +114,7 @@ class Office:
         self._settle()
         if tally.ready:
             self._tell_all(Search(tally.epoch))
-            self._searching = True
+            self._searching = tally.ordered = True
             self._settle()
             while tally.verdict is None and not tally.counters.quiescent and tally.wave_due:
                 self._tell_all(Wave(tally.counters.begin_wave()))
@@ -176,7 +176,7 @@ class Office:
             case Failed() as failed:
                 self.failures[name] = failed
             case OfEpoch() as word:
-                assert self.tally.hear(name, word)
+                assert not self.tally.hear(name, word)
             case _:
                 pass
 

@@ -20,8 +20,10 @@ from robochoc.communication.network.words import (
     Checked,
     Copies,
     Denied,
+    Exchanged,
     Joined,
     Judge,
+    Judged,
     Leave,
     Objection,
     Register,
@@ -60,7 +62,9 @@ def test_a_run_from_beginning_to_end() -> None:
     (account,) = post.heard_of(Account)
     assert isinstance(account, Account)
     assert (account.assigned, account.assignment) == (True, {"B": 2})
-    assert post.heard_of(Checked) == [Checked(1, allowed=True, cost=0)]
+    shared = (Judged("RB", ("A", "B"), 1, 0),)
+    assert post.heard_of(Checked) == [Checked(1, allowed=True, cost=0, held=1, shared=shared)]
+    assert account.exchanged == {"RA": Exchanged(0, 1, 5), "RC": Exchanged(2, 0, 0)}
     assert isinstance(post.heard[-1], Bye)
     assert {receiver for receiver, _ in post.sent} == {"RC"}
 

@@ -216,7 +216,7 @@ class _Reader:
                 told = tuple((agent.get("variable") or "").split())
                 with self._report.at(line(agent)):
                     self._check_told(told)
-            yield Child(name, told, parts, line(agent))
+            yield Child(name, told, parts, line(agent), repeated)
 
     def _check_told(self, told: tuple[str, ...]) -> None:
         seen: set[str] = set()

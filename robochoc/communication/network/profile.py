@@ -196,9 +196,10 @@ def among(robot: Robot, interfaces: Mapping[str, Sequence[str]]) -> Robot:
     def kept(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
         return tuple(constraint for constraint in constraints if known.issuperset(constraint.variables))
 
+    children = (child for child in robot.children if child.name in interfaces)
     return replace(
         robot,
         parents=tuple(replace(p, constraints=kept(p.constraints)) for p in robot.parents if p.name in interfaces),
-        children=tuple(replace(c, constraints=kept(c.constraints)) for c in robot.children if c.name in interfaces),
+        children=tuple(replace(c, constraints=kept(c.constraints), copies=kept(c.copies)) for c in children),
         shown=tuple(interfaces[robot.name]),
     )
