@@ -102,14 +102,12 @@ def _checked(outcome: Outcome) -> str:
     if outcome.checked is None or not outcome.checked.by_owner:
         return "checked against every constraint"
     alone, total = outcome.checked.by_owner, sum(outcome.checked)
-    return f"checked; {alone:,} of {total:,} constraint{'s' * (total != 1)} rest on their owner's word"
+    return f"checked; on their owner's word alone: {alone:,} of {total:,} constraint{'s' * (total != 1)}"
 
 
 def _trusted(outcome: Outcome) -> str:
     """What rests on the word of all robots, as nobody could check it."""
-    if outcome.claimed_by != ALL_ROBOTS or outcome.confirmed:
-        return ""
-    if not outcome.verified:
+    if outcome.claimed_by != ALL_ROBOTS or not outcome.verified or outcome.confirmed:
         return ""
     what = "that no fewer could step aside" if outcome.aside else "that nothing costs less"
     return f"; {what} rests on all robots' word"

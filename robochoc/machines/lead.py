@@ -330,4 +330,5 @@ def _check_settings(protocol: str, settings: Mapping[str, str]) -> None:
 def _in_words(outcome: Outcome) -> str:
     """The outcome, as robots are told it."""
     aside = f", {len(outcome.aside)} step aside" if outcome.aside else ""
-    return f"{outcome.verdict}{aside}"
+    claim = f", claimed by {outcome.claimed_by}" if outcome.claimed_by else ""
+    return f"{outcome.verdict}{aside}{claim}"

@@ -93,8 +93,8 @@ def fault_of_account(name: str, account: Account, declared: Declared, course: Co
     """Return why the robot `name` cannot report `account`; empty if it can."""
     return (
         next(_faults_of_values(name, account, declared), "")
-        or _fault_of_exchange(name, account, course)
         or _fault_of_metrics(account, course.lasted_s)
+        or _fault_of_exchange(name, account, course)
         or _fault_of_findings(account.findings, course.order)
     )
 

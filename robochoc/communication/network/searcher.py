@@ -83,6 +83,11 @@ class Searcher:
         self._searching = self._concluded = self._paused = False
 
     @property
+    def name(self) -> str:
+        """The robot's name."""
+        return self._robot.name
+
+    @property
     def assignment(self) -> dict[str, int]:
         """The own variables' values as decided; empty while there are none."""
         return self._host.protocol.assignment if self._host else {}

@@ -241,7 +241,8 @@ class Tally:
         """Who has kept the search awake until the time was over, in words; empty if that cannot be told."""
         names = ", ".join(self._awaited[:_TOLD]) + ", ..." * (len(self._awaited) > _TOLD)
         waited = f"{names} {'has' if len(self._awaited) == 1 else 'have'} not answered the master"
-        return "; ".join(filter(None, [waited if names else "", widest_gap(self._accounts)]))
+        doubts = [doubt.why for doubt in self.doubts_about_counts]
+        return "; ".join(filter(None, [waited if names else "", *(doubts or [widest_gap(self._accounts)])]))
 
     @property
     def cost(self) -> float:
