@@ -149,6 +149,13 @@ class Outcome:
     """Across machines: who has checked the constraints of an answer."""
 
     @property
+    def ruled_out(self) -> str | None:
+        """Who alone could tell that there is no solution, in words; across machines that is no more than its claim."""
+        if self.witness is None or self.claimed_by is None:
+            return self.witness and f"{self.witness} {RULED_OUT}"
+        return f"{self.witness} claims it; nobody could check"
+
+    @property
     def events(self) -> int:
         """How many events of the scenario have happened: they, and losses, open epochs."""
         return sum(not epoch.lost for epoch in self.epochs[:-1])

@@ -6,17 +6,23 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import msgspec
 import pytest
 import traitors
 from offices import Office
 from problems import PREDICATES, team_of
 from traitors import Lie, changed
 
+from robochoc.cli.report import report
 from robochoc.communication.control import Conclusion, Counters, Ready
 from robochoc.communication.network.plausibility import Declared
 from robochoc.communication.network.tally import Tally
 from robochoc.communication.network.words import Account, Exchanged, Judged
-from robochoc.outcome import Metrics, Place, Verdict
+from robochoc.communication.processes import ProcessesRun
+from robochoc.communication.robot_link import RobotsLost
+from robochoc.formats.result import read_result, result_json
+from robochoc.machines.lead import claimed
+from robochoc.outcome import ALL_ROBOTS, Metrics, Outcome, Place, Thoroughness, Verdict
 from robochoc.problem import Constraint, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.afc import AFC
@@ -31,7 +37,7 @@ from robochoc.registry import protocol_named, protocol_names
 _DIFFERENT = [Constraint("C", PREDICATES[0], pair, pair) for pair in (("A", "B"), ("B", "C"))]
 CHAIN = team_of(dict.fromkeys("ABC", (1, 2)), _DIFFERENT)
 """RA, RB and RC, each other than the one before: it has two solutions."""
-NEVER = "it can never end"
+VALUES = {"A": 1, "B": 2, "C": 1}
 
 
 def known_to_both(team: Team) -> Team:
@@ -106,6 +112,18 @@ def test_a_protocol_of_ones_own_is_held_to_the_same() -> None:
         Office(CHAIN, Boastful).search()
 
 
+class Sly(ABT):
+    """It goes past what keeps it from concluding that."""
+
+    def start(self) -> None:
+        self.verdict = Verdict.OPTIMAL
+
+
+def test_processes_are_held_to_the_same() -> None:
+    with ProcessesRun(CHAIN, Sly) as run, pytest.raises(RobotsLost, match="it has concluded optimal, and a robot"):
+        run.search()
+
+
 def test_a_verdict_before_the_search(lied: Callable[..., Office]) -> None:
     office = lied(traitors.LIES["too early"])
     assert office.tally.lost == {"RB": "it has concluded something before the search began"}
@@ -138,6 +156,65 @@ def test_a_verdict_after_all_were_quiet() -> None:
     tally = begun()
     tally.verdict = Verdict.SOLUTION
     assert tally.hear("RB", Conclusion(1, "no-solution")) == "it has concluded no-solution after all were quiet"
+
+
+# What is said of that
+
+ALL = "all robots' word"
+CHECKED = "checked against every constraint"
+ASIDE = "t: no solution for the whole team (RB claims it; nobody could check);"
+SAID = Outcome("t", "abt", "network", 0, Verdict.NO_SOLUTION, witness="RB")
+
+
+@pytest.mark.parametrize(
+    ("found", "claimed_by", "words"),
+    [
+        ({}, "RB", "t: no solution (RB claims it; nobody could check)"),
+        (
+            {"verdict": Verdict.SOLUTION, "verified": True, "assignment": VALUES},
+            None,
+            "t: solution, checked against every constraint",
+        ),
+        (
+            {"verdict": Verdict.SOLUTION, "verified": True, "assignment": VALUES, "checked": Thoroughness(1, 1)},
+            None,
+            "t: solution, checked; on their owner's word alone: 1 of 2 constraints",
+        ),
+        ({"verdict": Verdict.SOLUTION, "reason": "so"}, ALL_ROBOTS, "t: solution, not checked: so"),
+        (
+            {"verdict": Verdict.OPTIMAL, "verified": True, "assignment": VALUES, "cost": 3},
+            ALL_ROBOTS,
+            "t: optimal, checked against every constraint; that nothing costs less rests on all robots' word",
+        ),
+        (
+            {"verdict": Verdict.OPTIMAL, "verified": True, "assignment": {"A": 1, "C": 2}, "withdrawn": ("RB",)},
+            ALL_ROBOTS,
+            f"{ASIDE} as few as possible (proven) step aside, {CHECKED}; that no fewer could step aside rests on {ALL}",
+        ),
+        (
+            {"verdict": Verdict.SOLUTION, "verified": True, "assignment": {"A": 1, "C": 2}, "withdrawn": ("RB",)},
+            "RB",
+            f"{ASIDE} some step aside, {CHECKED}",
+        ),
+        ({"verdict": Verdict.UNKNOWN, "reason": "so", "bound": 5}, ALL_ROBOTS, "t: unknown: so"),
+        ({"verdict": Verdict.UNKNOWN, "reason": "so"}, None, "t: unknown: so"),
+    ],
+)
+def test_on_whose_word_a_verdict_rests(found: dict[str, Any], claimed_by: str | None, words: str) -> None:
+    outcome = claimed(replace(SAID, **found))
+    assert outcome.claimed_by == claimed_by
+    assert report(CHAIN, outcome).splitlines()[0] == words
+    told = msgspec.json.decode(result_json(outcome))
+    assert told.get("claimed_by") == claimed_by
+    assert told.get("checked") == (outcome.checked and outcome.checked._asdict())
+    back = read_result(result_json(outcome))
+    assert (back.claimed_by, back.checked) == (claimed_by, outcome.checked)
+
+
+def test_on_this_machine_a_witness_is_no_more_than_that() -> None:
+    outcome = replace(SAID, runtime="simulator")
+    assert report(CHAIN, outcome).startswith("t: no solution (RB has ruled everything out)\n")
+    assert "claimed_by" not in msgspec.json.decode(result_json(outcome))
 
 
 # Its values

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 import traitors
 from machines import Program, Site, ended, written
@@ -98,9 +100,15 @@ def test_others_find_that_its_value_breaks_theirs(site: Site) -> None:
 
 
 @SLOW
-@pytest.mark.parametrize(("lie", "why"), [("awake", "it has sent RB "), ("silent", "RB has not answered the master")])
+@pytest.mark.parametrize(
+    ("lie", "why"),
+    [
+        ("awake", r"RA says that it has sent RB .* messages, and RB that it has had"),
+        ("silent", r"RB.* not answered the master"),
+    ],
+)
 def test_it_keeps_the_run_awake_until_the_time_is_over(site: Site, lie: str, why: str) -> None:
-    master, status = betrayed(site, lie, "--timeout", 4)
+    master, status = betrayed(site, lie, "--timeout", 10)
     assert status == 3, master.errors
-    assert "unknown: the time was over (--timeout 4); " in master.output
-    assert why in master.output
+    assert "unknown: the time was over (--timeout 10); " in master.output
+    assert re.search(why, master.output), master.output

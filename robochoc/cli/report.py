@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from robochoc.change import changed_by
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
-from robochoc.outcome import ALL_ROBOTS, RULED_OUT, Metrics, Outcome, Verdict
+from robochoc.outcome import ALL_ROBOTS, Metrics, Outcome, Verdict
 from robochoc.problem import Kind, Team, natural
 
 WIDTH = 100
@@ -68,9 +68,7 @@ def _place(team: Team, outcome: Outcome) -> str:
 
 
 def _verdict(team: Team, outcome: Outcome) -> str:
-    why = outcome.witness and f"{outcome.witness} {RULED_OUT}"
-    if outcome.claimed_by and outcome.witness:
-        why = f"{outcome.witness} claims it; nobody could check"
+    why = outcome.ruled_out
     if outcome.reason and not outcome.epochs:
         why = outcome.reason
     confirmed = ", confirmed centrally" * outcome.confirmed
@@ -143,7 +141,8 @@ def _so_far(team: Team, outcome: Outcome) -> str:
     if team.kind is Kind.DISCSP:
         return ""
     known = [f"the best so far costs {_number(outcome.cost)}"] if outcome.assignment else []
-    known += [f"nothing costs less than {_number(bound)}"] if bound else []
+    word = ", by all robots' word" if outcome.claimed_by else ""
+    known += [f"nothing costs less than {_number(bound)}{word}"] if bound else []
     return "; " + ", and ".join(known) if known else ""
 
 

@@ -60,9 +60,10 @@ class FourCounters:
         return self._latest.get(robot)
 
     @property
-    def unanswered(self) -> tuple[str, ...]:
-        """Who has not answered the wave under way."""
-        return tuple(sorted(self._unanswered))
+    def silent(self) -> tuple[str, ...]:
+        """Who has never told its counters; else who has not answered the wave under way."""
+        unheard = [robot for robot, counts in self._latest.items() if counts is None]
+        return tuple(sorted(unheard or self._unanswered))
 
     @property
     def due(self) -> bool:

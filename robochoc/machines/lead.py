@@ -215,7 +215,7 @@ class _Lead:
         if result.verdict is Verdict.UNKNOWN:
             outcome = replace(outcome, reason=self._limit(result.witness))
         if result.verdict is Verdict.NO_SOLUTION or not (ended or traits.costs):
-            return _claimed(outcome)
+            return claimed(outcome)
         proven = ended and (traits.complete or not traits.costs)
         out = tuple(name for name in self._master.members.order if not self._master.tally.assigned.get(name))
         if ended and aside:
@@ -223,14 +223,14 @@ class _Lead:
         verdict = self._verdict(traits, aside=bool(out)) if proven else Verdict.UNKNOWN
         if self._plan.conditions.private:
             reason = "every robot knows its own values, and nobody else's (--private)"
-            return _claimed(replace(outcome, verdict=verdict, reason=reason))
+            return claimed(replace(outcome, verdict=verdict, reason=reason))
         self._values = self._told(result.assignments)
         held, cost = self._master.checked(self._values)
         self._refute(*(doubt.why for doubt in self._master.tally.doubts_about_verdict))
         if held and (aside or not out):
             verdict = verdict if proven or not ended else Verdict.SOLUTION
             outcome = replace(outcome, verdict=verdict, assignment=joined(self._values), cost=cost, verified=True)
-            return _claimed(replace(outcome, checked=self._master.tally.thoroughness))
+            return claimed(replace(outcome, checked=self._master.tally.thoroughness))
         if proven:
             objectors = self._master.tally.objectors
             against = (
@@ -291,7 +291,7 @@ class _Lead:
         return Team(self._plan.name, tuple(members.robots[name].robot for name in members.order))
 
 
-def _claimed(outcome: Outcome) -> Outcome:
+def claimed(outcome: Outcome) -> Outcome:
     """Return `outcome` with whom it rests on, as nobody could check it (docs/security.md, "One traitor").
 
     That there is no solution is the word of who says so; that none costs less, or what was not told, is everybody's.

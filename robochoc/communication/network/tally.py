@@ -154,7 +154,7 @@ class Tally:
         """The search is over after `lasted_s` seconds, `in_time` or because the time was over."""
         self.lasted_s = lasted_s
         if not in_time:  # to be ready, or to answer
-            self._awaited = tuple(sorted(self._unready)) or self.counters.unanswered
+            self._awaited = tuple(sorted(self._unready)) or self.counters.silent
 
     @property
     def ready(self) -> bool:
