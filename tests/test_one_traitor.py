@@ -259,7 +259,7 @@ def test_it_judges_its_own_constraint_alone(lied: Callable[..., Office]) -> None
     """Nobody else knows the constraint: that is what is said of it."""
     office = lied(traitors.LIES["a wrong value"])
     assert judged(office)[0] is False, "RC's constraint with RB is broken as well, and RC says so"
-    assert office.tally.objectors == ("RC",)
+    assert office.tally.objections == ("RC finds its constraint over B C broken",)
     office = lied(traitors.LIES["a wrong value"], team=team_of(dict.fromkeys("AB", (1, 2)), _DIFFERENT[:1]))
     assert judged(office) == (True, 0)
     assert office.tally.thoroughness == (0, 1), "on its owner's word alone"

@@ -96,7 +96,7 @@ def test_its_parent_has_a_copy_of_the_constraint(site: Site) -> None:
 def test_others_find_that_its_value_breaks_theirs(site: Site) -> None:
     master, status = betrayed(site, "a wrong value")
     assert status == 4, master.output
-    assert "but a constraint is broken, as RC found" in master.errors
+    assert "but RC finds its constraint over B C broken" in master.errors
 
 
 @SLOW

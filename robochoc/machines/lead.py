@@ -232,14 +232,9 @@ class _Lead:
             outcome = replace(outcome, verdict=verdict, assignment=joined(self._values), cost=cost, verified=True)
             return claimed(replace(outcome, checked=self._master.tally.thoroughness))
         if proven:
-            objectors = self._master.tally.objectors
-            against = (
-                f"a constraint is broken, as {_listed(objectors)} found"
-                if objectors
-                else f"{_listed(out)} has no value"
-            )
+            against = "; ".join(self._master.tally.objections) or f"{_listed(out)} has no value"
             who = f"{result.witness} says that" if result.witness else "all fell quiet, so that"
-            raise Refuted(f"{who} {outcome.protocol} has a solution for {outcome.team}; but {against}")
+            raise Refuted(f"{who} {outcome.protocol} has a solution for {outcome.team}, but {against}")
         reason = outcome.reason or f"{outcome.protocol} has come to its end, and what it came by breaks a constraint"
         return replace(outcome, verdict=Verdict.UNKNOWN, reason=reason)
 

@@ -7,6 +7,7 @@ against the liar's earlier words, or against a neighbour's. `docs/security.md` s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import chain
@@ -25,8 +26,8 @@ from robochoc.protocols.findings import Findings
 from robochoc.protocols.traits import Traits
 
 LARGEST_COUNT = 2**53
-CHECKS_PER_S = 10**9
-"""So many constraints nobody checks in a second."""
+CHECKS_PER_S = 10**12
+"""So many constraints nobody checks in a second, not even by tables that were made before."""
 LARGEST_MEMORY = 2**50
 MOST_KINDS = 100
 """Of messages: a protocol has fewer."""
@@ -34,7 +35,7 @@ MOST_JUDGED = 10_000
 NOTICEABLE = 100
 """A gap of fewer messages may be under way when the time is over."""
 _ROUNDED = 1 + 2**-40
-"""Costs may be larger than floats are exact, and profiles hold floats."""
+"""Costs may be larger than floats are exact, and some travel as floats."""
 _NOBODY = Exchanged(0, 0, 0)
 
 
@@ -190,7 +191,7 @@ def fault_of_check(name: str, check: Checked, declared: Declared, order: Collect
         one.holder == name or one.holder not in order for one in check.copies
     ):
         return "it has checked constraints in another's name"
-    if check.allowed and sum(one.price for one in check.shared) > check.cost:
+    if check.allowed and sum(one.price for one in check.shared) > check.cost * _ROUNDED:
         return "it has said what its constraints charge, and that together they charge less"
     return ""
 
@@ -260,11 +261,22 @@ def doubts_about_checks(checks: Mapping[str, Checked]) -> Iterator[Doubt]:
     for name, check in checks.items():
         for one in check.copies:
             charged = prices.get(_key(one))
-            if charged != one.price and one.holder in checks:
+            alike = charged is not None and math.isclose(charged, one.price, rel_tol=_ROUNDED - 1)
+            if not alike and one.holder in checks:
                 what = f"the constraint over {shortened(' '.join(one.variables))}"
                 says = "has no such constraint" if charged is None else f"says that it {_charges(charged)}"
                 why = f"{name} says that {what} {_charges(one.price)}, and {one.holder}, which holds it, {says}"
                 yield Doubt((one.holder, name), why)
+
+
+def objections(checks: Mapping[str, Checked]) -> Iterator[str]:
+    """Yield, in words, which constraints are broken, by who says so."""
+    for name, check in checks.items():
+        broken = [shortened(" ".join(one.variables)) for one in check.shared if one.price == INFINITE]
+        if broken:
+            yield f"{name} finds its constraint over {broken[0]} broken"
+        elif not check.allowed:
+            yield f"{name} finds one of its constraints broken, which nobody else may know"
 
 
 def _key(one: Judged) -> tuple[str, tuple[str, ...]]:

@@ -18,6 +18,7 @@ from robochoc.communication.network.plausibility import (
     fault_of_account,
     fault_of_check,
     fault_of_counters,
+    objections,
     thoroughness,
     total_of,
     widest_gap,
@@ -207,9 +208,9 @@ class Tally:
         return not self._unchecked and all(check.allowed for check in self._checks.values())
 
     @property
-    def objectors(self) -> tuple[str, ...]:
-        """Who says that one of its constraints is broken."""
-        return tuple(sorted(name for name, check in self._checks.items() if not check.allowed))
+    def objections(self) -> tuple[str, ...]:
+        """Which constraints are broken, by who says so."""
+        return tuple(islice(objections(self._checks), _TOLD))
 
     @property
     def thoroughness(self) -> Thoroughness:
