@@ -248,6 +248,27 @@ def test_what_is_no_message_is_refused_and_takes_no_place() -> None:
     assert len(post.heard_of(Objection)) == 1
 
 
+def test_who_takes_no_part_is_not_heard() -> None:
+    """Such as a robot that was lost before: the protocol knows nothing of it."""
+
+    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+        match word:
+            case Joined():
+                yield task()
+            case Ready():
+                yield Search(1)
+                yield post.letter(Said(1, 0, ok(1)), "R9")
+                yield post.letter(Said(1, 0, ok(1)), "RA")
+            case Counters(_, 0, _, 1):
+                yield LEAVE
+            case _:
+                pass
+
+    ending, post = played(script)
+    assert ending == Ending("over", failed=False, assignment={"B": 2})
+    assert post.heard_of(Objection) == [Objection("R9", "a letter to RB", "R9 takes no part in this search")]
+
+
 def test_objections_are_limited() -> None:
     def script(_post: Scripted, word: Word) -> Iterator[Word | Item]:
         if isinstance(word, Joined):

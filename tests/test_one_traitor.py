@@ -10,7 +10,7 @@ import msgspec
 import pytest
 import traitors
 from offices import Office
-from problems import PREDICATES, team_of
+from problems import PREDICATES, known_to_both, team_of
 from traitors import Lie, changed
 
 from robochoc.cli.report import report
@@ -38,16 +38,6 @@ _DIFFERENT = [Constraint("C", PREDICATES[0], pair, pair) for pair in (("A", "B")
 CHAIN = team_of(dict.fromkeys("ABC", (1, 2)), _DIFFERENT)
 """RA, RB and RC, each other than the one before: it has two solutions."""
 VALUES = {"A": 1, "B": 2, "C": 1}
-
-
-def known_to_both(team: Team) -> Team:
-    """Parents' files repeat what their children hold, as the original platform's do."""
-    held = {robot.name: robot.shared for robot in team.robots}
-    robots = [
-        replace(one, children=tuple(replace(child, copies=held[child.name]) for child in one.children))
-        for one in team.robots
-    ]
-    return replace(team, robots=tuple(robots))
 
 
 @pytest.fixture

@@ -173,12 +173,13 @@ class Members:
         """Take in what the robot `name` answers when it is asked for all that is `unseen`; returns what is wrong."""
         member = self.robots[name]
         wanted = self.unseen().get(name, ())
+        owners = self._owners()
+        for variable in variables:
+            if owners.get(variable, name) != name:
+                return f"the variable {variable} is {owners[variable]}'s, and {name}'s too"
         if not variables.keys() <= {*wanted, *member.asked}:
             return "it has shown variables that it was not asked for"
         shown = {variable: variables[variable] for variable in wanted if variable in variables}
-        for variable, owner in self._owners().items():
-            if variable in shown and owner != name:
-                return f"the variable {variable} is {owner}'s, and {name}'s too"
         try:
             silhouette(member.profile, {**member.also, **shown})
         except BadProfile as bad:
