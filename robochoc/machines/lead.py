@@ -277,8 +277,9 @@ class _Lead:
         if witness is not None:
             return f"{witness} gave up, as its protocol has it"
         if plan.messages is not None and sum(self._outcome.metrics.messages.values()) >= plan.messages:
-            return f"so many messages have been sent (--messages {plan.messages})"
-        over = "the time was over" if plan.timeout is None else f"the time was over (--timeout {plan.timeout:g})"
+            over = f"so many messages have been sent (--messages {plan.messages})"
+        else:
+            over = "the time was over" + ("" if plan.timeout is None else f" (--timeout {plan.timeout:g})")
         return "; ".join(filter(None, [over, self._master.tally.restless]))
 
     def _team(self) -> Team:
