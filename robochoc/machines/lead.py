@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 from msgspec import UNSET
 
@@ -292,11 +292,18 @@ def claimed(outcome: Outcome) -> Outcome:
 
     That there is no solution is the word of who says so; that none costs less, or what was not told, is everybody's.
     """
-    by = outcome.witness if outcome.verdict is Verdict.NO_SOLUTION or outcome.aside else None
-    if outcome.verdict is Verdict.OPTIMAL or outcome.bound is not None or not outcome.verified:
-        by = by if outcome.verdict is Verdict.NO_SOLUTION else ALL_ROBOTS
-    if outcome.verdict is Verdict.UNKNOWN and outcome.bound is None:
-        by = None
+    by: str | None = None
+    match outcome.verdict:
+        case Verdict.NO_SOLUTION:
+            by = outcome.witness
+        case Verdict.OPTIMAL:
+            by = ALL_ROBOTS
+        case Verdict.UNKNOWN:
+            by = None if outcome.bound is None else ALL_ROBOTS
+        case Verdict.SOLUTION:
+            by = (outcome.witness if outcome.aside else None) if outcome.verified else ALL_ROBOTS
+        case never:
+            assert_never(never)
     return replace(outcome, claimed_by=by)
 
 
