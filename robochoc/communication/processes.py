@@ -251,7 +251,7 @@ class ProcessesRun(Session):
             case Counters(_, wave, sent, received):
                 self._counters.answer(robot.name, wave, Counts(sent, received))
             case Conclusion(_, verdict):
-                self._verdict, self._witness = Verdict(verdict), robot.name
+                self._conclude(robot.name, verdict)
             case Events(events):
                 for event in events:
                     self._observe(event)
@@ -262,6 +262,13 @@ class ProcessesRun(Session):
                 raise refusal(why) if unsupported else RobotsLost({robot.name: why})
             case never:
                 assert_never(never)
+
+    def _conclude(self, name: str, verdict: str) -> None:
+        """Take in that the robot `name` alone can tell the verdict. Raises `RobotsLost` for one that it cannot."""
+        fault = self._protocol.traits.fault_of_conclusion(verdict)
+        if fault:
+            raise RobotsLost({name: fault})
+        self._verdict, self._witness = Verdict(verdict), name
 
     def _open_queues(self, sender: RobotLink, receivers: Sequence[str]) -> None:
         if sender.name not in self._crew.robots:

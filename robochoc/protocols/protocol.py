@@ -84,7 +84,10 @@ class Protocol(ABC):
         self.outbox.append(said)
 
     def conclude(self, verdict: Verdict) -> None:
-        """End the search of the whole team with `verdict`."""
+        """End the search of the whole team with `verdict`, one of those in `traits.concludes`; else `ValueError`."""
+        fault = self.traits.fault_of_conclusion(verdict)
+        if fault:
+            raise ValueError(fault)
         self.verdict = verdict
 
     @property

@@ -52,7 +52,7 @@ from robochoc.protocols.findings import NOTHING, Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol, Settings
 from robochoc.protocols.sfb_bounds import BOUND, ForwardBounds, Rows, dearest
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.cost_table import EXACT, refuse_inexact
 
@@ -135,7 +135,11 @@ class SFB(Protocol):
     bounds: ForwardBounds
     messages = Above | Below | CPAs | Explored | Solution
     traits = Traits(
-        paper="Hirayama & Yokoo 1997; Gershman, Meisels, Zivan 2009", synchronous=True, costs=True, everywhere=True
+        concludes=ENDS_WITH_PROOF,
+        paper="Hirayama & Yokoo 1997; Gershman, Meisels, Zivan 2009",
+        synchronous=True,
+        costs=True,
+        everywhere=True,
     )
     settings: SFBSettings = SFBSettings()
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import msgspec
 
+from robochoc.communication.network.plausibility import Doubt
 from robochoc.communication.network.refusals import Refusals
 from robochoc.communication.network.tally import is_of
 from robochoc.observers.events import AnyEvent, Granted, Lost, Observer, Refused, Registered
@@ -48,6 +49,13 @@ class Chronicle:
                 self._tell(event)
             else:
                 self.refuse(name, f"tell of {type(event).__name__}", "it is not about itself")
+
+    def doubted(self, doubts: Sequence[Doubt]) -> str:
+        """Of two robots each, one has not told the truth; returns all of it in words, after a semicolon."""
+        for doubt in doubts:
+            for name in doubt.between:
+                self.refuse(name, "its counts of messages", doubt.why)
+        return "".join(f"; {doubt.why}" for doubt in doubts)
 
     def _refused(self, who: str, what: str, why: str) -> None:
         self._tell(Refused(t=self._now, who=who, what=what, why=why))

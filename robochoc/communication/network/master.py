@@ -160,19 +160,19 @@ class Master:
         self.chronicle.begin()
         deadline = None if timeout is None else began + timeout
         self._gate.open_ways(self.members.reach(beyond=traits.beyond))
-        tally = self.tally = Tally(self.tally.epoch + 1, self.members.order, messages)
+        tally = self.tally = Tally(self.tally.epoch + 1, self.members.order, messages, self.members.declared(traits))
         for name, task in self.members.tasks(tally.epoch, protocol, traits, brief).items():
             self._tell(name, task)
         self._wait_until(lambda: tally.broken_off or tally.ready, deadline)
         if tally.verdict is None and not tally.broken_off and not over(deadline):
             self._tell_all(Search(tally.epoch))
             self.chronicle.begin()
-            tally.searching = True
+            tally.ordered = tally.searching = True
             self._wait_until(lambda: tally.verdict is not None or tally.broken_off, deadline)
             tally.searching = False
-        wall_s = time.monotonic() - began
+        tally.note_end(time.monotonic() - began, in_time=not over(deadline))
         self._collect(tally)
-        return tally.result(wall_s)
+        return tally.result(tally.lasted_s)
 
     def checked(self, assignments: Mapping[str, Mapping[str, int]]) -> tuple[bool, float]:
         """Have every robot hold its constraints against what was decided: whether all hold, and the sum of the costs.
@@ -260,8 +260,8 @@ class Master:
         """Begin a wave when it could show that all is quiet, or when somebody waits for news."""
         counters = tally.counters
         if missing := tally.missing(now, self._conditions.patience_s):
-            raise RobotsLost({MASTER: f"{missing} messages between robots were lost for good"})
-        if counters.quiescent:
+            tally.stuck = f"{missing} messages between robots were lost for good"
+        elif counters.quiescent:
             tally.verdict = tally.verdict or Verdict.SOLUTION
         elif tally.wave_due:
             self._tell_all(Wave(counters.begin_wave()))
@@ -272,11 +272,14 @@ class Master:
                 self._tell_all(Wave(counters.begin_wave()))
 
     def _collect(self, tally: Tally) -> None:
-        """Say that the search is over, and collect everybody's account."""
+        """Say that the search is over, and collect everybody's account. Raises `RobotsLost` when it was stuck."""
         self._tell_all(Pause())
         self._wait_until(lambda: not tally.silent, time.monotonic() + LAST_WORDS_S)
         for name in tally.silent if tally.verdict is not None else ():
             self._lose(name, "it did not report at the end")
+        doubts = self.chronicle.doubted(tally.doubts_about_counts)
+        if tally.stuck:
+            raise RobotsLost({MASTER: tally.stuck + doubts})
 
     # Letters
 
@@ -300,17 +303,15 @@ class Master:
             case Ask() | Sniff():
                 self._answer(sender, opened.word)
             case _:
-                member = self.members.robots.get(sender)
-                if member is None:
-                    self._refuse(sender, "a letter to the master", "it is not registered")
-                else:
+                if member := self.members.robots.get(sender):
                     self._hear(sender, member, opened.word)
+                else:
+                    self._refuse(sender, "a letter to the master", "it is not registered")
 
     def _hear(self, name: str, member: Member, word: Word) -> None:
         match word:
             case OfEpoch():
-                if not self.tally.hear(name, word):
-                    self._refuse(name, "a letter to the master", f"{type(word).__name__} says what cannot be")
+                self._note_failure(name, self.tally.hear(name, word))
             case Joined(visit, card):
                 member.join(visit, card)
             case Shown(variables):
@@ -358,16 +359,15 @@ class Master:
                 self._refuse(name, "be in the directory", unfit)
             self.chronicle.registered(name)
             if self._progress:
-                said = f"{len(self.members.robots)} robots registered"
-                self._progress(Progress(0, time.monotonic() - self._began, said))
+                there = f"{len(self.members.robots)} robots registered"
+                self._progress(Progress(0, time.monotonic() - self._began, there))
         self._welcome(name, visit)
 
     def _welcome(self, name: str, visit: str) -> None:
         self._tell(name, Welcome(visit, self.run, self._conditions.filters, self._watched, self._conditions.private))
 
     def _note_presence(self, name: str, *, there: bool) -> None:
-        member = self.members.robots.get(name)
-        if member:
+        if member := self.members.robots.get(name):
             member.note_presence(there=there)
 
     def _follow_registry(self) -> None:
