@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from robochoc.cli.failure import INVALID, USAGE, Failure
+from robochoc.cli.paths import refuse_same_places
 
 if TYPE_CHECKING:
     from robochoc.problem import Assignment, Robot, Team
@@ -229,22 +229,6 @@ def _refuse(options: Mapping[str, str], asked: set[str], why: str) -> None:
             raise click.UsageError(f"{option} {why}")
 
 
-def refuse_same_places(sinks: Sequence[str], files: Mapping[str, Path | None], situation: str | None = None) -> None:
-    """What is published goes to places of its own: not to the command's other `files`, nor where `situation` is."""
-    if not sinks:
-        return
-    from robochoc.ros.sinks import place_of
-
-    taken: dict[Path | str, str] = {path.resolve(): f"{what} {path}" for what, path in files.items() if path}
-    if isinstance(heard := place_of(situation or ""), Path):
-        taken[heard] = f"--situation {situation}"
-    for text in sinks:
-        other = taken.setdefault(place_of(text), option := f"--ros {text}")
-        if other is not option:
-            told = f"{option} is given twice" if other == option else f"{other} and {option} are one place"
-            raise click.UsageError(told)
-
-
 def check_ros(ros: Ros, settings: Mapping[str, Any]) -> None:
     """What does not go together with the rest of `robochoc solve`: `settings` are its options."""
     if settings["count"] and ros:
@@ -380,7 +364,7 @@ def outlets(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assi
     from robochoc.ros.alone import crew_alone, leg_alone
     from robochoc.ros.outlet import Outlet
 
-    refuse_same_places(texts, {})
+    refuse_same_places({}, sinks=texts)
     with ros_failures_told(), ExitStack() as stack:
         opened = open_sinks(texts, stack)
         found = [Outlet(robot.name, crew_alone(robot), sink, frame or FRAME) for sink in opened]

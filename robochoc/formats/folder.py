@@ -6,6 +6,7 @@ import secrets
 import shutil
 from pathlib import Path
 
+from robochoc.files import resolved
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput
 from robochoc.formats.writer import robot_xml
 from robochoc.problem import Team
@@ -19,7 +20,7 @@ def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
     """
     if folder.exists() or folder.is_symlink():
         _may_replace(folder, replace=replace)
-    folder = folder.resolve()
+    folder = resolved(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
     new = folder.with_name(f".{secrets.token_hex(8)}.new")
     old = new.with_suffix(".old")

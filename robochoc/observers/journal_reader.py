@@ -279,7 +279,9 @@ class _Text:
         self._lines += 1
         try:
             entry = self._decode(line)
-        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        except UnicodeDecodeError as error:
+            raise Damaged(f"{self.place}: it is not UTF-8") from error
+        except (msgspec.MsgspecError, RecursionError) as error:
             raise Damaged(f"{self.place}: {error}") from error
         if not isfinite(entry.t):
             raise Damaged(f"{self.place}: its time is no number")
