@@ -348,7 +348,10 @@ class _Run:
             from robochoc.communication.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
 
             survive = self._options.on_loss is OnLoss.WITHDRAW
-            return ProcessesRun(team, protocol, domains=domains, survive=survive, brief=brief, **watchers)
+            patience_s = self._options.patience
+            return ProcessesRun(
+                team, protocol, domains=domains, survive=survive, patience_s=patience_s, brief=brief, **watchers
+            )
         if self._options.runtime is Runtime.NETWORK:
             return self._network(protocol, team, domains, brief)
         return Simulation(team, protocol, _schedule(self._options), domains=domains, brief=brief, **watchers)
@@ -363,6 +366,8 @@ class _Run:
             raise Unsupported(f"--runtime network needs {missing.name}; say: pip install 'robochoc[network]'") from None
         survive = self._options.on_loss is OnLoss.WITHDRAW
         conditions = Conditions(filters=self._options.filters, survive=survive)
+        if self._options.patience is not None:
+            conditions = replace(conditions, patience_s=self._options.patience)
         watchers: _Watchers = {"observer": self._observer, "progress": self._progress}
         return LocalNetwork(team, protocol, domains=domains, conditions=conditions, brief=brief, **watchers)
 

@@ -165,7 +165,11 @@ situation_options = _optional(
         "--patience",
         type=Finite(0, min_open=True),
         metavar="SECONDS",
-        help="So long robots have to report something after each decision; then the run is over.  [default: 10]",
+        help=(
+            "A robot whose process is stopped (SIGSTOP), or on a network out of reach, for so long is lost (see"
+            " --on-loss).  [default: it is waited for; on a network 10]  With --situation: so long robots have to"
+            " report something after each decision; then the run is over.  [default: 10]"
+        ),
     ),
     click.option(
         "--battery",
@@ -186,7 +190,7 @@ situation_options = _optional(
 
 _FLOWN = {"failures": "--fail", "distance": "--distance", "wind": "--wind", "gusts": "--gusts"}
 _FLOWN_HERE = {**_FLOWN, "obstacles": "--obstacle"}
-_HEARD = {"patience": "--patience", "battery": "--battery"}
+_HEARD = {"battery": "--battery"}
 _PLACED = {"frame": "--frame", "scale": "--scale"}
 _NOT_PUBLISHED = "is for what is published: add --ros SINK"
 
@@ -211,16 +215,19 @@ def ros_asked(settings: dict[str, Any]) -> Ros:
     """Take the options of this file out of `settings`. What would be ignored is wrong usage."""
     sinks, situation = settings.pop("sinks"), settings.pop("situation")
     given = {name: settings.pop(name) for name in (*_FLOWN_HERE, *_HEARD, *_PLACED)}
+    patience = settings["patience"]
     asked = {name for name, value in given.items() if value not in (None, ())}
     if situation != FLIGHT:
         _refuse(_FLOWN_HERE, asked, "is for the simulated flight: add --situation flight")
     if situation in {None, FLIGHT}:
         _refuse(_HEARD, asked, "is for robots that are listened to: add --situation mcap:FILE, or another source")
+        if patience is not None and (settings["runtime"] == "simulator" or settings["protocol"] == "central"):
+            raise click.UsageError("--patience is for robots with processes, and for those that are listened to")
     if not (sinks or situation):
         _refuse(_PLACED, asked, _NOT_PUBLISHED)
     surroundings = {name: given[name] for name in _FLOWN_HERE if name in asked}
     frame = given["frame"] or FRAME
-    return Ros(sinks, situation, frame, given["scale"], given["patience"], given["battery"], surroundings)
+    return Ros(sinks, situation, frame, given["scale"], patience, given["battery"], surroundings)
 
 
 def _refuse(options: Mapping[str, str], asked: set[str], why: str) -> None:
