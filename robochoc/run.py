@@ -347,8 +347,7 @@ class _Run:
         if self._options.runtime is Runtime.PROCESSES:
             from robochoc.communication.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
 
-            survive = self._options.on_loss is OnLoss.WITHDRAW
-            patience_s = self._options.patience
+            survive, patience_s = self._options.on_loss is OnLoss.WITHDRAW, self._options.patience
             return ProcessesRun(
                 team, protocol, domains=domains, survive=survive, patience_s=patience_s, brief=brief, **watchers
             )
@@ -360,14 +359,13 @@ class _Run:
         self, protocol: type[Protocol], team: Team, domains: Mapping[str, CompiledDomain], brief: Brief
     ) -> Session:
         try:
-            from robochoc.communication.network.conditions import Conditions  # noqa: PLC0415 - one runtime is enough
+            from robochoc.communication.network.conditions import PATIENCE_S, Conditions  # noqa: PLC0415 - as above
             from robochoc.communication.network.local import LocalNetwork  # noqa: PLC0415 - and it is an extra
         except ModuleNotFoundError as missing:
             raise Unsupported(f"--runtime network needs {missing.name}; say: pip install 'robochoc[network]'") from None
-        survive = self._options.on_loss is OnLoss.WITHDRAW
-        conditions = Conditions(filters=self._options.filters, survive=survive)
-        if self._options.patience is not None:
-            conditions = replace(conditions, patience_s=self._options.patience)
+        options, patience_s = self._options, self._options.patience or PATIENCE_S
+        survive = options.on_loss is OnLoss.WITHDRAW
+        conditions = Conditions(filters=options.filters, survive=survive, patience_s=patience_s)
         watchers: _Watchers = {"observer": self._observer, "progress": self._progress}
         return LocalNetwork(team, protocol, domains=domains, conditions=conditions, brief=brief, **watchers)
 
