@@ -368,20 +368,21 @@ class _Run:
         if self._options.runtime is Runtime.PROCESSES:
             from robochoc.communication.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
 
-            survive = self._options.on_loss is OnLoss.WITHDRAW
-            return ProcessesRun(team, protocol, survive=survive, brief=brief, **watchers)
+            survive, patience_s = self._options.on_loss is OnLoss.WITHDRAW, self._options.patience
+            return ProcessesRun(team, protocol, survive=survive, patience_s=patience_s, brief=brief, **watchers)
         if self._options.runtime is Runtime.NETWORK:
             return self._network(protocol, team, brief)
         return Simulation(team, protocol, _schedule(self._options), brief=brief, **watchers)
 
     def _network(self, protocol: type[Protocol], team: CompiledTeam, brief: Brief) -> Session:
         try:
-            from robochoc.communication.network.conditions import Conditions  # noqa: PLC0415 - one runtime is enough
+            from robochoc.communication.network.conditions import PATIENCE_S, Conditions  # noqa: PLC0415 - as above
             from robochoc.communication.network.local import LocalNetwork  # noqa: PLC0415 - and it is an extra
         except ModuleNotFoundError as missing:
             raise Unsupported(f"--runtime network needs {missing.name}; say: pip install 'robochoc[network]'") from None
-        survive = self._options.on_loss is OnLoss.WITHDRAW
-        conditions = Conditions(filters=self._options.filters, survive=survive)
+        options, patience_s = self._options, self._options.patience or PATIENCE_S
+        survive = options.on_loss is OnLoss.WITHDRAW
+        conditions = Conditions(filters=options.filters, survive=survive, patience_s=patience_s)
         watchers: _Watchers = {"observer": self._observer, "progress": self._progress}
         return LocalNetwork(team, protocol, conditions=conditions, brief=brief, **watchers)
 

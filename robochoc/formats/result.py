@@ -152,6 +152,10 @@ def read_result(content: bytes) -> Outcome:
     """The outcome that a JSON result tells of. Raises `BadResult`, saying what is wrong."""
     try:
         form = msgspec.json.decode(content, type=_Form)
+    except UnicodeDecodeError as error:
+        raise BadResult("it is not UTF-8") from error
+    except RecursionError as error:
+        raise BadResult("it is nested too deep") from error
     except msgspec.MsgspecError as error:
         raise BadResult(str(error)) from error
     spent = form.metrics
