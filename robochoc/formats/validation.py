@@ -49,7 +49,7 @@ def check_team(team: Team) -> None:
         return
     found = _of_the_whole(team) or _mistakes(team) or list(_of_the_scenario(team))
     if found:
-        raise InvalidInput(found)
+        raise InvalidInput(dict.fromkeys(found))
     note_valid(team)
 
 
@@ -73,7 +73,7 @@ def check_writable(team: Team) -> None:
         place = Place(f"team {shortened(team.name)}")
         found.append(place.mistake("its scenario is no robot's", "write it as scenario.xml, and the team without it"))
     if found:
-        raise InvalidInput(found)
+        raise InvalidInput(dict.fromkeys(found))
     by_links = priority_order({robot.name: [parent.name for parent in robot.parents] for robot in team.robots})
     if by_links != team.order:
         check_team(replace(team, robots=tuple(team[name] for name in by_links)))
@@ -83,7 +83,7 @@ def check_robot(robot: Robot) -> None:
     """Raise `InvalidInput` with every mistake that `robot` has by itself; its neighbours are not there to be asked."""
     found = Objects().mistakes(robot)
     if found:
-        raise InvalidInput(found)
+        raise InvalidInput(dict.fromkeys(found))
 
 
 def note_valid(team: Team) -> None:
