@@ -36,7 +36,23 @@ from robochoc.formats.objects import Objects
 from robochoc.generators.queens3d import queens3d
 from robochoc.options import Options, Runtime
 from robochoc.orders import reordered
-from robochoc.problem import Constraint, Event, Kind, Relation, RemoveAgent, RemoveValue, Robot, Semantics, Team
+from robochoc.problem import (
+    AddAgent,
+    AddConstraint,
+    AddValue,
+    Change,
+    Constraint,
+    Domain,
+    Event,
+    Kind,
+    Relation,
+    RemoveAgent,
+    RemoveValue,
+    Robot,
+    Semantics,
+    Team,
+    Variable,
+)
 from robochoc.run import solve
 
 HERE = Options(runtime=Runtime.SIMULATOR)
@@ -105,7 +121,8 @@ def test_lines_of_files_are_not_believed(team: Team) -> None:
 
 def test_two_thousand_mistakes_are_not_all_told(team: Team) -> None:
     row = replace(team["Robot1"].private[0], scope=(1, 2), parameters=(1, 2))
-    many = (replace(team["Robot1"], private=(row,) * 2000), *team.robots[1:])
+    rows = [replace(row, name=f"C{number}") for number in range(2000)]
+    many = (replace(team["Robot1"], private=tuple(rows)), *team.robots[1:])
     found = refused(replace(team, robots=many)).diagnostics
     assert len(found) == 101
 
@@ -161,6 +178,30 @@ def test_what_changes_leave_can_be_solved(team: Team) -> None:
     simple = team_of({"A": range(1, 3), "B": range(1, 3)}, [])
     dynamic = replace(simple, scenario=(Event((RemoveAgent("RB"), RemoveValue("A", 1))), Event(())))
     assert solve(dynamic, HERE).assignment == {"A": 2}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            AddConstraint("RB", "RA", Constraint("C", PREDEFINED["ne"], ("A", "B"), ("A", "B"), cost=3)),
+            "a cost in a Dis",
+        ),
+        (
+            AddConstraint("RC", "RA", Constraint("C", PREDEFINED["ne"], ("A", "C"), ("A",))),
+            "takes 2 terms, but 'A' has 1",
+        ),
+        (AddAgent(Robot("RC", (Variable("C", Domain("D", ())),))), "domain D has no value"),
+        (AddValue("A", 10**18), "19 digits"),
+        ("nonsense", "'nonsense' where RemoveAgent or AddAgent"),
+    ],
+)
+def test_what_a_field_says_is_held_against_the_rules(change: Change, message: str) -> None:
+    team = team_of({"A": range(1, 3), "B": range(1, 3)}, [])
+    newcomer = AddAgent(Robot("RC", (Variable("C", Domain("D", (range(2),))),)))
+    event = Event((newcomer, change))
+    with pytest.raises(InvalidInput, match=message):
+        solve(team, replace(HERE, protocol="dynabt"), field=lambda *_: event)
 
 
 # Found valid once

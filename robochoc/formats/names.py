@@ -19,7 +19,7 @@ RESERVED = "scenario"
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.]*")
 _WORD = re.compile(r"[^ \t\r\n]+")
-_NO_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_NO_XML = re.compile("[\0-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 """Characters that no XML file can hold."""
 
 

@@ -29,7 +29,7 @@ from robochoc.formats.rules import (
     refuse_private_part,
     repeated,
 )
-from robochoc.formats.shapes import ShapeError, check_shape
+from robochoc.formats.shapes import AS_BUILT, ShapeError, check_shape
 from robochoc.problem import Constraint, Domain, Kind, Model, Predicate, Relation, Robot
 
 Definition = Domain | Relation | Predicate
@@ -66,8 +66,7 @@ class Objects:
             check_shape(robot, Robot)
         except ShapeError as error:
             name = robot.name if isinstance(getattr(robot, "name", None), str) else "?"
-            place = ObjectPlaces(name).robot()
-            self._note(place, f"{error.path.lstrip('.')}: {error}".lstrip(": "), "build it as its class says")
+            self._note(ObjectPlaces(name).robot(), error.told, AS_BUILT)
             return False
         return True
 
