@@ -125,10 +125,10 @@ def test_as_few_as_possible_step_aside(protocol: str) -> None:
 def test_costs_that_do_not_fit_into_messages_are_refused() -> None:
     chance = Random("huge")
     team = random_cost_team(chance)
-    dear = Relation("R", 1, Semantics.SOFT, (), (), 2**62)
+    dear = Relation("Dear", 1, Semantics.SOFT, (), (), 10**18 - 1)
     first, *others = team.robots
     own = Constraint("D", dear, (first.variables[0].name,), (first.variables[0].name,), model=None)
-    team = replace(team, robots=(replace(first, private=(*first.private, own)), *others))
+    team = replace(team, robots=(replace(first, private=(*first.private, *[own] * 10)), *others))
     for protocol in MINIMISING:
         with pytest.raises(Unsupported, match="scale them down"):
             solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))
