@@ -70,7 +70,7 @@ def robot(
     afterwards it proves with that who it is, and renews it by itself.
     """
     with network_failures_told(file):
-        from robochoc.communication.network.robot import Manner
+        from robochoc.communication.network.manner import Manner
         from robochoc.communication.run_result import Progress
         from robochoc.formats import read_robot
         from robochoc.machines.join import identity_of, join

@@ -8,8 +8,9 @@ from collections.abc import Iterator, Sequence
 from queue import Empty
 
 from robochoc.authority.identity import Identity
+from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.letters import MASTER, Letters, Refused
-from robochoc.communication.network.post import Arrived, CannotConnect, Post
+from robochoc.communication.network.post import CannotConnect, Post
 from robochoc.communication.network.words import Ask, Told
 from robochoc.machines.place import Place
 from robochoc.services.communicative_acts import Performative
