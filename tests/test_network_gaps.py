@@ -56,7 +56,7 @@ def put_with_a_gap(post: Post, receiver: str, content: bytes) -> None:
     publisher = post._session.declare_publisher(  # noqa: SLF001
         key, congestion_control=zenoh.CongestionControl.BLOCK
     )
-    wait_until(lambda: publisher.matching_status.matching, "nobody hears it", PATIENCE_S)
+    wait_until(lambda: publisher.matching_status.matching, "nobody hears it", PATIENCE_S)  # type: ignore[attr-defined]  # zenoh's stubs
     for number in (1, 2, FAR):
         publisher.put(content, source_info=zenoh.SourceInfo(publisher.id, number))
 

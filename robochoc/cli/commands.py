@@ -103,6 +103,8 @@ def run() -> int:
             return UNREAD
         raise
     except OSError as error:
-        click.echo(f"robochoc: {error}", err=True)
+        from robochoc.plain_text import on_one_line
+
+        click.echo(on_one_line(f"robochoc: {error}"), err=True)
         return 1
     return status if isinstance(status, int) else 0

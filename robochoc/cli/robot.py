@@ -74,6 +74,7 @@ def robot(
         from robochoc.communication.run_result import Progress
         from robochoc.formats import read_robot
         from robochoc.machines.join import identity_of, join
+        from robochoc.plain_text import on_one_line
         from robochoc.solver.cache import SolutionCache
         from robochoc.solver.compile import Compiler
 
@@ -102,7 +103,7 @@ def robot(
             click.echo(msgspec.json.encode(result).decode())
         else:
             decision = ", ".join(f"{name} = {value}" for name, value in ending.assignment.items())
-            click.echo(f"{file.stem}: {ending.why}; {decision or 'no value'}")
+            click.echo(on_one_line(f"{file.stem}: {ending.why}; {decision or 'no value'}"))
             for line in told:
                 click.echo(line, err=True)
     context.exit(LIMIT if ending.why.startswith("unknown") else 0)

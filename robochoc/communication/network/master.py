@@ -59,6 +59,7 @@ from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import over
 from robochoc.observers.events import Observer
 from robochoc.outcome import Verdict
+from robochoc.plain_text import LONGEST_REASON, on_one_line
 from robochoc.protocols.traits import Traits
 from robochoc.solver.encoding import TooMuch, Unsupported
 from robochoc.solver.part import Brief
@@ -92,10 +93,8 @@ class Master:
         self.run = secrets.token_hex(8)
         self.members = members
         self.tally = Tally()
-        self._identity = identity
-        self._conditions = conditions
-        self._watched = watched
-        self._progress = progress
+        self._identity, self._conditions = identity, conditions
+        self._watched, self._progress = watched, progress
         self._shown = self._looked = self._read_registry = 0.0
         self._began = time.monotonic()
         self._letters = Letters(MASTER, self.run)
@@ -337,6 +336,7 @@ class Master:
 
     def _note_failure(self, name: str, why: str, refusal: type[Unsupported] | None = None) -> None:
         """The robot cannot go on (if there is a `why`); a `refusal` ends the run."""
+        why = on_one_line(why, LONGEST_REASON)
         if refusal:
             raise refusal(why)
         if why:
@@ -358,8 +358,8 @@ class Master:
                 self._refuse(name, "be in the directory", unfit)
             self.chronicle.registered(name)
             if self._progress:
-                said = f"{len(self.members.robots)} robots registered"
-                self._progress(Progress(0, time.monotonic() - self._began, said))
+                elapsed_s, number = time.monotonic() - self._began, len(self.members.robots)
+                self._progress(Progress(0, elapsed_s, f"{number} robots registered"))
         self._welcome(name, visit)
 
     def _welcome(self, name: str, visit: str) -> None:

@@ -52,6 +52,7 @@ from robochoc.communication.network.words import (
     Word,
 )
 from robochoc.message import Envelope
+from robochoc.plain_text import LONGEST_REASON, on_one_line
 from robochoc.problem import Robot
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.domain import CompiledDomain
@@ -128,13 +129,16 @@ class NetworkRobot:
             while True:
                 self._turn(self._items())
         except _Over as over:
-            return Ending(over.why, over.failed, self._searcher.assignment if self._searcher else {})
+            return Ending(
+                on_one_line(over.why, LONGEST_REASON), over.failed, self._searcher.assignment if self._searcher else {}
+            )
         except Unsupported as refusal:
-            self._fail(Failed(str(refusal), unsupported=True, elsewhere=isinstance(refusal, TooMuch)))
-            return Ending(str(refusal), failed=True, assignment={})
+            why = on_one_line(str(refusal), LONGEST_REASON)
+            self._fail(Failed(why, unsupported=True, elsewhere=isinstance(refusal, TooMuch)))
+            return Ending(why, failed=True, assignment={})
         except Exception as error:  # noqa: BLE001 - whatever it was, the master has to know
             where = traceback.extract_tb(error.__traceback__)[-1]
-            why = f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"
+            why = on_one_line(f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})", LONGEST_REASON)
             self._fail(Failed(why))
             return Ending(why, failed=True, assignment={})
 
