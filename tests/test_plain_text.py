@@ -57,7 +57,7 @@ def is_plain(text: str, at_most: int) -> bool:
 
 
 def test_what_the_master_says_reaches_the_robots_owner_plain() -> None:
-    ending, _ = played(lambda _post, word: [Leave(HUGE, failed=True)] if isinstance(word, Joined) else [])
+    ending, _ = played(lambda _post, word: [Leave(HUGE[:1_000_000], failed=True)] if isinstance(word, Joined) else [])
     assert ending.why.startswith(r"\x1b[2J\u202e")
     assert is_plain(ending.why, 11 * LONGEST_REASON)
 
