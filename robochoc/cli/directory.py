@@ -9,6 +9,7 @@ import click
 
 from robochoc.cli.network import PlaceType, network_failures_told
 from robochoc.cli.paths import InputPath
+from robochoc.cli.tokens import token_options
 
 if TYPE_CHECKING:
     from robochoc.machines.place import Place
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 @click.option(
     "--as", "name", required=True, metavar="NAME", help="Who asks: an enrolled name (--role observer will do)."
 )
-@click.option("--token", envvar="ROBOCHOC_TOKEN", metavar="TOKEN", help="Enrol with this token first.")
+@token_options()
 @click.option(
     "--identity",
     type=InputPath(),

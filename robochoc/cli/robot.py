@@ -14,6 +14,7 @@ from robochoc.cli.network import PlaceType, network_failures_told
 from robochoc.cli.paths import InputPath
 from robochoc.cli.progress import progress_line
 from robochoc.cli.ros import outlets, ros_options
+from robochoc.cli.tokens import token_options
 
 if TYPE_CHECKING:
     from robochoc.machines.place import Place
@@ -24,12 +25,7 @@ if TYPE_CHECKING:
 @click.option(
     "--master", "place", type=PlaceType(), required=True, metavar="HOST:PORT", help="Where the master listens."
 )
-@click.option(
-    "--token",
-    envvar="ROBOCHOC_TOKEN",
-    metavar="TOKEN",
-    help="Enrol with this token first (robochoc authority enrol has printed it); or put it into ROBOCHOC_TOKEN.",
-)
+@token_options()
 @click.option(
     "--identity",
     type=InputPath(),
