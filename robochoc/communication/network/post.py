@@ -24,6 +24,7 @@ from robochoc.communication.network.conditions import LEASE_MS
 from robochoc.communication.network.inbox import Arrived, Inbox, Missed, Presence, Woken
 from robochoc.communication.network.letters import MASTER
 from robochoc.communication.network.zenoh_config import config
+from robochoc.communication.system import require_descriptors
 
 RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}
 HEARTBEAT_S = 5.0
@@ -36,6 +37,10 @@ KEPT_LETTERS = 100_000
 _LATE_S = 1.0
 _FIRST_ATTEMPT_S, _LONGEST_ATTEMPT_S = 2.0, 10.0
 """So long are attempts to connect; a busy router may take its time for a handshake."""
+
+
+DESCRIPTORS = 24
+"""Open files that a session may need: threads of zenoh's have some, too."""
 
 
 class CannotConnect(Exception):  # noqa: N818 - named for what happened
@@ -202,6 +207,7 @@ def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int)
         raise CannotConnect(
             f"{endpoint}: zenoh cannot check whose IPv6 address that is; call the master by a host name"
         )
+    require_descriptors(DESCRIPTORS)
     until = time.monotonic() + patience_s
     attempt_s = _FIRST_ATTEMPT_S
     while True:
