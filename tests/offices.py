@@ -8,9 +8,10 @@ from typing import cast
 
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Failed, OfEpoch, Pause, Wave
+from robochoc.communication.network.inbox import Arrived, Item
 from robochoc.communication.network.letters import MASTER, Letters
 from robochoc.communication.network.members import Members
-from robochoc.communication.network.post import Arrived, Item, Post
+from robochoc.communication.network.post import Post
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.tally import Tally
 from robochoc.communication.network.words import (

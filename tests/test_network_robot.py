@@ -11,9 +11,11 @@ from lone_robot import LEAVE, UNPROVEN, differ, ok, played, task
 from offices import RUN, Scripted
 
 from robochoc.communication.control import Counters, Failed, Pause, Ready, Wave
+from robochoc.communication.network.inbox import Arrived, Item, Presence, Woken
 from robochoc.communication.network.letters import MASTER, Letter, Letters
-from robochoc.communication.network.post import Arrived, Item, Post, Presence, Woken
-from robochoc.communication.network.robot import Ending, Manner, NetworkRobot
+from robochoc.communication.network.manner import Manner
+from robochoc.communication.network.post import Post
+from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.words import (
     Account,
     Bye,

@@ -109,7 +109,9 @@ def run() -> int:
             return UNREAD
         raise
     except OSError as error:
+        from robochoc.plain_text import on_one_line
+
         told = f"{os.fsdecode(error.filename)}: {error.strerror}" if isinstance(error.filename, str | bytes) else error
-        click.echo(f"robochoc: {told}", err=True)
+        click.echo(on_one_line(f"robochoc: {told}"), err=True)
         return 1
     return status if isinstance(status, int) else 0

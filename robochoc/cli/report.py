@@ -31,7 +31,7 @@ def report(team: Team, outcome: Outcome) -> str:
         lines += [f"  {len(lost)} {'was' if len(lost) == 1 else 'were'} lost:", *_wrapped(lost)]
     order = f", order {outcome.order}" if outcome.order else ""
     lines.append(f"  {outcome.protocols}{order}, {_place(team, outcome)}: {_metrics(outcome)}{_simulated(outcome)}")
-    return "\n".join(lines)
+    return "\n".join(map(on_one_line, lines))
 
 
 def _epochs(outcome: Outcome) -> list[str]:

@@ -14,6 +14,7 @@ import click
 from robochoc.cli.failure import INVALID, LOST, USAGE, Failure
 from robochoc.cli.network import PlaceType, network_failures_told
 from robochoc.cli.paths import InputPath, OutputFile
+from robochoc.cli.tokens import token_options
 
 if TYPE_CHECKING:
     from robochoc.authority.identity import Identity
@@ -39,9 +40,7 @@ _OPTIONS = (
         metavar="NAME",
         help=f"With --master: who sniffs, a name enrolled with --may sniff.  [default: {NAME}]",
     ),
-    click.option(
-        "--token", envvar="ROBOCHOC_TOKEN", metavar="TOKEN", help="With --master: enrol with this token first."
-    ),
+    token_options("With --master: enrol"),
     click.option(
         "--identity",
         type=InputPath(),

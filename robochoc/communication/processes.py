@@ -65,7 +65,7 @@ class ProcessesRun(Session):
     `brief` is what robots are told beside the problem.
     """
 
-    def __init__(  # noqa: PLR0913 - each of them is one thing that a run may be told
+    def __init__(
         self,
         team: Team | CompiledTeam,
         protocol: type[Protocol],

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import msgspec
 
 from robochoc.communication.network.plausibility import Doubt
+from robochoc.communication.network.quotas import EVENTS_A_SECOND, Allowance
 from robochoc.communication.network.refusals import Refusals
 from robochoc.communication.network.tally import is_of
 from robochoc.observers.events import AnyEvent, Granted, Lost, Observer, Refused, Registered
@@ -19,6 +20,7 @@ class Chronicle:
     def __init__(self, observer: Observer | None) -> None:
         self._observer = observer
         self._began = time.monotonic()
+        self._events: dict[str, Allowance] = {}
         self.refuse = Refusals(self._refused).note
         """Told who was refused, what, and why."""
 
@@ -44,6 +46,9 @@ class Chronicle:
 
     def told(self, name: str, events: Sequence[AnyEvent]) -> None:
         """What a robot tells of itself, as it is watched or wants to be; of others it may not tell."""
+        if not self._is_within_quota(name, len(events)):
+            self.refuse(name, "tell of events", f"more than {EVENTS_A_SECOND:,} a second")
+            return
         for event in events:
             if is_of(event, name):
                 self._tell(event)
@@ -56,6 +61,15 @@ class Chronicle:
             for name in doubt.between:
                 self.refuse(name, "its counts of messages", doubt.why)
         return "".join(f"; {doubt.why}" for doubt in doubts)
+
+    def _is_within_quota(self, name: str, events: int) -> bool:
+        now = time.monotonic()
+        if name not in self._events:
+            self._events[name] = Allowance(EVENTS_A_SECOND, now)
+        allowance = self._events[name]
+        enough = allowance.has(events, now)
+        allowance.use(events if enough else 0)
+        return enough
 
     def _refused(self, who: str, what: str, why: str) -> None:
         self._tell(Refused(t=self._now, who=who, what=what, why=why))

@@ -103,6 +103,13 @@ class Objection(_Word, frozen=True):
     why: str
 
 
+class Gap(_Word, frozen=True):
+    """So many `letters` of `who` to me are lost for good."""
+
+    who: str
+    letters: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
+
+
 class Ask(_Word, frozen=True):
     """To the Directory Facilitator, in SL0; answers have the same `number`.
 
@@ -235,6 +242,7 @@ ToMaster = (
     | Checked
     | Failed
     | Objection
+    | Gap
     | Ask
     | Sniff
     | Bye
