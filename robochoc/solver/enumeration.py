@@ -49,7 +49,7 @@ class Budget:
 class Found(NamedTuple):
     """How many solutions there are, whether there are no others, and (unless only counted) which, in order."""
 
-    count: int
+    number: int
     complete: bool
     solutions: list[Codes]
 
