@@ -6,6 +6,7 @@ import itertools
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import TypedDict, assert_never
 
 from robochoc.answers import Refuted, answered, check, placed
@@ -336,9 +337,8 @@ class _Run:
         return opinion.verdict is not Verdict.UNKNOWN
 
     def _judge(self) -> Judge:
-        always = self._options.local.always_ace
-        show = lambda: self._show("ACE decides the whole team")  # noqa: E731 - it is one word for the judge
-        return Judge(self._cache, self._deadline, show, self._solver, always_ace=always)
+        show = partial(self._show, "ACE decides the whole team")
+        return Judge(self._cache, self._deadline, show, self._solver, always_ace=self._options.local.always_ace)
 
     # What an epoch needs
 

@@ -44,7 +44,8 @@ def compile_team(
     local      solutions of these
     groups     of local solutions that look alike from outside
     cost       of the cheapest local solution of a group, from the cheapest group to the dearest (DisWCSP)
-    how        direct: by propagation; enumerated: without ACE; ACE: by it; cached: by it, before; equal: for a robot above
+    how        direct: nothing to search; enumerated: a small problem, without ACE; ACE: solved by it now;
+               cached: by it, before; equal: for a robot above
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.solver.cache import SolutionCache
 
