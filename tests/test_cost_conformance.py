@@ -59,7 +59,7 @@ def agrees(team: Team, options: Options, warm: AceProcess) -> Outcome:
 @pytest.mark.parametrize("protocol", COMPLETE)
 @pytest.mark.parametrize("batch", BATCHES)
 def test_the_least_cost_is_found_in_the_simulator(protocol: str, batch: int, warm: AceProcess) -> None:
-    chance = Random(f"costs {protocol} {batch}")
+    chance = Random(f"least {protocol} {batch}")
     seen = {Verdict.OPTIMAL: 0, Verdict.NO_SOLUTION: 0}
     problems = PER_BATCH if batch else FIRST_BATCH
     for _ in range(problems):
