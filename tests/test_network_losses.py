@@ -1,4 +1,4 @@
-"""A team of `--runtime network` that goes on without the robots that it has lost."""
+"""What robots on a network show: when others are lost, and when others want to see more than their files say."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ from pathlib import Path
 import pytest
 from complex_problems import complex_team
 from held import Held
+from loose_problems import untold_interface
 
 from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.epochs import Journey, Played
 from robochoc.formats import PREDEFINED
+from robochoc.observers.checker import objections
 from robochoc.observers.events import AnyEvent, Lost, Sent
 from robochoc.outcome import Verdict
 from robochoc.problem import Constraint
+from robochoc.registry import protocol_named
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.part import Brief
 
@@ -57,3 +60,13 @@ def test_those_who_are_left_go_on_with_the_values_that_they_had(tmp_path: Path) 
     assert second.compiled.team["V"].interface == ("v", "w")
     assert second.result.verdict is Verdict.SOLUTION
     assert second.result.assignments["V"]["v"] != second.result.assignments["A"]["a"]
+
+
+@pytest.mark.slow
+def test_who_is_asked_to_show_more_is_not_misread() -> None:
+    """Others once took x for y: ABT found no solution."""
+    team = untold_interface()
+    with LocalNetwork(team, protocol_named("abt")) as network:
+        result = network.search(60)
+    assert result.verdict is Verdict.SOLUTION
+    assert not list(objections(team, {**result.assignments["A"], **result.assignments["B"]}))
