@@ -400,3 +400,15 @@ def test_a_journal_of_strangers_raises_nothing_else() -> None:
         except CannotReplay as why:
             outcomes.add(why.broken)
     assert outcomes == {True, False}
+
+
+def test_journals_of_the_first_version_which_stamped_messages_at_the_end_of_a_step_are_played_too() -> None:
+    journal = read_journal((Path(__file__).parent / "data" / "version-1.journal").read_bytes())
+    assert journal.header.version == 1
+    assert identical(replay(journal))
+    place = next(place for place, event in enumerate(journal.events) if isinstance(event, Sent) and event.type == "Ok")
+    events = list(journal.events)
+    sent = events[place]
+    assert isinstance(sent, Sent)
+    events[place] = msgspec.structs.replace(sent, content={"value": (3,)})
+    assert isinstance(replay(with_events(journal, events)).difference.recorded, Sent)  # type: ignore[union-attr]

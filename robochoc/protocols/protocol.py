@@ -33,7 +33,7 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 NO_SETTINGS = Settings()
 
 
-class Said(tuple[str, Message]):
+class Said(tuple[str, Message]):  # noqa: SLOT001 - no subclass of tuple can have slots with anything in them
     """The receiver and the message, of what was said.
 
     `checks` is how many constraint checks the speaker had done by then: from it the host makes the clock that the

@@ -17,7 +17,7 @@ import msgspec
 from robochoc.communication.host import Host
 from robochoc.communication.run_result import Progress
 from robochoc.message import Envelope, Message
-from robochoc.observers.events import AnyEvent, Event, Received, Sent
+from robochoc.observers.events import AnyEvent, Event, Received, Sent, Settled
 from robochoc.observers.journal import Header, Journal
 from robochoc.observers.journal_entries import STAMPED_LATE
 from robochoc.protocols.protocol import Said
@@ -265,7 +265,15 @@ class Scene:
 
 def _as_it_was_told(event: AnyEvent) -> int:
     """Where an event stood in its step in the first version of journals: decisions came before words."""
-    return 0 if isinstance(event, Received) else 2 if isinstance(event, Sent) else 3 if isinstance(event, Settled) else 1
+    match event:
+        case Received():
+            return 0
+        case Sent():
+            return 2
+        case Settled():
+            return 3
+        case _:
+            return 1
 
 
 class _Replay:
