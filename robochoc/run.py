@@ -124,7 +124,7 @@ class _Run:
         try:
             return self._travel(journey, protocol)
         except TooMuch as refused:
-            raise Unsupported(f"{refused}{instead(self._team, options.protocol)}") from None
+            raise Unsupported(f"{refused}{instead(self._team, options, complete=True, costs=True)}") from None
         except (TooManySolutions, CompileTimeout, _TimeOver) as limit:
             outcome = replace(self._summary(), verdict=Verdict.UNKNOWN, assignment={}, verified=False)
             return replace(_without(outcome, journey), reason="; ".join([str(limit), *journey.regrets]))

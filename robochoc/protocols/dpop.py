@@ -156,6 +156,7 @@ class DPOP(TreeProtocol):
         costs=True,
         everywhere=True,
         beyond=False,
+        tables=True,
         privacy="constraints of others, but for sums",
     )
     settings: DPOPSettings = DPOPSettings()

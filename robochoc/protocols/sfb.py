@@ -135,7 +135,11 @@ class SFB(Protocol):
     bounds: ForwardBounds
     messages = Above | Below | CPAs | Explored | Solution
     traits = Traits(
-        paper="Hirayama & Yokoo 1997; Gershman, Meisels, Zivan 2009", synchronous=True, costs=True, everywhere=True
+        paper="Hirayama & Yokoo 1997; Gershman, Meisels, Zivan 2009",
+        synchronous=True,
+        costs=True,
+        everywhere=True,
+        tables=True,
     )
     settings: SFBSettings = SFBSettings()
 

@@ -15,7 +15,8 @@ class Traits:
     during the search, so each robot of a constraint's scope has to know the constraint, and not only the lowest.
     `beyond`: its robots also write to robots that they share no constraint with; where they do not, access control
     across machines keeps them from it. `tree`: it works on a pseudo-tree. `dynamic`: it goes on when the problem
-    changes (then it is a `DynamicProtocol`). `privacy`: what neighbours do not come to know.
+    changes (then it is a `DynamicProtocol`). `tables`: it computes with tables of floats, and refuses costs that could
+    add up to 2^53 or more (`cost_table.refuse_inexact`). `privacy`: what neighbours do not come to know.
     """
 
     paper: str = ""
@@ -28,4 +29,5 @@ class Traits:
     beyond: bool = True
     tree: bool = False
     dynamic: bool = False
+    tables: bool = False
     privacy: str = ""
