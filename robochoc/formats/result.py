@@ -143,7 +143,7 @@ def read_result(content: bytes) -> Outcome:
     """The outcome that a JSON result tells of. Raises `BadResult`, saying what is wrong."""
     try:
         form = msgspec.json.decode(content, type=_Form)
-    except msgspec.MsgspecError as error:
+    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
         raise BadResult(str(error)) from error
     spent = form.metrics
     messages = spent.messages_by_type or {"messages": spent.messages}
