@@ -138,7 +138,7 @@ class _Run:
         try:
             return self._travel(journey, protocol)
         except TooMuch as refused:
-            raise Unsupported(f"{refused}{instead(self._team, options.protocol)}") from None
+            raise Unsupported(f"{refused}{instead(self._team, options, complete=True, costs=True)}") from None
         except (TooManySolutions, CompileTimeout, OutOfTimeError) as limit:
             outcome = replace(self._summary(), verdict=Verdict.UNKNOWN, assignment={}, verified=False)
             return replace(_without(outcome, journey), reason="; ".join([str(limit), *journey.regrets]))

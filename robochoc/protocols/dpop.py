@@ -157,6 +157,7 @@ class DPOP(TreeProtocol):
         costs=True,
         everywhere=True,
         beyond=False,
+        tables=True,
         privacy="constraints of others, but for sums",
     )
     settings: DPOPSettings = DPOPSettings()

@@ -25,7 +25,8 @@ class Traits:
     `beyond`: its robots also write to robots that they share no constraint with; where they do not, access control
     across machines keeps them from it. `tree`: it works on a pseudo-tree. `dynamic`: it goes on when the problem
     changes (then it is a `DynamicProtocol`). `concludes`: the verdicts with which one robot alone may end the search;
-    whoever claims another is refused. `privacy`: what neighbours do not come to know.
+    whoever claims another is refused. `tables`: it computes with tables of floats, and refuses costs that could add up
+    to 2^53 or more (`cost_table.refuse_inexact`). `privacy`: what neighbours do not come to know.
     """
 
     paper: str = ""
@@ -39,6 +40,7 @@ class Traits:
     tree: bool = False
     dynamic: bool = False
     concludes: tuple[Verdict, ...] = UNDECLARED
+    tables: bool = False
     privacy: str = ""
 
     def fault_of_conclusion(self, verdict: str) -> str:
