@@ -27,8 +27,9 @@ from rally import End, LongRally, ManyBalls, Rally, ShortRally, pair, play, retu
 from robochoc.authority.admission import Household
 from robochoc.authority.identity import Identity, IdentityTexts
 from robochoc.communication.network.conditions import LEASE_MS, Conditions
+from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.local import LOOPBACK, LocalNetwork
-from robochoc.communication.network.post import Arrived, Post
+from robochoc.communication.network.post import Post
 from robochoc.communication.network.router import RefusalObserver, Router
 from robochoc.communication.network.zenoh_config import config
 from robochoc.communication.processes import ProcessesRun

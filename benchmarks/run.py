@@ -22,6 +22,7 @@ import network
 import optimum
 import peers
 import simulated
+import small
 import sniffer
 import solver
 import start
@@ -41,6 +42,7 @@ PARTS: dict[str, Callable[[], Section]] = {
     "simulator": simulated.measured,
     "journal": journals.measured,
     "solver": solver.measured,
+    "small": small.measured,
     "flight": flight.measured,
 }
 LONG: dict[str, Callable[[], Section]] = {

@@ -173,7 +173,7 @@ class AgentsContainer:
             return {name: robot.result() for name, robot in running.items()}
 
     def _robot(self, name: str, main: Place) -> Ending:
-        from robochoc.communication.network.robot import Manner  # noqa: PLC0415 - an extra
+        from robochoc.communication.network.manner import Manner  # noqa: PLC0415 - an extra
         from robochoc.machines.join import PATIENCE_S, identity_of, join  # noqa: PLC0415 - the same
         from robochoc.solver.compile import Compiler  # noqa: PLC0415 - the same
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 from robochoc.change import BadChange, changed, changed_by, concerns, described, possible, rejoined, without
 from robochoc.communication.run_result import RunResult
@@ -59,6 +59,11 @@ class Opening(NamedTuple):
     epoch: Epoch
     number: int = 0
     by: str = ""
+
+    @classmethod
+    def of(cls, team: CompiledTeam, brief: Brief) -> Self:
+        """Return a run of `team` as it is."""
+        return cls(Epoch(team, brief=brief))
 
 
 class Announcer:

@@ -27,7 +27,7 @@ def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
     if path.exists() and not path.is_file():
         path.write_bytes(content)
         return
-    os.close(_replaced(path.resolve(), content, mode))
+    os.close(_replaced(resolved(path), content, mode))
 
 
 class Growing:
@@ -43,7 +43,7 @@ class Growing:
         stream = _stream_to(path)
         self._own = stream is None and not (path.exists() and not path.is_file())
         if self._own:
-            self._descriptor = _replaced(path.resolve(), beginning, mode)
+            self._descriptor = _replaced(resolved(path), beginning, mode)
             self._size = len(beginning)
             return
         self._descriptor = os.open(path, os.O_WRONLY) if stream is None else os.dup(stream)
@@ -92,7 +92,7 @@ class Unfinished:
     """
 
     def __init__(self, path: Path, mode: int = 0o666) -> None:
-        self._target = path.resolve()
+        self._target = resolved(path)
         if path.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
         if _stream_to(path) is not None or (path.exists() and not path.is_file()):
@@ -135,6 +135,20 @@ class Unfinished:
         with os.fdopen(os.open(self._named, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode), "wb") as copy:
             shutil.copyfileobj(self.stream, copy)
         return self._named
+
+
+def resolved(path: Path) -> Path:
+    """Return `path` as an absolute one, without symbolic links; the file need not be there.
+
+    Raises `OSError` where the links lead in a circle. (`Path.resolve` raises `RuntimeError` then, or nothing, as the
+    version of Python has it.)
+    """
+    try:
+        path.stat()
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise
+    return Path(os.path.realpath(path))
 
 
 def _replaced(target: Path, content: bytes, mode: int) -> int:

@@ -61,8 +61,9 @@ class Options:
     robot's domain; `cache` says whether solutions of local problems are kept in the user's cache folder. `count` is
     for the central judge: the number of all solutions. `verify` asks for a second opinion on a `no-solution`.
     `settings` are the protocol's, as text; its chance is drawn from `seed` too. With `on_loss` set to withdraw, robots
-    whose processes end leave the problem; up to `spares` of them come back. `filters` are the
-    network's: the channel filters that messages go through.
+    whose processes end leave the problem; up to `spares` of them come back. `patience`, in seconds: a robot whose
+    process is stopped (on a network: that is out of reach) for longer is lost; None: stopped ones are waited for.
+    `filters` are the network's: the channel filters that messages go through.
     """
 
     protocol: str = SATISFIES
@@ -80,6 +81,7 @@ class Options:
     messages: int | None = None
     on_loss: OnLoss = OnLoss.FAIL
     spares: int = 0
+    patience: float | None = None
     channel: ChannelModel | None = None
     settings: Mapping[str, str] = field(default_factory=dict)
     filters: tuple[str, ...] = ()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import NamedTuple
 
 RULED_OUT = "has ruled everything out"
 """What a robot has done that alone can tell that there is no solution, in words that are true in every protocol: by
@@ -87,6 +88,20 @@ class Epoch:
     confirmed: bool = False
 
 
+ALL_ROBOTS = "all robots"
+"""Who claims what any one of them could have made untrue. No robot has such a name."""
+
+
+class Thoroughness(NamedTuple):
+    """How many constraints were checked by who holds them and by another robot too, and how many by their owner alone.
+
+    Of robots that no one else sees into: across machines.
+    """
+
+    by_both: int
+    by_owner: int
+
+
 @dataclass(frozen=True)
 class Outcome:
     """One team, one run. `assignment` maps every variable of the robots that fly to its value.
@@ -127,6 +142,18 @@ class Outcome:
 
     placed_by: str | None = None
     """The protocol that said who steps aside, where that is another than the one that was asked for."""
+
+    claimed_by: str | None = None
+    """Across machines: whose word the verdict rests on, as nobody could check it; a robot, or `ALL_ROBOTS`."""
+    checked: Thoroughness | None = None
+    """Across machines: who has checked the constraints of an answer."""
+
+    @property
+    def ruled_out(self) -> str | None:
+        """Who alone could tell that there is no solution, in words; across machines that is no more than its claim."""
+        if self.witness is None or self.claimed_by is None:
+            return self.witness and f"{self.witness} {RULED_OUT}"
+        return f"{self.witness} claims it; nobody could check"
 
     @property
     def events(self) -> int:

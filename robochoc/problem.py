@@ -192,12 +192,16 @@ class Parent:
 
 @dataclass(frozen=True)
 class Child:
-    """A neighbour of lower priority: the own variables it must be told, and this robot's part of PKCs."""
+    """A neighbour of lower priority: the own variables it must be told, and this robot's part of PKCs.
+
+    `copies` are TKC constraints that the child holds, and this robot's file repeats: for whoever checks an answer.
+    """
 
     name: str
     variables: tuple[str, ...] = ()
     constraints: tuple[Constraint, ...] = ()
     line: int = field(default=0, compare=False)
+    copies: tuple[Constraint, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True)

@@ -2,32 +2,94 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
 
 from robochoc.change import changed_by
 from robochoc.communication.host import BadSettings, settings_of
 from robochoc.observers.objective import aside_cost
-from robochoc.options import CENTRAL, Options, Runtime, ScheduleName, Withdrawal
+from robochoc.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.problem import Kind, Model, Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.registry import offers
+from robochoc.solver.cost_table import EXACT, refuse_inexact
 from robochoc.solver.encoding import Unsupported
+from robochoc.solver.priced import HIGHEST
 
 PAIR = 2
 LARGEST = 2**62
 """Costs that add up to more are refused: a message holds integers of 64 bits."""
 
 
+class _Unfit(Unsupported):
+    """What does not fit is the protocol: another one may do. `complete`: if it proves what it finds."""
+
+    def __init__(self, why: str, *, complete: bool = False) -> None:
+        super().__init__(why)
+        self.complete = complete
+
+
 def refuse_unfit(team: Team, options: Options, protocol: type[Protocol]) -> None:
     """Raise `Unsupported` for what the options ask for and the protocol, or this version, cannot do."""
-    traits = protocol.traits
-    _refuse_channel(options)
     try:
         settings_of(protocol, options.settings)
     except BadSettings as wrong:
         raise Unsupported(f"--set: {wrong} (protocol {options.protocol})") from None
+    try:
+        _check(team, options, protocol.traits)
+    except _Unfit as unfit:
+        raise Unsupported(f"{unfit}{instead(team, options, complete=unfit.complete)}") from None
+
+
+def instead(team: Team, options: Options, *, complete: bool = False, costs: bool = False) -> str:
+    """Who takes what the protocol of `options` has refused, or what else would help, to be put behind the reason.
+
+    Each protocol is asked as if it had been chosen. Only those count that are `complete`, or know `costs`, if need be.
+    """
+    names = [
+        offer.name
+        for offer in offers()
+        if offer.protocol
+        and offer.name != options.protocol
+        and offer.protocol.traits.complete >= complete
+        and offer.protocol.traits.costs >= costs
+        and _takes(team, replace(options, protocol=offer.name), offer.protocol.traits)
+    ]
+    if names:
+        return f"; these do: {', '.join(names)} (--protocol)"
+    if _judge_takes(team, options):
+        return f"; no protocol does, but the central judge (--protocol {CENTRAL})"
+    dear = _most(team, aside=options.withdraw is not None) >= EXACT
+    return f"; no protocol that is installed does{' (scale the costs down)' if dear else ''}"
+
+
+def _takes(team: Team, options: Options, traits: Traits) -> bool:
+    """Whether a protocol with these traits would take the team, in the search as well."""
+    try:
+        _check(team, options, traits)
+        if traits.tables:
+            refuse_inexact(_most(team, aside=options.withdraw is not None))
+    except Unsupported:
+        return False
+    return True
+
+
+def _judge_takes(team: Team, options: Options) -> bool:
+    """Whether the central judge would, for sure."""
+    for_robots = (options.order, options.messages, options.channel, options.settings, options.filters, options.verify)
+    if any(for_robots) or options.runtime is not Runtime.PROCESSES or options.on_loss is not OnLoss.FAIL:
+        return False
+    try:
+        refuse_central(team, replace(options, protocol=CENTRAL))
+    except Unsupported:
+        return False
+    return _most(team, aside=options.withdraw is not None) <= HIGHEST
+
+
+def _check(team: Team, options: Options, traits: Traits) -> None:
+    """Raise `_Unfit` where another protocol could do it, and `Unsupported` where none could."""
+    _refuse_channel(options)
     if options.withdraw is not None:
         refuse_scenario(team, "--withdraw")
     if traits.costs or options.withdraw is Withdrawal.FEWEST:
@@ -100,36 +162,20 @@ def refuse_scenario(team: Team, option: str) -> None:
 def refuse(team: Team, name: str, traits: Traits) -> None:
     """Raise `Unsupported` for what whoever is called `name` cannot take of `team`."""
     if team.kind is Kind.DISWCSP and not traits.costs:
-        raise Unsupported(
-            f"{team.name} is a DisWCSP, and {name} does not minimise costs; {_who_takes(lambda other: other.costs)}"
-        )
+        raise _Unfit(f"{team.name} is a DisWCSP, and {name} does not minimise costs")
     for robot in team.robots:
         parts = (part for child in robot.children for part in child.constraints)
         for constraint in (*robot.shared, *parts):
             if constraint.model is Model.PKC and not traits.partially_known:
-                raise Unsupported(
+                raise _Unfit(
                     f"{robot.name} shares a partially known constraint (PKC, {constraint.name}), which {name}"
-                    f" does not support{_instead_of(name, lambda other: other.partially_known)}"
+                    " does not support"
                 )
             if not traits.n_ary and len({team.owner[variable] for variable in constraint.variables}) > PAIR:
-                raise Unsupported(
+                raise _Unfit(
                     f"{robot.name} holds a constraint over more than two robots ({constraint.name}), which {name}"
-                    f" does not support{_instead_of(name, lambda other: other.n_ary)}"
+                    " does not support"
                 )
-
-
-def instead(team: Team, name: str) -> str:
-    """The complete protocols that minimise and can take `team`, without the one called `name`."""
-
-    def fits(other: str, traits: Traits) -> bool:
-        try:
-            refuse(team, other, traits)
-        except Unsupported:
-            return False
-        return other != name and traits.costs and traits.complete
-
-    names = [offer.name for offer in offers() if offer.protocol and fits(offer.name, offer.protocol.traits)]
-    return f"; these would do: {', '.join(names)} (--protocol)" if names else ""
 
 
 def _refuse_channel(options: Options) -> None:
@@ -143,10 +189,7 @@ def _refuse_channel(options: Options) -> None:
 def _refuse_fewest(team: Team, options: Options, traits: Traits) -> None:
     """Who steps aside is a question of costs: a protocol for these answers it alone, any other is asked first."""
     if traits.costs and not traits.complete:
-        raise Unsupported(
-            f"--withdraw fewest has to be proven, and {options.protocol} proves nothing;"
-            f" {_who_takes(lambda other: other.costs and other.complete)}"
-        )
+        raise _Unfit(f"--withdraw fewest has to be proven, and {options.protocol} proves nothing", complete=True)
     if team.kind is Kind.DISCSP:
         refuse(team, options.protocol, traits)
     refuse(team, "--withdraw fewest", Traits(costs=True, n_ary=traits.n_ary or not traits.costs))
@@ -154,16 +197,11 @@ def _refuse_fewest(team: Team, options: Options, traits: Traits) -> None:
 
 def _refuse_dear(team: Team, *, aside: bool) -> None:
     """Costs, and what stepping aside costs, must fit into messages, however they add up."""
-    most = aside_cost(team) * (sum(robot.weight for robot in team.robots) + 1 if aside else 1)
+    most = _most(team, aside=aside)
     if most >= LARGEST:
         raise Unsupported(f"{team.name}'s costs could add up to {most:,}, more than {LARGEST:,}; scale them down")
 
 
-def _instead_of(name: str, fits: Callable[[Traits], bool]) -> str:
-    """Who could do it instead of the protocol called `name`; an option has no such stand-in."""
-    return "" if name.startswith("--") else f"; {_who_takes(fits)}"
-
-
-def _who_takes(fits: Callable[[Traits], bool]) -> str:
-    names = [offer.name for offer in offers() if offer.protocol and fits(offer.protocol.traits)]
-    return f"these do: {', '.join(names)} (--protocol)"
+def _most(team: Team, *, aside: bool) -> float:
+    """What costs could add up to, with those of stepping aside if robots may."""
+    return aside_cost(team) * (sum(robot.weight for robot in team.robots) + 1 if aside else 1)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from robochoc.answers import answered, check, placed
@@ -13,30 +13,29 @@ from robochoc.anytime import absent
 from robochoc.change import changed_by, described
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress
-from robochoc.communication.session import Epoch as Given
 from robochoc.communication.session import Session
 from robochoc.defaults import FIRST_FIT, MINIMISES
 from robochoc.epochs import Announcer, Field, Journey, Opening, Played
-from robochoc.formats import check_team
+from robochoc.formats import check_event, check_team
 from robochoc.observers.checker import Refuted
 from robochoc.observers.events import Observer
 from robochoc.observers.objective import aside_cost
 from robochoc.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.orders import CannotTurn, Order, favourable, order_of
 from robochoc.outcome import Epoch, Metrics, Outcome, Verdict
-from robochoc.problem import INFINITE, Robot, Team
+from robochoc.problem import INFINITE, Event, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.refusals import instead, refuse_central, refuse_field, refuse_unfit
 from robochoc.registry import protocol_named, spoken
 from robochoc.runtimes import opened
 from robochoc.solver.cache import SolutionCache
-from robochoc.solver.compile import Compiler, CompileTimeout, Source
+from robochoc.solver.compile import CompileTimeout
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.domain import CompiledDomain, TooManySolutions
+from robochoc.solver.domain import TooManySolutions
 from robochoc.solver.encoding import TooMuch, Unsupported
-from robochoc.solver.failures import SolverTimeout
 from robochoc.solver.part import Brief
+from robochoc.solver.team_compiler import NoLocalSolutionError, OutOfTimeError, TeamCompiler
 
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess
@@ -58,11 +57,12 @@ def solve(
 
     Who solves many teams may lend a `solver` that stays warm between them. A `field` is told of each epoch's answer,
     and says what happens next: the problem changes over time. When a limit is reached, the verdict is
-    `unknown`. Raises `InvalidInput` for a team that is not valid, wherever it comes from; `UnknownProtocol`,
+    `unknown`. Raises `InvalidInput` for a team, or a field's event, that is not valid; `UnknownProtocol`,
     `Unsupported`, `RobotsLost` (processes), `CompileFailed` and `SolverLost` (the constraint solver), `SolverMissing`,
     and `Refuted` when a second opinion does not agree.
     """
     check_team(team)
+    field = field and _checked(field)
     try:
         if field:
             refuse_field(team, options)
@@ -72,16 +72,16 @@ def solve(
         raise Unsupported(str(refused)) from None
 
 
-class _TimeOver(Exception):  # noqa: N818 - a limit that was reached
-    """The time for everything was over before the robots could start."""
+def _checked(field: Field) -> Field:
+    """`field`, whose events are held against the rules of teams before they happen."""
 
+    def checked(team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
+        event = field(team, epoch, left_s)
+        if event:
+            check_event(team, event)
+        return event
 
-class _NoneAlone(Exception):  # noqa: N818 - it is an answer, not a fault
-    """The private constraints of `robot` leave it no local solution, which decides the matter."""
-
-    def __init__(self, robot: str) -> None:
-        super().__init__(robot)
-        self.robot = robot
+    return checked
 
 
 class _Run:
@@ -107,7 +107,7 @@ class _Run:
         self._began = time.monotonic()
         self._deadline = None if options.timeout is None else self._began + options.timeout
         self._cache = SolutionCache() if options.cache else None
-        self._compile_s = 0.0
+        self._compiler = TeamCompiler(options.local, self._cache, self._deadline, solver, self._show)
         self._epochs: list[Epoch] = []
         self._outcome = Outcome(
             team=team.name,
@@ -137,8 +137,8 @@ class _Run:
         try:
             return self._travel(journey, protocol)
         except TooMuch as refused:
-            raise Unsupported(f"{refused}{instead(self._team, options.protocol)}") from None
-        except (TooManySolutions, CompileTimeout, _TimeOver) as limit:
+            raise Unsupported(f"{refused}{instead(self._team, options, complete=True, costs=True)}") from None
+        except (TooManySolutions, CompileTimeout, OutOfTimeError) as limit:
             outcome = replace(self._summary(), verdict=Verdict.UNKNOWN, assignment={}, verified=False)
             return replace(_without(outcome, journey), reason="; ".join([str(limit), *journey.regrets]))
 
@@ -151,8 +151,10 @@ class _Run:
             if lost:
                 raise RobotsLost(lost)
             outcome = _without(self._summary(), journey)
-        except _NoneAlone as alone:
-            outcome = self._impossible(journey.team, alone.robot)
+        except NoLocalSolutionError as alone:
+            sure = self._confirmed(journey.team, alone.robot)
+            epoch = Epoch(Verdict.NO_SOLUTION, journey.team.order, verified=sure, witness=alone.robot, confirmed=sure)
+            outcome = replace(self._told(epoch), reason=str(alone))
         if outcome.verdict is Verdict.UNKNOWN and outcome.reason is None:
             outcome = replace(outcome, reason=self._limit(outcome.witness, sum(outcome.metrics.messages.values())))
         if journey.regrets:
@@ -162,13 +164,6 @@ class _Run:
             second = MINIMISES if fewest else FIRST_FIT
             outcome = self._placed(replace(outcome, placed_by=second), journey, spoken(second))
         return outcome
-
-    def _impossible(self, team: Team, alone: str) -> Outcome:
-        """The outcome when one robot `alone` has no local solution. Raises `Refuted`."""
-        reason = f"{alone} alone has none: its private constraints leave it no local solution"
-        sure = self._confirmed(team, alone)
-        epoch = Epoch(Verdict.NO_SOLUTION, team.order, verified=sure, witness=alone, confirmed=sure)
-        return replace(self._told(epoch), reason=reason)
 
     def _limit(self, witness: str | None, sent: int) -> str:
         """Why there is no verdict, after so many messages."""
@@ -209,8 +204,8 @@ class _Run:
             team = journey.arranged()
             if outcome.placed_by == MINIMISES and self._options.order is None:
                 team = favourable(team)
-            compiled = self._compiled(team, every=True)
-            self._announce(protocol, Opening(Given(compiled, brief=brief)))
+            compiled = self._compiler.compile(team, every=True)
+            self._announce(protocol, Opening.of(compiled, brief))
             with self._session(protocol, compiled, brief) as session:
                 result = session.search(self._left_s(), self._options.messages)
             if not result.lost:
@@ -218,7 +213,7 @@ class _Run:
             journey.leave(result.lost.keys())
             if not journey.team.robots:
                 raise RobotsLost(result.lost)
-        spent = replace(outcome.metrics + result.metrics, compile_s=self._compile_s)
+        spent = replace(outcome.metrics + result.metrics, compile_s=self._compiler.seconds)
         outcome = replace(_without(outcome, journey), metrics=spent)
         outcome = placed(outcome, journey.team, result, compiled, brief.aside)
         if outcome.verdict is Verdict.UNKNOWN:
@@ -263,13 +258,13 @@ class _Run:
             confirmed=epoch.confirmed,
             bound=epoch.bound,
             tree=epoch.tree,
-            metrics=replace(epoch.metrics, compile_s=self._compile_s),
+            metrics=replace(epoch.metrics, compile_s=self._compiler.seconds),
         )
 
     def _summary(self) -> Outcome:
         """The last epoch's verdict, with what all of them cost."""
         if not self._epochs:
-            return replace(self._outcome, metrics=Metrics(compile_s=self._compile_s))
+            return replace(self._outcome, metrics=Metrics(compile_s=self._compiler.seconds))
         total = sum((epoch.metrics for epoch in self._epochs), Metrics())
         several = len(self._epochs) > 1 or self._dynamic
         outcome = self._told(replace(self._epochs[-1], metrics=total))
@@ -323,40 +318,14 @@ class _Run:
     def _judge(self) -> Judge:
         from robochoc.solver.central import Judge  # noqa: PLC0415 - start-up: seldom asked for
 
-        always = self._options.local.always_ace
-        show = lambda: self._show("ACE decides the whole team")  # noqa: E731 - it is one word for the judge
-        return Judge(self._cache, self._deadline, show, self._solver, always_ace=always)
+        show = partial(self._show, "ACE decides the whole team")
+        return Judge(self._cache, self._deadline, show, self._solver, always_ace=self._options.local.always_ace)
 
     # What an epoch needs
 
-    def _compiled(self, team: Team, *, every: bool = False) -> CompiledTeam:
-        """Compile `team`, which is what the robots will work on.
-
-        Raises `_NoneAlone` at the first robot without a local solution, unless the others matter: `every` one is asked
-        for, or the problem changes over time.
-        """
-        began = time.monotonic()
-        number = itertools.count(1)
-        solved = False
-
-        def compile_robot(robot: Robot) -> CompiledDomain:
-            nonlocal solved
-            self._show(f"compiling {robot.name} ({next(number)} of {len(team.robots)})")
-            try:
-                compilation = compiler.compile(robot)
-            except SolverTimeout:
-                raise _TimeOver(f"the time (--timeout) was over while {robot.name} was compiled") from None
-            solved = solved or compilation.source is not Source.DIRECT
-            if not (compilation.domain.values or every or self._dynamic):
-                raise _NoneAlone(robot.name)
-            return compilation.domain
-
-        try:
-            with Compiler(self._options.local, self._cache, self._deadline, self._solver) as compiler:
-                return CompiledTeam(team, compile_robot)
-        finally:
-            if solved:
-                self._compile_s += time.monotonic() - began
+    def _compiled(self, team: Team) -> CompiledTeam:
+        """Compile `team` for its next epoch; one robot without a local solution decides the matter, if it is static."""
+        return self._compiler.compile(team, every=self._dynamic or bool(self._epochs))
 
     @property
     def _brief(self) -> Brief:

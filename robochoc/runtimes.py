@@ -41,7 +41,8 @@ def opened(
         case Runtime.PROCESSES:
             from robochoc.communication.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
 
-            return ProcessesRun(team, protocol, survive=options.on_loss is OnLoss.WITHDRAW, **rest)
+            survive = options.on_loss is OnLoss.WITHDRAW
+            return ProcessesRun(team, protocol, survive=survive, patience_s=options.patience, **rest)
         case Runtime.SIMULATOR:
             from robochoc.communication.simulator import Simulation  # noqa: PLC0415 - one runtime is enough
 
@@ -54,11 +55,12 @@ def opened(
 
 def _network(protocol: type[Protocol], team: CompiledTeam, options: Options, rest: _Rest) -> Session:
     try:
-        from robochoc.communication.network.conditions import Conditions  # noqa: PLC0415 - one runtime is enough
+        from robochoc.communication.network.conditions import PATIENCE_S, Conditions  # noqa: PLC0415 - as above
         from robochoc.communication.network.local import LocalNetwork  # noqa: PLC0415 - and it is an extra
     except ModuleNotFoundError as missing:
         raise Unsupported(f"--runtime network needs {missing.name}; say: pip install 'robochoc[network]'") from None
-    conditions = Conditions(filters=options.filters, survive=options.on_loss is OnLoss.WITHDRAW)
+    survive, patience_s = options.on_loss is OnLoss.WITHDRAW, options.patience or PATIENCE_S
+    conditions = Conditions(filters=options.filters, survive=survive, patience_s=patience_s)
     return LocalNetwork(team, protocol, conditions=conditions, **rest)
 
 

@@ -116,9 +116,9 @@ def domains(team: Team) -> dict[str, list[int]]:
     return {name: list(variable.domain) for name, variable in team.variables.items()}
 
 
-def random_journey(chance: Random, events: int = 10) -> Team:
-    """A random team with a scenario of so many events."""
-    team = random_team(chance)
+def random_journey(chance: Random, events: int = 10, change: Callable[[Team], Team] = lambda team: team) -> Team:
+    """A random team with a scenario of so many events; `change` is made to it before."""
+    team = change(random_team(chance))
     return replace(team, scenario=tuple(Author(chance).scenario(team, events)))
 
 

@@ -72,9 +72,9 @@ class Run:
         return self.robots()
 
     def wait_until_listening(self) -> None:
-        """Wait until the program, and no longer Python alone, answers signals."""
+        """Wait until the program, and no longer Python alone, answers signals, or is over already."""
         bit = 1 << (signal.SIGTERM - 1)
-        wait_until(lambda: bool(_caught(self.pid) & bit), "it never listened to signals")
+        wait_until(lambda: bool(_caught(self.pid) & bit) or self.is_over, "it never listened to signals")
 
     def strike(self, signum: int, *victims: int, group: bool = False) -> None:
         """Send `signum` to `victims`, to the program itself without any, or to its whole process group."""

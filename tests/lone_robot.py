@@ -9,10 +9,12 @@ from offices import RUN, Scripted
 from problems import team_of
 
 from robochoc.authority.identity import Identity
+from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
+from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.members import Members
-from robochoc.communication.network.post import Arrived, Item, Missed, Post, Presence, Woken
+from robochoc.communication.network.post import Post
 from robochoc.communication.network.profile import profile_of
-from robochoc.communication.network.robot import Ending, Manner, NetworkRobot
+from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.words import (
     Leave,
     Register,

@@ -141,6 +141,16 @@ def turned_interface() -> Team:
     )
 
 
+def untold_interface() -> Team:
+    """A's file says that it tells B its y; that B's constraint wants x too only B's file says."""
+    below = Constraint("C", PREDEFINED["lt"], ("x", "b"), ("x", "b"))
+    team = turned_interface()
+    held = (*team["B"].parents[0].constraints, below)
+    robots = (team["A"], replace(team["B"], parents=(Parent("A", held),)))
+    above = replace(robots[0], children=(Child("B", ("y",)),))
+    return Team("untold-interface", (above, robots[1]))
+
+
 def least(team: Team) -> float:
     """The least cost of a solution, by brute force; without costs 0 for one, and `INFINITE` where there is none."""
     needed = {name for constraint in team.constraints() for name in constraint.variables}

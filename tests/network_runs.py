@@ -20,11 +20,12 @@ from robochoc.authority.admission import Household
 from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.letters import Letters
 from robochoc.communication.network.local import LOOPBACK
+from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.post import Post
 from robochoc.communication.network.publication import Publication
-from robochoc.communication.network.robot import Ending, Manner, NetworkRobot
+from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.words import Word
 from robochoc.communication.run_result import RunResult
 from robochoc.observers.events import AnyEvent, Lost, Received, Refused

@@ -8,9 +8,10 @@ from typing import cast
 
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Failed, OfEpoch, Pause, Wave
+from robochoc.communication.network.inbox import Arrived, Item
 from robochoc.communication.network.letters import MASTER, Letters
 from robochoc.communication.network.members import Members
-from robochoc.communication.network.post import Arrived, Item, Post
+from robochoc.communication.network.post import Post
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.tally import Tally
 from robochoc.communication.network.words import (
@@ -83,7 +84,9 @@ class Office:
         identities: dict[str, Identity] | None = None,
         filters: Sequence[str] = (),
         brief: Brief = NO_BRIEF,
+        traitor: str = "",
     ) -> None:
+        self.traitor = traitor
         self.inboxes: dict[str, SimpleQueue[Item]] = {name: SimpleQueue() for name in (*team.order, MASTER)}
         self.members = Members(team.order)
         self.tally = Tally()
@@ -108,16 +111,18 @@ class Office:
 
     def search(self) -> RunResult:
         """One search, until all is quiet."""
-        tally = self.tally = Tally(self.tally.epoch + 1, self.members.order)
+        tally = self.tally = Tally(
+            self.tally.epoch + 1, self.members.order, None, self.members.declared(self._protocol.traits)
+        )
         tasks = self.members.tasks(tally.epoch, self._protocol.__name__, self._protocol.traits, self._brief)
         for name, task in tasks.items():
             self.tell(name, task)
         self._settle()
         if tally.ready:
             self._tell_all(Search(tally.epoch))
-            self._searching = True
+            self._searching = tally.ordered = True
             self._settle()
-            while tally.verdict is None and not tally.counters.quiescent and tally.wave_due:
+            while not (tally.verdict or tally.counters.quiescent or tally.broken_off) and tally.wave_due:
                 self._tell_all(Wave(tally.counters.begin_wave()))
                 self._settle()
             if tally.counters.quiescent:
@@ -142,6 +147,12 @@ class Office:
     def tell(self, name: str, word: ToRobot) -> None:
         """Say something to a robot."""
         self.inboxes[name].put(Arrived(MASTER, self._letters.write(name, word)))
+
+    def _weigh(self, name: str, fault: str) -> None:
+        """Who says what cannot be is lost; of nobody but the `traitor` that is to be expected."""
+        if fault:
+            assert name == self.traitor, (name, fault)
+            self.tally.lose(name, fault)
 
     def _tell_all(self, word: ToRobot) -> None:
         for name in self._robots:
@@ -177,7 +188,7 @@ class Office:
             case Failed() as failed:
                 self.failures[name] = failed
             case OfEpoch() as word:
-                assert self.tally.hear(name, word)
+                self._weigh(name, self.tally.hear(name, word))
             case _:
                 pass
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from random import Random
 
 from hypothesis import strategies as st
@@ -67,6 +68,20 @@ def team_of(domains: Mapping[str, Sequence[int]], constraints: Iterable[Constrai
         for variable, values in domains.items()
     )
     return Team(name, robots)
+
+
+def known_to_both(team: Team) -> Team:
+    """`team`, where parents' files repeat what their children hold, as the original platform's do."""
+    held = {robot.name: robot.shared for robot in team.robots}
+    own = {robot.name: {variable.name for variable in robot.variables} for robot in team.robots}
+
+    def copied(parent: str, child: Child) -> Child:
+        return replace(child, copies=tuple(one for one in held[child.name] if own[parent] & set(one.variables)))
+
+    robots = [
+        replace(robot, children=tuple(copied(robot.name, child) for child in robot.children)) for robot in team.robots
+    ]
+    return replace(team, robots=tuple(robots))
 
 
 def random_team(chance: Random, *, n_ary: bool = True) -> Team:

@@ -147,7 +147,7 @@ def arrivals(shared: object, ready: list[tuple[str, int]]) -> list[int]:
     )
     schedule = Timed(0, model)
     for number, (sender, checks) in enumerate(ready):
-        schedule.put(Envelope(sender, f"R{number}", b"x", 0))
+        schedule.put(Envelope(sender, f"R{number}", b"x", 0), checks)
         schedule.done(sender, 0, checks)
     times = []
     while packet := schedule.get():
@@ -164,6 +164,20 @@ def test_a_shared_medium_carries_one_message_at_a_time() -> None:
 
 def test_a_robot_has_one_radio() -> None:
     assert arrivals(False, [("A", 0), ("A", 0), ("B", 0)]) == [1, 1, 2]
+
+
+def test_a_message_leaves_when_it_was_said_and_its_sender_computes_on() -> None:
+    model = ChannelModel(name="even", latency_ms=1, check_ns=1000)
+    schedule = Timed(0, model)
+    for checks in (2, 5000):
+        schedule.put(Envelope("A", "B", b"x", 0), checks)
+    schedule.done("A", 0, 6000)
+    times = []
+    while schedule.get():
+        times.append(schedule.now)
+        schedule.done("B", 0, 0)
+    assert times == [1_002_000, 6_000_000]
+    assert schedule.elapsed_s == 0.006
 
 
 def test_the_medium_is_given_to_whom_is_ready_first_not_to_whom_began_first() -> None:
@@ -280,13 +294,13 @@ def test_what_is_cleared_begins_again() -> None:
     schedule = Timed(0, ChannelModel(name="even", latency_ms=100, check_ns=1000))
     for _ in range(2):
         assert (schedule.elapsed_s, schedule.time(5)) == (0, 5e-6)
-        schedule.put(Envelope("A", "B", b"x", 0))
+        schedule.put(Envelope("A", "B", b"x", 0), 4)
         schedule.done("A", 0, 10)
         assert schedule.get()
-        assert (schedule.time(0), schedule.elapsed_s) == (0.10001, 0.00001)
-        schedule.put(Envelope("B", "A", b"x", 0))
+        assert (schedule.time(0), schedule.elapsed_s) == (0.100004, 0.00001)
+        schedule.put(Envelope("B", "A", b"x", 0), 0)
         schedule.done("B", 0, 10)
-        assert schedule.elapsed_s == 0.10002
+        assert schedule.elapsed_s == 0.100014
         schedule.clear()
         assert not schedule.get()
 

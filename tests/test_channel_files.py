@@ -83,7 +83,7 @@ def test_a_bad_file_is_told_in_one_line(tmp_path: Path, content: str, message: s
 
 def test_what_is_no_file_or_no_text(tmp_path: Path) -> None:
     (tmp_path / "raw.toml").write_bytes(b"\xff\xfe")
-    for name, message in (("", "is no file"), ("none.toml", "is no file"), ("raw.toml", "is no TOML file")):
+    for name, message in (("", "is no file"), ("none.toml", "is no file"), ("raw.toml", "is not UTF-8")):
         with pytest.raises(InvalidInput, match=message):
             read_channel(tmp_path / name)
 

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from robochoc.communication.network.chronicle import Chronicle
+from robochoc.communication.network.quotas import BURST_S, EVENTS_A_SECOND
 from robochoc.observers.events import AnyEvent, Decided, Granted, Lost, Refused, Registered
 
 
@@ -42,3 +43,17 @@ def test_where_nobody_observes_nothing_is_told() -> None:
     chronicle = Chronicle(None)
     chronicle.refuse("A", "anything", "it may not")
     chronicle.registered("A")
+
+
+def test_who_tells_more_than_robots_have_to_tell_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.communication.network.chronicle.time", SimpleNamespace(monotonic=lambda: 0.0))
+    told: list[AnyEvent] = []
+    chronicle = Chronicle(told.append)
+    flood = [Decided(t=3.0, robot="A", assignment={}, clock=1)] * EVENTS_A_SECOND
+    for _ in range(int(BURST_S) + 3):
+        chronicle.told("A", flood)
+    chronicle.told("B", [Decided(t=3.0, robot="B", assignment={}, clock=1)])
+    decided = [event.robot for event in told if isinstance(event, Decided)]
+    assert (decided.count("A"), decided.count("B")) == (BURST_S * EVENTS_A_SECOND, 1)
+    refused = [event for event in told if isinstance(event, Refused)]
+    assert [(one.who, one.what, one.why) for one in refused] == [("A", "tell of events", "more than 10,000 a second")]

@@ -215,7 +215,7 @@ def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
         (["--nonsense"], "--nonsense"),
         (["--timeout", "nan"], "--timeout"),
         (["--html", ""], "--html"),
-        (["--html", "x", "--journal", "x"], "two files"),
+        (["--html", "x", "--journal", "./x"], "are one place"),
         ([""], "empty"),
         (["--delay", "3"], "--runtime simulator"),
         (["--schedule", "random"], "--runtime simulator"),

@@ -6,10 +6,10 @@ import pytest
 from problems import team_of
 
 from robochoc.communication.host import BadMessage, Host
-from robochoc.message import Envelope, encode
+from robochoc.message import Envelope, Message, encode
 from robochoc.observers.events import AnyEvent, Concluded, Decided, Received, Sent, Settled
 from robochoc.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.abt import ABT, Nogood, Ok
+from robochoc.protocols.abt import ABT, AddLink, Nogood, Ok
 from robochoc.protocols.first_fit import Placed
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.compiled import LocalProblem
@@ -38,6 +38,44 @@ def test_the_clock_takes_up_the_message_s_and_counts_own_checks() -> None:
     assert b.clock == 9
     assert said.clock == 9
     assert b.metrics().checks == 2
+
+
+class Chatty(ABT):
+    """Says something before, between and after its checks."""
+
+    def receive(self, sender: str, message: Message) -> None:
+        self.send("RA", AddLink())
+        super().receive(sender, message)
+        self._consistent(0, self.view)
+        self.send("RA", AddLink())
+
+    def settle(self) -> None:
+        self._consistent(1, self.view)
+        self.send("RC", AddLink())
+        self._consistent(1, self.view)
+
+
+def chatty() -> Host:
+    team = chain()
+    return Host(Chatty(LocalProblem(parts(team)["RB"]), PriorityOrder(team.order)))
+
+
+def test_a_message_carries_the_clock_of_when_it_was_said() -> None:
+    b = chatty()
+    said = b.handle([Envelope("RA", "RB", encode(Ok((1,))), clock=7)])
+    assert [envelope.clock for envelope in said] == [7, 8, 9]
+    assert b.clock == 10
+    assert b.said_at == [0, 1, 2]
+    # Nothing rules out B = 2, so it is checked each time; what ruled out B = 1 is known.
+    again = b.handle([Envelope("RA", "RB", encode(Ok((1,))), clock=0)])
+    assert [envelope.clock for envelope in again] == [10, 10, 11]
+
+
+def test_what_was_said_to_a_message_does_not_carry_the_clocks_of_those_that_were_read_after_it() -> None:
+    b = chatty()
+    first, second = (Envelope("RA", "RB", encode(Ok((1,))), clock) for clock in (7, 100))
+    assert [envelope.clock for envelope in b.handle([first, second])] == [7, 8, 100, 100, 101]
+    assert b.clock == 102
 
 
 def test_an_old_clock_moves_nothing_back() -> None:

@@ -201,10 +201,23 @@ def test_what_a_childs_constraints_look_at_is_asked_for_whether_its_parent_says_
     members.register("A", robot("A", children=("B",)), "first")
     members.register("B", robot("B", parents=("A",), shown="Y", wants=("X",)), "first")
     assert members.unseen() == {"A": ("X",)}
-    assert members.show("A", {"X": ((1, 3),), "Secret": ((1, 1),)}) == ""
+    assert (
+        members.show("A", {"X": ((1, 3),), "Secret": ((1, 1),)}) == "it has shown variables that it was not asked for"
+    )
+    assert members.show("A", {"X": ((1, 3),)}) == ""
     assert not members.unseen()
     assert not list(members.strangers())
     assert members.tasks(1, "abt", Traits(), NO_BRIEF)["B"].interfaces == {"A": ("X",), "B": ("Y",)}
+
+
+def test_two_that_show_one_variable_are_both_named() -> None:
+    members = Members()
+    for name in ("A", "C"):
+        members.register(name, robot(name, children=("B",)), "first")
+    members.register("B", robot("B", parents=("A", "C"), shown="Y", wants=("X",)), "first")
+    assert members.unseen() == {"A": ("X",), "C": ("X",)}
+    assert members.show("A", {"X": ((1, 3),)}) == ""
+    assert members.show("C", {"X": ((1, 3),)}) == "the variable X is A's, and C's too"
 
 
 def test_a_constraint_over_what_no_neighbour_has_is_told() -> None:

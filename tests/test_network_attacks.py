@@ -20,8 +20,9 @@ from robochoc.authority.certificates import leaf_certificate, moment, new_key
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Conclusion
 from robochoc.communication.network.access import letter_key
+from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.letters import LARGEST_LETTER, MASTER
-from robochoc.communication.network.post import Arrived, CannotConnect, Post
+from robochoc.communication.network.post import CannotConnect, Post
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot import NetworkRobot
 from robochoc.communication.network.router import Router

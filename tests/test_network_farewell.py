@@ -9,8 +9,9 @@ from held import CHAIN
 from network_runs import SLICE_S, NetworkRun
 from relays import Relay
 
+from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.letters import MASTER, Letters, Opened
-from robochoc.communication.network.post import Arrived, Post
+from robochoc.communication.network.post import Post
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.words import Bye, Joined, Leave, Register, Welcome
 

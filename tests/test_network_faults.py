@@ -25,8 +25,9 @@ from relays import Relay
 from robochoc.authority.authority import Authority
 from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.local import LocalNetwork
+from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.post import Post
-from robochoc.communication.network.robot import Ending, Manner, NetworkRobot
+from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.communication.run_result import RunResult
 from robochoc.observers.events import AnyEvent, Lost, Received, Sent

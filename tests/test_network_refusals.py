@@ -31,6 +31,7 @@ def test_what_a_tally_does_not_take() -> None:
     assert tally.verdict is None
     assert tally.counters.sent == 0
     assert not tally.ready
+    tally.ordered = True
     tally.hear("A", Conclusion(2, "no-solution"))
     assert tally.verdict is Verdict.NO_SOLUTION
 

@@ -11,17 +11,21 @@ from lone_robot import LEAVE, UNPROVEN, differ, ok, played, task
 from offices import RUN, Scripted
 
 from robochoc.communication.control import Counters, Failed, Pause, Ready, Wave
+from robochoc.communication.network.inbox import Arrived, Item, Presence, Woken
 from robochoc.communication.network.letters import MASTER, Letter, Letters
-from robochoc.communication.network.post import Arrived, Item, Post, Presence, Woken
-from robochoc.communication.network.robot import Ending, Manner, NetworkRobot
+from robochoc.communication.network.manner import Manner
+from robochoc.communication.network.post import Post
+from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.words import (
     Account,
     Bye,
     Checked,
     Copies,
     Denied,
+    Exchanged,
     Joined,
     Judge,
+    Judged,
     Leave,
     Objection,
     Register,
@@ -61,7 +65,9 @@ def test_a_run_from_beginning_to_end() -> None:
     (account,) = post.heard_of(Account)
     assert isinstance(account, Account)
     assert (account.assigned, account.assignment) == (True, {"B": 2})
-    assert post.heard_of(Checked) == [Checked(1, allowed=True, cost=0)]
+    shared = (Judged("RB", ("A", "B"), 1, 0),)
+    assert post.heard_of(Checked) == [Checked(1, allowed=True, cost=0, held=1, shared=shared)]
+    assert account.exchanged == {"RA": Exchanged(0, 1, 5), "RC": Exchanged(2, 0, 0)}
     assert isinstance(post.heard[-1], Bye)
     assert {receiver for receiver, _ in post.sent} == {"RC"}
 
@@ -243,6 +249,27 @@ def test_what_is_no_message_is_refused_and_takes_no_place() -> None:
     ending, post = played(script)
     assert ending == Ending("over", failed=False, assignment={"B": 2})
     assert len(post.heard_of(Objection)) == 1
+
+
+def test_who_takes_no_part_is_not_heard() -> None:
+    """Such as a robot that was lost before: the protocol knows nothing of it."""
+
+    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+        match word:
+            case Joined():
+                yield task()
+            case Ready():
+                yield Search(1)
+                yield post.letter(Said(1, 0, ok(1)), "R9")
+                yield post.letter(Said(1, 0, ok(1)), "RA")
+            case Counters(_, 0, _, 1):
+                yield LEAVE
+            case _:
+                pass
+
+    ending, post = played(script)
+    assert ending == Ending("over", failed=False, assignment={"B": 2})
+    assert post.heard_of(Objection) == [Objection("R9", "a letter to RB", "R9 takes no part in this search")]
 
 
 def test_objections_are_limited() -> None:

@@ -11,8 +11,9 @@ from lone_robot import LEAVE, UNPROVEN, differ, played, task
 from offices import RUN, Scripted
 
 from robochoc.communication.control import Failed, Pause, Ready
-from robochoc.communication.network.letters import Letter, Letters
-from robochoc.communication.network.post import Arrived, Item, Missed, Post
+from robochoc.communication.network.inbox import Arrived, Item, Missed
+from robochoc.communication.network.letters import MASTER, Letter, Letters
+from robochoc.communication.network.post import Post
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.shared import PredicateRecord, SharedRecord
 from robochoc.communication.network.words import (
@@ -60,8 +61,8 @@ def test_an_unknown_protocol_is_told() -> None:
 
 
 def test_lost_letters_are_told() -> None:
-    _, failed = failing(Missed(3))
-    assert (failed.why, failed.unsupported) == ("3 letters to RB were lost for good", True)
+    _, failed = failing(Missed(MASTER, 3))
+    assert (failed.why, failed.unsupported) == ("3 letters of the master to RB were lost for good", True)
 
 
 def copy(scope: tuple[str, ...] = ("B", "C"), body: str = "ne(X, Y)") -> SharedRecord:
@@ -194,7 +195,7 @@ def test_a_master_that_is_gone_ends_the_run() -> None:
 def test_who_fails_does_not_wait_for_a_master_that_is_gone() -> None:
     def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
         if isinstance(word, Joined):
-            yield Missed(1)
+            yield Missed(MASTER, 1)
         elif isinstance(word, Failed):
             post.router = ""
 

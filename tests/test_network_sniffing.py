@@ -19,8 +19,9 @@ from clocks import waiting
 from network_runs import NetworkRun
 
 from robochoc.communication.network.access import ALL, journal_key
+from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.letters import MASTER, Letters
-from robochoc.communication.network.post import Arrived, CannotConnect
+from robochoc.communication.network.post import CannotConnect
 from robochoc.communication.network.publication import ANSWERED_AT_MOST, Publication, piece_in, question
 from robochoc.communication.network.words import Sniff, Sniffable
 from robochoc.machines.consult import NoAnswer

@@ -9,13 +9,14 @@ from cost_problems import least_cost, random_cost_team
 from lone_robot import differ
 from offices import Office
 from pkc_problems import random_pkc_team
-from problems import random_team, solutions
+from problems import known_to_both, random_team, solutions
 
 from robochoc.authority.admission import Household
 from robochoc.outcome import Verdict
 from robochoc.problem import INFINITE
 from robochoc.protocols.abt import ABT
-from robochoc.registry import protocol_named
+from robochoc.registry import protocol_named, protocol_names
+from robochoc.solver.part import Brief
 
 
 @pytest.mark.parametrize("protocol", ["abt", "afc-ng", "awc", "agile-abt", "afc-tree"])
@@ -36,6 +37,25 @@ def test_teams_solve_their_problems(protocol: str) -> None:
         assert {name: ending.assignment for name, ending in office.leave().items()} == result.assignments
         verdicts.add(result.verdict)
     assert verdicts == {Verdict.SOLUTION, Verdict.NO_SOLUTION}
+
+
+@pytest.mark.parametrize("name", protocol_names())
+def test_nobody_is_doubted_who_is_honest(name: str) -> None:
+    """By whatever protocol: the office refuses nothing, all counts agree, and so do both ends of each constraint."""
+    protocol = protocol_named(name)
+    chance = Random(4)
+    team = random_cost_team(chance, n_ary=False) if protocol.traits.costs else random_team(chance, n_ary=False)
+    brief = Brief(settings={"cycles": "5"} if hasattr(protocol.settings, "cycles") else {})
+    office = Office(known_to_both(team), protocol, brief=brief)
+    result = office.search()
+    assert not office.failures
+    assert not office.tally.doubts_about_counts
+    assert result.verdict is not Verdict.UNKNOWN
+    if result.verdict is Verdict.SOLUTION:
+        office.judge(result.assignments)
+        private = sum(len(robot.private) for robot in team.robots)
+        assert office.tally.thoroughness == (len(list(team.constraints())) - private, private)
+    assert not office.tally.doubts_about_verdict
 
 
 @pytest.mark.parametrize("protocol", ["dpop", "sfb"])

@@ -12,8 +12,9 @@ from held import CHAIN, TRIANGLE, Held
 from network_runs import NetworkRun, letter
 
 from robochoc.communication.network.conditions import Conditions
+from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.letters import MASTER, Letters
-from robochoc.communication.network.post import Arrived, Post
+from robochoc.communication.network.post import Post
 from robochoc.communication.network.profile import Profile, profile_of
 from robochoc.communication.network.words import Copies, Denied, Register, Said, Word
 from robochoc.communication.robot_link import RobotsLost

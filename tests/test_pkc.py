@@ -37,7 +37,8 @@ SECRETS = Path(__file__).parents[1] / "docs" / "examples" / "secrets"
 
 def part(pair: str, *forbidden: tuple[int, int], name: str = "C") -> Constraint:
     """One robot's part of a PKC over the variables named by two letters."""
-    relation = Relation(f"R{forbidden}", 2, Semantics.CONFLICTS, forbidden)
+    called = "R" + "_".join(f"{one}.{other}" for one, other in forbidden)
+    relation = Relation(called, 2, Semantics.CONFLICTS, forbidden)
     return Constraint(name, relation, tuple(pair), tuple(pair), Model.PKC)
 
 

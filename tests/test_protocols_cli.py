@@ -151,6 +151,7 @@ def test_json_is_an_object_a_line() -> None:
         "package": f"robochoc {__version__}",
         "distributed": True,
         **vars(abt.ABT.traits),
+        "concludes": ["no-solution"],
         "settings": {},
     }
     assert found["central"]["distributed"] is False

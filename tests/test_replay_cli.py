@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,8 @@ from robochoc.cli.failure import INVALID, LOST, USAGE
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.observers.events import Sent
-from robochoc.observers.journal import Journal, Recorder
+from robochoc.observers.journal import Journal, Recorder, lines_of
+from robochoc.outcome import Verdict
 
 THE_SAME = """\
 queens3d-2: abt, runtime simulator, seed 0
@@ -45,6 +47,13 @@ def written(journal: Journal, path: Path) -> Path:
 
 def run(*words: object) -> Result:
     return CliRunner().invoke(cli, ["replay", *map(str, words)])
+
+
+def ended(*words: object) -> tuple[int, str]:
+    """The exit status, and what was printed."""
+    result = CliRunner().invoke(cli, ["replay", *map(str, words)], standalone_mode=False)
+    assert isinstance(result.return_value, int), result.exception
+    return result.return_value, result.output
 
 
 def changed(journal: Journal) -> Journal:
@@ -95,6 +104,73 @@ def test_one_that_breaks_off(two: Journal, tmp_path: Path) -> None:
     assert result.exit_code == 0
     assert "the journal does not say how the run ended" in result.output
     assert result.output.endswith("the same, as far as it goes\n")
+
+
+def test_one_that_was_altered_is_invalid_and_names_the_place(two: Journal, tmp_path: Path) -> None:
+    content = written(two, tmp_path / "journal").read_bytes()
+    for place in (len(content) - 1, len(content) // 2):
+        (tmp_path / "other").write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
+        status, said = ended(tmp_path / "other")
+        assert status == INVALID
+        assert "as far as it goes" not in said
+        assert "the journal was altered: byte " in said
+        assert "the checksum of a block is wrong" in said
+    told: dict[str, Any] = msgspec.json.decode(ended(tmp_path / "other", "--json")[1])
+    assert (told["truncated"], "checksum" in told["damage"]) == (False, True)
+
+
+def test_what_stands_before_the_damage_is_played(two: Journal, tmp_path: Path) -> None:
+    lines = list(lines_of(two))
+    lines[-5] = b"{}\n"
+    (tmp_path / "journal").write_bytes(b"".join(lines))
+    status, said = ended(tmp_path / "journal")
+    assert status == INVALID
+    assert f"the journal was altered: line {len(lines) - 4}: " in said
+    assert said.endswith("what stands before the damage is the same; this is not the journal that was written\n")
+
+
+def test_one_without_its_end_says_how_far_it_goes(two: Journal, tmp_path: Path) -> None:
+    for content in (b"".join(lines_of(two)), many_blocks(two)):
+        (tmp_path / "journal").write_bytes(content[:-9])
+        status, said = ended(tmp_path / "journal")
+        assert status == 0
+        assert "the journal ends early: " in said
+        assert said.endswith("the same, as far as it goes\n")
+
+
+def many_blocks(journal: Journal) -> bytes:
+    """The journal of a run that told of each event at once."""
+    recorder = Recorder(journal.header)
+    for event in journal.events:
+        recorder(event)
+        recorder.flush()
+    return recorder.content()
+
+
+def test_where_nothing_is_compared_there_is_no_success(two: Journal, tmp_path: Path) -> None:
+    broken = replace(two, outcome=None)
+    for journal in (replace(two, events=()), replace(broken, events=()), replace(broken, events=two.events[:2])):
+        (tmp_path / "journal").write_bytes(b"".join(lines_of(journal)))
+        status, said = ended(tmp_path / "journal")
+        assert status == INVALID
+        assert "nothing was compared" in said
+        told: dict[str, Any] = msgspec.json.decode(ended(tmp_path / "journal", "--json")[1])
+        assert told["identical"] is False
+
+
+def test_a_verdict_that_does_not_follow_is_a_difference(two: Journal, tmp_path: Path) -> None:
+    assert two.outcome is not None
+    path = written(replace(two, outcome=replace(two.outcome, verdict=Verdict.SOLUTION)), tmp_path / "journal")
+    status, said = ended(path)
+    assert status == LOST
+    assert said.endswith(
+        """\
+  different, though all steps are the same:
+    the outcome's verdict
+      recorded  "solution"
+      replayed  "optimal"
+"""
+    )
 
 
 def test_files_for_a_journal_that_has_none(two: Journal, tmp_path: Path) -> None:

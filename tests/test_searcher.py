@@ -14,7 +14,7 @@ from robochoc.communication.host import BadMessage
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.searcher import EVENTS_AT_ONCE, Searcher, Surroundings
 from robochoc.communication.network.shared import SharedRecord, record_of
-from robochoc.communication.network.words import Account, Checked, Copies, Said, Task, ToMaster
+from robochoc.communication.network.words import Account, Checked, Copies, Judged, Said, Task, ToMaster
 from robochoc.formats import PREDEFINED
 from robochoc.message import Envelope, encode
 from robochoc.observers.events import Received
@@ -221,10 +221,16 @@ def test_checking_is_by_the_own_file() -> None:
     one.prepare()
     one.search()
     one.take_in([ok(1)])
-    assert one.judged({"A": 1, "C": 1}) == Checked(1, allowed=True, cost=0)
-    assert one.judged({"A": 2, "C": 2}) == Checked(1, allowed=False, cost=0)
-    assert one.judged({"A": 1, "B": 1}) == Checked(1, allowed=True, cost=0)  # its own value it knows itself
-    assert one.judged({"C": 2}) == Checked(1, allowed=True, cost=0)  # RA has stepped aside
+    assert one.judged({"A": 1, "C": 1}) == judgement(price=0)
+    assert one.judged({"A": 2, "C": 2}) == judgement(price=INFINITE)
+    assert one.judged({"A": 1, "B": 1}) == judgement(price=0)  # its own value it knows itself
+    assert one.judged({"C": 2}) == Checked(1, allowed=True, cost=0, held=1)  # RA has stepped aside
+
+
+def judgement(price: float) -> Checked:
+    """Of RB's two constraints the private one holds, and RA can know the other."""
+    allowed = price < INFINITE
+    return Checked(1, allowed, price if allowed else 0, held=2, shared=(Judged("RB", ("A", "B"), 1, price),))
 
 
 def test_checking_adds_up_what_its_constraints_charge() -> None:
@@ -233,8 +239,8 @@ def test_checking_adds_up_what_its_constraints_charge() -> None:
     one.prepare()
     one.search()
     assert one.assignment == {"B": 1}
-    assert one.judged({"A": 1}) == Checked(1, allowed=True, cost=4)
-    assert one.judged({"A": 2}) == Checked(1, allowed=True, cost=0)
+    assert one.judged({"A": 1}) == judgement(price=4)
+    assert one.judged({"A": 2}) == judgement(price=0)
 
 
 def test_who_steps_aside_answers_for_nothing() -> None:

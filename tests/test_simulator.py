@@ -23,9 +23,9 @@ from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 @pytest.mark.parametrize(
     ("n", "model", "messages", "ncccs", "checks"),
     [
-        (4, "planar", {"AddLink": 4, "Nogood": 87, "Ok": 588}, 90, 989),
-        (4, "full", {"Nogood": 107, "Ok": 519}, 78, 857),
-        (7, "planar", {"AddLink": 69, "Nogood": 217, "Ok": 2584}, 304, 8955),
+        (4, "planar", {"AddLink": 4, "Nogood": 80, "Ok": 565}, 75, 879),
+        (4, "full", {"AddLink": 3, "Nogood": 94, "Ok": 496}, 62, 760),
+        (7, "planar", {"AddLink": 74, "Nogood": 174, "Ok": 2364}, 262, 7656),
     ],
 )
 def test_counts_of_queens_are_exact(n: int, model: str, messages: dict[str, int], ncccs: int, checks: int) -> None:

@@ -54,6 +54,51 @@ def all_is_gone(run: Run) -> None:
     assert run.left_behind() == []
 
 
+# The browser
+
+BROWSER = """\
+#!{python}
+import json, os, re, stat, sys
+from pathlib import Path
+from urllib.request import urlopen
+shown = sys.argv[1]
+file = Path(shown.removeprefix("file://"))
+modes = [stat.S_IMODE(path.stat().st_mode) for path in (file, file.parent)]
+url = re.search(r'url=(http://[^"]+)"', file.read_text())[1]
+urlopen(url + "about", timeout=20).close()
+Path({told!r} + ".part").write_text(json.dumps([sys.argv, dict(os.environ), modes, url]))
+Path({told!r} + ".part").rename({told!r})
+"""
+
+
+@pytest.mark.parametrize("command", ["sniff", "solve"])
+def test_no_process_shows_the_secret_address_to_others(
+    command: str, teams: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program, browser = tmp_path / "browser", tmp_path / "what the browser was told"
+    program.write_text(BROWSER.format(python=sys.executable, told=str(browser)))
+    program.chmod(0o700)
+    (tmp_path / "tmp").mkdir()
+    monkeypatch.setenv("BROWSER", str(program))
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "tmp"))
+    (tmp_path / "journal").write_bytes(journal_of(*told()))
+    words = ["sniff", str(tmp_path / "journal")] if command == "sniff" else ["solve", str(teams / "short"), "--sniff"]
+    with running([PROGRAM, *words, "--open"], tmp_path / "run") as run:
+        url = url_of(run)
+        wait_until(browser.exists, "no browser has come")
+        argv, environ, modes, followed = json.loads(browser.read_text())
+        assert followed == url
+        assert modes == [0o600, 0o700]
+        secret = url.split("/")[3]
+        assert secret not in json.dumps([argv, environ])
+        for pid in run.processes():
+            for what in ("cmdline", "environ"):
+                assert secret.encode() not in Path(f"/proc/{pid}/{what}").read_bytes()
+        run.strike(signal.SIGINT)
+        all_is_gone(run)
+    assert [*(tmp_path / "tmp").iterdir()] == []
+
+
 # robochoc sniff
 
 

@@ -46,28 +46,28 @@ REAL = {
         "Robot2.3 says: as long as V1.2 = 1, V1.3 cannot be 2; without that value, 2 of my values are not ruled out"
     ),
     ("abt-do-retro", "Order"): (
-        "Robot3.1 says: the order is now Robot1.1, Robot1.2, Robot2.1, Robot1.3, Robot2.2, Robot2.3, Robot3.2,"
-        " Robot3.1 and Robot3.3"
+        "Robot1.2 says: the order is now Robot1.1, Robot2.1, Robot1.2, Robot1.3, Robot2.2, Robot2.3, Robot3.1,"
+        " Robot3.2 and Robot3.3"
     ),
     ("abt-do-retro", "AddLink"): "Robot3.1 says: tell me V1.2 from now on, whenever you are above me",
     ("agile-abt", "Ok"): (
         "Robot3.3 says: V3.3 = 2 from now on; as long as V1.1 = 1 and V1.3 = 1, I have 1 of 3 values left"
     ),
-    ("agile-abt", "Nogood"): "Robot3.1 says: as long as V2.1 = 3, V2.2 cannot be 1",
+    ("agile-abt", "Nogood"): "Robot3.1 says: as long as V1.1 = 1, V2.1 cannot be 3",
     ("agile-abt", "Order"): (
         "Robot3.3 says: the order is now Robot1.1, Robot1.3, Robot3.3, Robot2.3, Robot2.2, Robot3.1, Robot3.2,"
         " Robot1.2 and Robot2.1"
     ),
-    ("awc", "Ok"): "Robot3.3 says: V3.3 = 3 from now on, with priority 3",
-    ("awc", "Nogood"): "Robot1.1 says: V1.3 = 2 and V2.1 = 3 cannot both stand",
+    ("awc", "Ok"): "Robot3.3 says: V3.3 = 1 from now on, with priority 3",
+    ("awc", "Nogood"): "Robot1.1 says: V1.3 = 2 and V1.2 = 2 cannot both stand",
     ("awc", "AddLink"): "Robot1.1 says: from now on let us tell each other V1.1 and V2.3",
     (
         "disfc",
         "Ok",
-    ): "Robot2.1 says: my assignment number 8 stands from now on; it leaves Robot2.2 0 values of its domain",
+    ): "Robot1.1 says: my assignment number 2 stands from now on; it leaves Robot1.2 0 values of its domain",
     ("disfc", "Nogood"): (
-        "Robot3.3 says: as long as Robot1.1 keeps its assignment number 3,"
-        " Robot2.3 cannot keep its assignment number 15"
+        "Robot3.3 says: as long as Robot2.3 keeps its assignment number 9,"
+        " Robot3.2 cannot keep its assignment number 17"
     ),
     ("disfc", "AddLink"): "Robot3.1 says: tell me of each new assignment of yours from now on",
     ("afc", "CPA"): "Robot1.2 says: so far V1.1 = 3 and V1.2 = 1; it is Robot1.3's turn",
@@ -294,7 +294,7 @@ TWO = Setting(
          "no solution has V = 1 and W = 2: take another value"),
         ("CPAs", {"count": 1, "rows": "", "least": 7, "ceiling": 9},
          "1 partial assignment for Robot1.1 to extend; the best solution so far costs 7"),
-        ("Below", {"domains": [], "charges": [], "most": 0}, "nobody is below me"),
+        ("Below", {"domains": [], "charges": [], "runs": [], "most": 0}, "nobody is below me"),
         ("UTIL", {"width": 1, "costs": bytes([3, 255, 9])},
          "a piece of my table: 3 costs, from 3 to 9, and 1 infinite"),
         ("UTIL", {"width": 2, "costs": "//8="}, "a piece of my table: 1 cost, and 1 infinite"),

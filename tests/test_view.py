@@ -300,22 +300,24 @@ print("left")
 
 
 @contextmanager
-def live_viewer() -> Iterator[tuple[subprocess.Popen[str], int]]:
+def live_viewer() -> Iterator[tuple[subprocess.Popen[str], int, str]]:
+    """Its process, its port, and the path that nobody guesses."""
     with subprocess.Popen([sys.executable, "-W", "error", "-c", LIVE], stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout
             url = process.stdout.readline()
-            assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\n", url)
-            yield process, int(url.rsplit(":", 1)[1].strip("/\n"))
+            parts = re.fullmatch(r"http://127\.0\.0\.1:(\d+)(/[\w-]{24}/)\n", url)
+            assert parts, url
+            yield process, int(parts[1]), parts[2]
         finally:
             process.kill()
 
 
-def first_message(port: int, host: str, origin: str) -> tuple[int, bytes]:
+def first_message(port: int, path: str, host: str, origin: str) -> tuple[int, bytes]:
     """The status of a WebSocket handshake and, if it was accepted, the first message."""
     with socket.create_connection(("127.0.0.1", port), timeout=10) as connection, connection.makefile("rwb") as stream:
         stream.write(
-            f"GET /commands HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{origin}\r\nUpgrade: websocket\r\n"
+            f"GET {path}commands HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{origin}\r\nUpgrade: websocket\r\n"
             "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
             "Sec-WebSocket-Version: 13\r\n\r\n".encode()
         )
@@ -332,31 +334,44 @@ def first_message(port: int, host: str, origin: str) -> tuple[int, bytes]:
 
 
 def test_the_live_viewer_serves_page_and_commands() -> None:
-    with live_viewer() as (_, port):
-        with urlopen(f"http://127.0.0.1:{port}/", timeout=10) as answer:
+    with live_viewer() as (_, port, path):
+        with urlopen(f"http://127.0.0.1:{port}{path}", timeout=10) as answer:
             assert b"live team" in answer.read()
-        status, message = first_message(port, f"localhost:{port}", f"localhost:{port}")
+        status, message = first_message(port, path, f"localhost:{port}", f"localhost:{port}")
         assert status == 101
         assert umsgpack.unpackb(message)["type"] == "set_transform"
 
 
 def test_the_live_viewer_answers_this_machine_only() -> None:
-    with live_viewer() as (_, port):
+    with live_viewer() as (_, port, path):
         for host in ("evil.example", f"127.0.0.1.evil.example:{port}", "localhost.evil.example"):
             with pytest.raises(HTTPError, match="404") as refused:
-                urlopen(Request(f"http://127.0.0.1:{port}/", headers={"Host": host}), timeout=10)
+                urlopen(Request(f"http://127.0.0.1:{port}{path}", headers={"Host": host}), timeout=10)
             refused.value.close()
-            assert first_message(port, host, host)[0] == 404
-        assert first_message(port, f"127.0.0.1:{port}", "evil.example")[0] == 403
+            assert first_message(port, path, host, host)[0] == 404
+        assert first_message(port, path, f"127.0.0.1:{port}", "evil.example")[0] == 403
+
+
+def test_the_live_viewer_answers_those_only_who_know_its_path() -> None:
+    with live_viewer() as (_, port, path):
+        here = f"127.0.0.1:{port}"
+        for guess in ("/", "//", f"/{'x' * 24}/", path[:-2] + "/", path.upper()):
+            with pytest.raises(HTTPError, match="404") as refused:
+                urlopen(f"http://{here}{guess}", timeout=10)
+            refused.value.close()
+            assert first_message(port, guess, here, here)[0] == 404
+        with pytest.raises(HTTPError, match="403") as refused:
+            urlopen(Request(f"http://{here}{path}", headers={"Origin": "http://evil.example"}), timeout=10)
+        refused.value.close()
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="needs Linux's /proc")
 def test_the_live_viewer_listens_on_loopback_only_and_leaves_nothing() -> None:
-    with live_viewer() as (process, port):
+    with live_viewer() as (process, port, path):
         assert listening(process.pid) == {f"0100007F:{port:04X}"}
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
         assert children.read_text() == ""
-        first_message(port, f"127.0.0.1:{port}", f"127.0.0.1:{port}")
+        first_message(port, path, f"127.0.0.1:{port}", f"127.0.0.1:{port}")
         process.send_signal(signal.SIGINT)
         assert process.wait(10) == 0
         assert process.stdout

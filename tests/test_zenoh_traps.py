@@ -20,10 +20,11 @@ from robochoc.communication.control import Failed
 from robochoc.communication.network import post
 from robochoc.communication.network.access import ALL, access_control
 from robochoc.communication.network.conditions import LEASE_MS
+from robochoc.communication.network.inbox import Arrived, Item
 from robochoc.communication.network.letters import LARGEST_LETTER, MASTER, Letters, TooLarge
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.members import Members, NotTaken
-from robochoc.communication.network.post import Arrived, Item, Post
+from robochoc.communication.network.post import Post
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.router import Router
 from robochoc.communication.network.zenoh_config import RX_BYTES, config

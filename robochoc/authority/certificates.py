@@ -142,7 +142,7 @@ def read_request(content: bytes) -> tuple[str, ec.EllipticCurvePublicKey]:
         request = x509.load_pem_x509_csr(content)
         holder, genuine = request.public_key(), request.is_signature_valid
         name = common_name(request.subject)
-    except (ValueError, TypeError, UnsupportedAlgorithm) as error:
+    except (ValueError, TypeError, UnsupportedAlgorithm, x509.InvalidVersion) as error:
         raise BadCertificate("the request for a certificate is malformed") from error
     if not genuine:
         raise BadCertificate("the request for a certificate is not signed by the key that it names")
@@ -153,7 +153,7 @@ def read_certificate(content: bytes) -> x509.Certificate:
     """The one certificate in `content`. Raises `BadCertificate`."""
     try:
         found = x509.load_pem_x509_certificates(content)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, x509.InvalidVersion) as error:
         raise BadCertificate("that is no certificate") from error
     if len(found) != 1:
         raise BadCertificate(f"expected one certificate, found {len(found)}")

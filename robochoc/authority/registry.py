@@ -134,7 +134,7 @@ class Registry:
             return {}
         except OSError as error:
             raise BadAuthority(f"{path} cannot be read: {error.strerror}") from error
-        except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
             raise BadAuthority(f"{path} is no registry of this version: {error}") from error
         return known[1]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from robochoc.cli.failure import invalid_input_fails
-from robochoc.cli.paths import InputPath, OutputFile
+from robochoc.cli.paths import InputPath, OutputFile, refuse_same_places
 from robochoc.cli.saved import saved_outcome, team_of, team_option
 
 
@@ -28,6 +28,7 @@ def animate(saved: Path, output: Path | None, folder: Path | None, port: int, *,
         raise click.UsageError("say where the page goes (-o FILE), or show it live (--serve)")
     if port and not serve:
         raise click.UsageError("--port is for --serve")
+    refuse_same_places({"-o": output}, {"the result": saved}, teams=[folder] if folder else [])
     outcome = saved_outcome(saved)
     team = team_of(outcome, saved, folder)
     with stages(outcome.team) as progress:

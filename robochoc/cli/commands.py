@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from pkgutil import resolve_name
 
@@ -108,6 +109,9 @@ def run() -> int:
             return UNREAD
         raise
     except OSError as error:
-        click.echo(f"robochoc: {error}", err=True)
+        from robochoc.plain_text import on_one_line
+
+        told = f"{os.fsdecode(error.filename)}: {error.strerror}" if isinstance(error.filename, str | bytes) else error
+        click.echo(on_one_line(f"robochoc: {told}"), err=True)
         return 1
     return status if isinstance(status, int) else 0

@@ -10,7 +10,7 @@ import click
 
 from robochoc.cli.failure import LIMIT, Failure, failures_told, worst
 from robochoc.cli.local import limits, local_options
-from robochoc.cli.paths import InputPath
+from robochoc.cli.paths import InputPath, teams_at
 
 if TYPE_CHECKING:
     from robochoc.solver.cache import SolutionCache
@@ -44,24 +44,14 @@ def compile_team(
     local      solutions of these
     groups     of local solutions that look alike from outside
     cost       of the cheapest local solution of a group, from the cheapest group to the dearest (DisWCSP)
-    how        direct: by propagation; enumerated: without ACE; ACE: by it; cached: by it, before; equal: for a robot above
+    how        direct: nothing to search; enumerated: a small problem, without ACE; ACE: solved by it now;
+               cached: by it, before; equal: for a robot above
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.formats import find_teams
     from robochoc.solver.cache import SolutionCache
 
     bounds = limits(local_solutions, local_timeout, always_ace=always_ace)
     cache = None if no_cache else SolutionCache()
-    statuses = []
-    for path in paths:
-        try:
-            with failures_told(path):
-                folders = find_teams(path)
-        except Failure as failure:
-            failure.show()
-            statuses.append(failure.exit_code)
-            continue
-        statuses += [_status(folder, bounds, cache, as_json=as_json) for folder in folders]
-    context.exit(worst(statuses))
+    context.exit(worst([_status(folder, bounds, cache, as_json=as_json) for folder in teams_at(paths)]))
 
 
 def _status(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_json: bool) -> int:

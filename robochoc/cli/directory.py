@@ -9,6 +9,7 @@ import click
 
 from robochoc.cli.network import PlaceType, network_failures_told
 from robochoc.cli.paths import InputPath
+from robochoc.cli.tokens import token_options
 
 if TYPE_CHECKING:
     from robochoc.machines.place import Place
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 @click.option(
     "--as", "name", required=True, metavar="NAME", help="Who asks: an enrolled name (--role observer will do)."
 )
-@click.option("--token", envvar="ROBOCHOC_TOKEN", metavar="TOKEN", help="Enrol with this token first.")
+@token_options()
 @click.option(
     "--identity",
     type=InputPath(),
@@ -89,25 +90,31 @@ def _tell(answer: str, *, sl: bool, as_json: bool) -> None:
     import msgspec
 
     from robochoc.machines.consult import about, found
+    from robochoc.plain_text import on_one_line
 
     if sl:
-        click.echo(answer)
+        click.echo(on_one_line(answer, len(answer)))
         return
     agents = found(answer)
     for agent in agents:
         kinds = ", ".join(f"{one.type} {one.name}" for one in agent.services)
-        click.echo(msgspec.json.encode(agent).decode() if as_json else f"{agent.name}: {kinds}")
+        click.echo(msgspec.json.encode(agent).decode() if as_json else on_one_line(f"{agent.name}: {kinds}"))
     gone = "" if agents else about(answer)
     if gone:
-        click.echo(msgspec.json.encode({"name": gone, "gone": True}).decode() if as_json else f"{gone} has gone")
+        told = msgspec.json.encode({"name": gone, "gone": True}).decode()
+        click.echo(told if as_json else on_one_line(f"{gone} has gone"))
 
 
 def _print_table(agents: tuple[AgentDescription, ...]) -> None:
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
+
+    from robochoc.plain_text import on_one_line
 
     table = Table("agent", "protocols", "variables", "topics")
     for agent in agents:
         kinds = {kind: [one.name for one in agent.services if one.type == kind] for kind in ("variable", "topic")}
-        table.add_row(agent.name, ", ".join(agent.protocols), ", ".join(kinds["variable"]), ", ".join(kinds["topic"]))
+        cells = (agent.name, *map(", ".join, (agent.protocols, kinds["variable"], kinds["topic"])))
+        table.add_row(*(escape(on_one_line(cell)) for cell in cells))
     Console().print(table if agents else "nobody that matches")

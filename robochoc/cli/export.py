@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from robochoc.cli.failure import failures_told
-from robochoc.cli.paths import InputPath, OutputFile
+from robochoc.cli.paths import InputPath, OutputFile, refuse_same_places
 
 
 @click.command()
@@ -24,6 +24,7 @@ def export(folder: Path, kind: str, output: Path | None) -> None:  # noqa: ARG00
     from robochoc.formats import read_team
     from robochoc.formats.xcsp3 import xcsp3
 
+    refuse_same_places({"-o": output}, teams=[folder])
     with failures_told(folder):
         team = read_team(folder)
         document = xcsp3(team)

@@ -25,8 +25,10 @@ class Failure(click.ClickException):
         self.exit_code = status  # type: ignore[misc]  # click reads it off instances
 
     def show(self, file: IO[Any] | None = None) -> None:  # noqa: ARG002 - click's signature
-        """Say it on stderr."""
-        click.echo(self.message, err=True)
+        """Say it on stderr, line by line; there may be words of others in it."""
+        from robochoc.plain_text import on_one_line
+
+        click.echo("\n".join(map(on_one_line, self.message.split("\n"))), err=True)
 
 
 def invalid_input_fails(command: Callable[P, R]) -> Callable[P, R]:

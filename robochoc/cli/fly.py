@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.failure import INVALID, LOST, Failure, invalid_input_fails
-from robochoc.cli.paths import InputPath, OutputFile
+from robochoc.cli.paths import InputPath, OutputFile, refuse_same_places
 from robochoc.cli.ros import (
     FRAME,
     conditions_of,
     flight_options,
     open_sinks,
-    refuse_same_places,
     ros_failures_told,
     ros_options,
 )
@@ -45,11 +44,11 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
     """
     from robochoc.cli.fly_report import as_planned, flight_json, report, too_late
 
+    refuse_same_places({"--html": html}, {"the result": saved}, teams=[folder] if folder else [], sinks=given["sinks"])
     outcome = saved_outcome(saved)
     team = team_of(outcome, saved, folder)
     if given["sinks"] and team is None:
         raise click.UsageError("--ros publishes on the topics that robots' files name: give their folder with --team")
-    refuse_same_places(given["sinks"], {"--html": html, "the result": saved})
     from robochoc.ros.mission import mission_of
 
     mission = mission_of(outcome, team, given["scale"])

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from robochoc.cli.failure import INVALID, USAGE, Failure
-from robochoc.cli.paths import InputPath, OutputFile
+from robochoc.cli.paths import InputPath, OutputFile, refuse_same_places
 from robochoc.cli.saved import saved_journal
 
 if TYPE_CHECKING:
@@ -75,6 +75,7 @@ def export(
     from robochoc.view.sniffer.selection import NothingMeant, Selection
 
     meant = Selection(patterns_in(robots), patterns_in(types), first, last, conversation)
+    refuse_same_places({"-o": output}, {"the journal": file})
     read = saved_journal(file)
     trace = _trace(read, file)
     try:

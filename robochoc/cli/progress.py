@@ -35,6 +35,8 @@ def progress_line(team: str) -> Iterator[Callable[[Progress], None] | None]:
     from rich.live import Live
     from rich.text import Text
 
+    from robochoc.plain_text import on_one_line
+
     last = 0.0
     with Live(console=Console(stderr=True), auto_refresh=False, transient=True) as live:
 
@@ -45,7 +47,7 @@ def progress_line(team: str) -> Iterator[Callable[[Progress], None] | None]:
             last = time.monotonic()
             stage = progress.stage or f"{progress.messages:,} messages"
             line = f"{team}: {stage}, {progress.elapsed_s:.1f} s"
-            live.update(Text(line, style="dim"), refresh=True)
+            live.update(Text(on_one_line(line), style="dim"), refresh=True)
 
         yield show
 

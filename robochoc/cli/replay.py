@@ -51,7 +51,9 @@ def replay(
     """Drive the same protocol objects through the packets in JOURNAL, and compare all that they say and do.
 
     The exit status is 0 if that is the same as was recorded, and 4 if not: then the protocol is another one than it
-    was, or the journal is. The first difference is shown. A journal that ends early is played as far as it goes.
+    was, or the journal is. The first difference is shown. So is what its header and its outcome claim, where that does
+    not follow from its steps. A journal that ends early is played as far as it goes. One that was altered is played up
+    to there, and is invalid (1), as is one that holds nothing to be compared.
     """
     from robochoc.formats import read_team
     from robochoc.replay import Means
@@ -74,7 +76,14 @@ def replay(
         from robochoc.cli.replay_report import report
 
         click.echo(report(recorded, replayed))
-    return 0 if replayed.identical else LOST
+    if replayed.differs:
+        return LOST
+    return 0 if replayed.identical and not _altered(recorded) else INVALID
+
+
+def _altered(journal: Journal) -> bool:
+    """Whether a part of it is not as it was written."""
+    return journal.damage is not None and not journal.truncated
 
 
 def _replayed(path: Path, journal: Journal, means: Means) -> Replayed:
@@ -87,5 +96,6 @@ def _replayed(path: Path, journal: Journal, means: Means) -> Replayed:
         with progress_line(on_one_line(journal.header.team)) as progress:
             return play(journal, means, progress=progress)
     except CannotReplay as why:
-        status = INVALID if why.broken else USAGE
-        raise Failure(status, on_one_line(f"{path}: it cannot be played again: {why}")) from why
+        status = INVALID if why.broken or _altered(journal) else USAGE
+        damage = f"it was altered: {journal.damage}; " if _altered(journal) else ""
+        raise Failure(status, on_one_line(f"{path}: {damage}it cannot be played again: {why}")) from why

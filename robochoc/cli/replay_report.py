@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import msgspec
 
@@ -17,7 +17,7 @@ from robochoc.observers.events import (
     Settled,
 )
 from robochoc.observers.journal import Journal
-from robochoc.replay import Difference, Replayed
+from robochoc.replay import Contradiction, Difference, Replayed
 
 LONGEST = 400
 """Characters of one message's content."""
@@ -32,11 +32,17 @@ def report(journal: Journal, replayed: Replayed) -> str:
     for what, count in _counts(replayed).items():
         lines.append(f"  {what:9} {count:>12,}")
     lines += _shortfalls(replayed)
-    if replayed.difference is None:
+    if replayed.difference is not None:
+        lines += _shown(replayed.difference)
+    elif replayed.contradictions:
+        lines += _contradicted(replayed.contradictions)
+    elif not replayed.steps:
+        lines.append("  nothing was compared: it holds no step of any robot that could be played")
+    elif replayed.damage and not replayed.truncated:
+        lines.append("  what stands before the damage is the same; this is not the journal that was written")
+    else:
         whole = replayed.ended and not (replayed.stopped or replayed.unfinished or replayed.damage)
         lines.append("  the same" if whole else "  the same, as far as it goes")
-    else:
-        lines += _shown(replayed.difference)
     return "\n".join(on_one_line(line) for line in lines)
 
 
@@ -53,8 +59,10 @@ def result_json(journal: Journal, replayed: Replayed) -> str:
         "unfinished": replayed.unfinished,
         "stopped": replayed.stopped,
         "damage": replayed.damage,
+        "truncated": replayed.truncated,
         "ended": replayed.ended,
         "difference": replayed.difference,
+        "contradictions": replayed.contradictions,
     }
     return msgspec.json.format(msgspec.json.encode(told), indent=2).decode()
 
@@ -71,7 +79,7 @@ def _counts(replayed: Replayed) -> dict[str, int]:
 def _shortfalls(replayed: Replayed) -> Iterator[str]:
     """What could not be played, and why."""
     if replayed.damage:
-        yield f"  the journal ends early: {replayed.damage}"
+        yield f"  the journal {'ends early' if replayed.truncated else 'was altered'}: {replayed.damage}"
     elif not replayed.ended:
         yield "  the journal does not say how the run ended"
     if replayed.unfinished:
@@ -99,6 +107,15 @@ def _shown(difference: Difference) -> Iterator[str]:
         yield f"    differs   in {', '.join(names)}"
     if difference.raised:
         yield f"    then it raised {difference.raised}"
+
+
+def _contradicted(found: Sequence[Contradiction]) -> Iterator[str]:
+    """What the journal claims that its steps do not bear out."""
+    yield "  different, though all steps are the same:"
+    for one in found:
+        yield f"    {one.what}"
+        yield f"      recorded  {_cut(msgspec.json.encode(one.recorded).decode())}"
+        yield f"      replayed  {_cut(msgspec.json.encode(one.replayed).decode())}"
 
 
 def _differing(recorded: AnyEvent | None, replayed: AnyEvent | None) -> list[str]:

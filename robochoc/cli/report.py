@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from robochoc.change import changed_by
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
-from robochoc.outcome import RULED_OUT, Metrics, Outcome, Verdict
+from robochoc.outcome import ALL_ROBOTS, Metrics, Outcome, Verdict
 from robochoc.problem import Kind, Team, natural
 
 WIDTH = 100
@@ -31,7 +31,7 @@ def report(team: Team, outcome: Outcome) -> str:
         lines += [f"  {len(lost)} {'was' if len(lost) == 1 else 'were'} lost:", *_wrapped(lost)]
     order = f", order {outcome.order}" if outcome.order else ""
     lines.append(f"  {outcome.protocols}{order}, {_place(team, outcome)}: {_metrics(outcome)}{_simulated(outcome)}")
-    return "\n".join(lines)
+    return "\n".join(map(on_one_line, lines))
 
 
 def _epochs(outcome: Outcome) -> list[str]:
@@ -68,7 +68,7 @@ def _place(team: Team, outcome: Outcome) -> str:
 
 
 def _verdict(team: Team, outcome: Outcome) -> str:
-    why = outcome.witness and f"{outcome.witness} {RULED_OUT}"
+    why = outcome.ruled_out
     if outcome.reason and not outcome.epochs:
         why = outcome.reason
     confirmed = ", confirmed centrally" * outcome.confirmed
@@ -82,7 +82,7 @@ def _verdict(team: Team, outcome: Outcome) -> str:
         case _ if outcome.count is not None:
             return f"{outcome.count:,} solution{'s' * (outcome.count != 1)}"
         case Verdict.SOLUTION | Verdict.OPTIMAL if not outcome.aside:
-            return f"{_proven(team, outcome)}{left}, {_checked(outcome)}{confirmed}"
+            return f"{_proven(team, outcome)}{left}, {_checked(outcome)}{confirmed}{_trusted(outcome)}"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             who = "some step" if outcome.assignment else "all step"
             if outcome.verdict is Verdict.OPTIMAL:
@@ -90,12 +90,25 @@ def _verdict(team: Team, outcome: Outcome) -> str:
                 who = f"as few as possible{by_weight} (proven) step"
             whole = left or " for the whole team"
             because = f" ({why})" if why else ""
-            return f"no solution{whole}{because}; {who} aside, {_checked(outcome)}{confirmed}"
+            return f"no solution{whole}{because}; {who} aside, {_checked(outcome)}{confirmed}{_trusted(outcome)}"
 
 
 def _checked(outcome: Outcome) -> str:
-    """Whether somebody has held the answer against the constraints."""
-    return "checked against every constraint" if outcome.verified else f"not checked: {outcome.reason}"
+    """Who has held the answer against the constraints: across machines it may be their owners alone."""
+    if not outcome.verified:
+        return f"not checked: {outcome.reason}"
+    if outcome.checked is None or not outcome.checked.by_owner:
+        return "checked against every constraint"
+    alone, total = outcome.checked.by_owner, sum(outcome.checked)
+    return f"checked; on their owner's word alone: {alone:,} of {total:,} constraint{'s' * (total != 1)}"
+
+
+def _trusted(outcome: Outcome) -> str:
+    """What rests on the word of all robots, as nobody could check it."""
+    if outcome.claimed_by != ALL_ROBOTS or not outcome.verified or outcome.confirmed:
+        return ""
+    what = "that no fewer could step aside" if outcome.aside else "that nothing costs less"
+    return f"; {what} rests on all robots' word"
 
 
 def _proven(team: Team, outcome: Outcome) -> str:
@@ -128,7 +141,8 @@ def _so_far(team: Team, outcome: Outcome) -> str:
     if team.kind is Kind.DISCSP:
         return ""
     known = [f"the best so far costs {_number(outcome.cost)}"] if outcome.assignment else []
-    known += [f"nothing costs less than {_number(bound)}"] if bound else []
+    word = ", by all robots' word" if outcome.claimed_by else ""
+    known += [f"nothing costs less than {_number(bound)}{word}"] if bound else []
     return "; " + ", and ".join(known) if known else ""
 
 

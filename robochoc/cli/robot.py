@@ -14,6 +14,7 @@ from robochoc.cli.network import PlaceType, network_failures_told
 from robochoc.cli.paths import InputPath
 from robochoc.cli.progress import progress_line
 from robochoc.cli.ros import outlets, ros_options
+from robochoc.cli.tokens import token_options
 
 if TYPE_CHECKING:
     from robochoc.machines.place import Place
@@ -24,12 +25,7 @@ if TYPE_CHECKING:
 @click.option(
     "--master", "place", type=PlaceType(), required=True, metavar="HOST:PORT", help="Where the master listens."
 )
-@click.option(
-    "--token",
-    envvar="ROBOCHOC_TOKEN",
-    metavar="TOKEN",
-    help="Enrol with this token first (robochoc authority enrol has printed it); or put it into ROBOCHOC_TOKEN.",
-)
+@token_options()
 @click.option(
     "--identity",
     type=InputPath(),
@@ -70,10 +66,11 @@ def robot(
     afterwards it proves with that who it is, and renews it by itself.
     """
     with network_failures_told(file):
-        from robochoc.communication.network.robot import Manner
+        from robochoc.communication.network.manner import Manner
         from robochoc.communication.run_result import Progress
         from robochoc.formats import read_robot
         from robochoc.machines.join import identity_of, join
+        from robochoc.plain_text import on_one_line
         from robochoc.solver.cache import SolutionCache
         from robochoc.solver.compile import Compiler
 
@@ -103,7 +100,7 @@ def robot(
             click.echo(msgspec.json.encode(result).decode())
         else:
             decision = ", ".join(f"{name} = {value}" for name, value in ending.assignment.items())
-            click.echo(f"{file.stem}: {ending.why}; {decision or 'no value'}")
+            click.echo(on_one_line(f"{file.stem}: {ending.why}; {decision or 'no value'}"))
             for line in told:
                 click.echo(line, err=True)
     context.exit(LIMIT if ending.why.startswith("unknown") else 0)

@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from robochoc.cli.failure import INVALID, USAGE, Failure
+from robochoc.cli.paths import refuse_same_places
 
 if TYPE_CHECKING:
     from robochoc.problem import Assignment, Robot, Team
@@ -165,7 +165,11 @@ situation_options = _optional(
         "--patience",
         type=Finite(0, min_open=True),
         metavar="SECONDS",
-        help="So long robots have to report something after each decision; then the run is over.  [default: 10]",
+        help=(
+            "A robot whose process is stopped (SIGSTOP), or on a network out of reach, for so long is lost (see"
+            " --on-loss).  [default: it is waited for; on a network 10]  With --situation: so long robots have to"
+            " report something after each decision; then the run is over.  [default: 10]"
+        ),
     ),
     click.option(
         "--battery",
@@ -186,7 +190,7 @@ situation_options = _optional(
 
 _FLOWN = {"failures": "--fail", "distance": "--distance", "wind": "--wind", "gusts": "--gusts"}
 _FLOWN_HERE = {**_FLOWN, "obstacles": "--obstacle"}
-_HEARD = {"patience": "--patience", "battery": "--battery"}
+_HEARD = {"battery": "--battery"}
 _PLACED = {"frame": "--frame", "scale": "--scale"}
 _NOT_PUBLISHED = "is for what is published: add --ros SINK"
 
@@ -211,38 +215,25 @@ def ros_asked(settings: dict[str, Any]) -> Ros:
     """Take the options of this file out of `settings`. What would be ignored is wrong usage."""
     sinks, situation = settings.pop("sinks"), settings.pop("situation")
     given = {name: settings.pop(name) for name in (*_FLOWN_HERE, *_HEARD, *_PLACED)}
+    patience = settings["patience"]
     asked = {name for name, value in given.items() if value not in (None, ())}
     if situation != FLIGHT:
         _refuse(_FLOWN_HERE, asked, "is for the simulated flight: add --situation flight")
     if situation in {None, FLIGHT}:
         _refuse(_HEARD, asked, "is for robots that are listened to: add --situation mcap:FILE, or another source")
+        if patience is not None and (settings["runtime"] == "simulator" or settings["protocol"] == "central"):
+            raise click.UsageError("--patience is for robots with processes, and for those that are listened to")
     if not (sinks or situation):
         _refuse(_PLACED, asked, _NOT_PUBLISHED)
     surroundings = {name: given[name] for name in _FLOWN_HERE if name in asked}
     frame = given["frame"] or FRAME
-    return Ros(sinks, situation, frame, given["scale"], given["patience"], given["battery"], surroundings)
+    return Ros(sinks, situation, frame, given["scale"], patience, given["battery"], surroundings)
 
 
 def _refuse(options: Mapping[str, str], asked: set[str], why: str) -> None:
     for name, option in options.items():
         if name in asked:
             raise click.UsageError(f"{option} {why}")
-
-
-def refuse_same_places(sinks: Sequence[str], files: Mapping[str, Path | None], situation: str | None = None) -> None:
-    """What is published goes to places of its own: not to the command's other `files`, nor where `situation` is."""
-    if not sinks:
-        return
-    from robochoc.ros.sinks import place_of
-
-    taken: dict[Path | str, str] = {path.resolve(): f"{what} {path}" for what, path in files.items() if path}
-    if isinstance(heard := place_of(situation or ""), Path):
-        taken[heard] = f"--situation {situation}"
-    for text in sinks:
-        other = taken.setdefault(place_of(text), option := f"--ros {text}")
-        if other is not option:
-            told = f"{option} is given twice" if other == option else f"{other} and {option} are one place"
-            raise click.UsageError(told)
 
 
 def check_ros(ros: Ros, settings: Mapping[str, Any]) -> None:
@@ -380,7 +371,7 @@ def outlets(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assi
     from robochoc.ros.alone import crew_alone, leg_alone
     from robochoc.ros.outlet import Outlet
 
-    refuse_same_places(texts, {})
+    refuse_same_places({}, sinks=texts)
     with ros_failures_told(), ExitStack() as stack:
         opened = open_sinks(texts, stack)
         found = [Outlet(robot.name, crew_alone(robot), sink, frame or FRAME) for sink in opened]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-import webbrowser
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ import click
 from robochoc.cli.failure import INVALID, LOST, USAGE, Failure
 from robochoc.cli.network import PlaceType, network_failures_told
 from robochoc.cli.paths import InputPath, OutputFile
+from robochoc.cli.tokens import token_options
 
 if TYPE_CHECKING:
     from robochoc.authority.identity import Identity
@@ -40,9 +40,7 @@ _OPTIONS = (
         metavar="NAME",
         help=f"With --master: who sniffs, a name enrolled with --may sniff.  [default: {NAME}]",
     ),
-    click.option(
-        "--token", envvar="ROBOCHOC_TOKEN", metavar="TOKEN", help="With --master: enrol with this token first."
-    ),
+    token_options("With --master: enrol"),
     click.option(
         "--identity",
         type=InputPath(),
@@ -178,15 +176,13 @@ class _Showing:
 
         self._sinks.append(write)
         try:
-            viewer = Viewer(journal.fileno(), self._page.chosen, self._page.port)
+            asked = self._page
+            viewer = Viewer(journal.fileno(), asked.chosen, asked.port, open_browser=asked.open_browser)
         except OSError as error:
             why = f"port {self._page.port}: {error.strerror} (choose another, or none)"
             raise Failure(USAGE, why) from error
         self._viewer = self._stack.enter_context(viewer)
         click.echo(f"{viewer.url} shows the run at {self._place} on this machine; Ctrl-C ends it", err=True)
-        if self._page.open_browser:
-            with suppress(webbrowser.Error):
-                webbrowser.open(viewer.url)
 
     def write(self, blocks: bytes) -> None:
         """Take in whole blocks. Raises `_NotKept`."""

@@ -11,17 +11,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.channel import ChannelName, channel_for
-from robochoc.cli.failure import INVALID, LIMIT, Failure, failures_told, worst
+from robochoc.cli.failure import LIMIT, Failure, failures_told, worst
 from robochoc.cli.local import limits, local_options
 from robochoc.cli.looped import flight_told, told_of
 from robochoc.cli.order import GIVEN, OrderName, order_for
-from robochoc.cli.paths import InputPath, OutputFile
+from robochoc.cli.paths import InputPath, OutputFile, refuse_same_places, teams_at
 from robochoc.cli.recording import recording, shown_and_flushed
 from robochoc.cli.ros import (
     check_ros,
     flight_options,
     looped,
-    refuse_same_places,
     ros_asked,
     ros_options,
     situation_options,
@@ -34,7 +33,7 @@ from robochoc.cli.solve_settings import (
     check_settings,
     protocol_settings,
 )
-from robochoc.cli.watching import Watch, watching
+from robochoc.cli.watching import Watch, check_chosen, watching
 from robochoc.defaults import MINIMISES, SATISFIES, suits
 
 if TYPE_CHECKING:
@@ -219,13 +218,14 @@ def solve(
     ros = ros_asked(settings)
     check_settings(settings)
     check_ros(ros, settings)
-    refuse_same_places(ros.sinks, {"--html": html, "--journal": journal}, ros.situation)
     if explain and as_json:
         raise click.UsageError("--explain is for people; the JSON result has the tree without it")
     withdraw = settings.pop("withdraw")
     protocol = settings.pop("protocol")
     on_loss = settings.pop("on_loss") or ("withdraw" if settings["spares"] else "fail")
     order = settings.pop("order")
+    named = {"--order": order, "--channel": settings["channel"]}
+    given = {option: value for option, value in named.items() if isinstance(value, Path)}
     watched = watching(settings.pop("sniff"), open_browser=settings.pop("open_browser"))
     with failures_told("--channel"):
         channel = channel_for(settings.pop("channel"))
@@ -242,10 +242,11 @@ def solve(
         channel=channel,
         **settings,
     )
-    folders, statuses = _teams(paths)
+    folders = teams_at(paths)
+    refuse_same_places(
+        {"--html": html, "--journal": journal}, given, teams=folders, sinks=ros.sinks, situation=ros.situation
+    )
     products = Products(html, journal, serve, watched)
-    if html and html == journal:
-        raise click.UsageError(f"--html and --journal are two files; both are {html}")
     if settings["count"] and products:
         raise click.UsageError("--count gives a number: there is nothing for --html, --journal, --serve or --sniff")
     if serve and products.watching:
@@ -255,24 +256,7 @@ def solve(
     if products and len(folders) > 1:
         raise click.UsageError(f"--html, --journal, --serve and --sniff are for one team; {len(folders)} were found")
     wanted = Wanted(protocol, order, as_json=as_json, explain=explain, ros=ros)
-    for folder in folders:
-        statuses.append(_solve_one(folder, options, products, wanted))
-    context.exit(worst(statuses))
-
-
-def _teams(paths: tuple[Path, ...]) -> tuple[list[Path], list[int]]:
-    """The teams' folders, and the exit statuses of paths where there is none."""
-    from robochoc.formats import InvalidInput, find_teams
-
-    folders: dict[Path, None] = {}
-    statuses = []
-    for path in paths:
-        try:
-            folders.update(dict.fromkeys(find_teams(path)))
-        except InvalidInput as invalid:
-            click.echo(str(invalid), err=True)
-            statuses.append(INVALID)
-    return list(folders), statuses
+    context.exit(worst([_solve_one(folder, options, products, wanted) for folder in folders]))
 
 
 def _solve_one(folder: Path, options: Options, products: Products, wanted: Wanted) -> int:
@@ -290,6 +274,7 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     try:
         with failures_told(folder):
             team = read_team(folder)
+            check_chosen(products.watching, team)
             protocol = wanted.protocol or suits(team.kind)
             options = replace(options, protocol=protocol, order=order_for(team, wanted.order))
             header = partial(_header, team, options)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,12 +26,25 @@ class SolveCommand(click.Command):
         for place, word in enumerate(args[:plain]):
             following = args[place + 1] if place + 1 < len(args) else ""
             if word == "--withdraw" and following not in WITHDRAWALS:
+                _check_path(following, "kind of withdrawal", WITHDRAWALS)
                 args = [*args[:place], f"--withdraw={WITHDRAWALS[0]}", *args[place + 1 :]]
             elif word == "--sniff" and not _names_robots(following):
                 args = [*args[:place], "--sniff=", *args[place + 1 :]]
             elif word == "--spare" and not following.isdecimal():
+                _check_path(following, "number of robots", ())
                 args = [*args[:place], "--spare=1", *args[place + 1 :]]
         return super().parse_args(ctx, args)
+
+
+def _check_path(word: str, kind: str, values: Sequence[str]) -> None:
+    """Raise `click.UsageError` unless `word`, behind an option that may stand alone, is an option or a path.
+
+    Else it is one of the option's `values`, misspelt, and the path that it would be taken for is not there.
+    """
+    if not word or word.startswith("-") or os.path.lexists(word):
+        return
+    hint = f": {' or '.join(values)}" if values else ""
+    raise click.UsageError(f"{word!r} is no {kind} and no folder{hint}")
 
 
 def _names_robots(word: str) -> bool:

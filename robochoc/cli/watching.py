@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, BinaryIO, Self
 import click
 
 if TYPE_CHECKING:
+    from robochoc.problem import Team
     from robochoc.view.sniffer.viewer import Viewer
 
 _BROWSER_S = 8.0
@@ -33,6 +34,20 @@ def watching(chosen: str | None, *, open_browser: bool) -> Watching | None:
     from robochoc.view.sniffer.patterns import patterns_in
 
     return Watching(patterns_in(chosen), open_browser)
+
+
+def check_chosen(watching: Watching | None, team: Team) -> None:
+    """Raise `click.UsageError` where a pattern of --sniff fits no robot of `team`, nor any that is to come."""
+    if watching is None or not watching.chosen:
+        return
+    from robochoc.formats.diagnostics import on_one_line, suggestion
+    from robochoc.ros.mission import everybody
+    from robochoc.view.sniffer.patterns import unmatched
+
+    names = [robot.name for robot in everybody(team)]
+    for pattern in unmatched(names, watching.chosen):
+        hint = suggestion(pattern, names, "robots")
+        raise click.UsageError(on_one_line(f"--sniff: no robot of {team.name} is called {pattern!r} ({hint})"))
 
 
 class Watch:

@@ -155,9 +155,10 @@ _PLACE = re.compile(r" - at `\$\.?(\w*)[^`]*`$")
 
 def read_channel(path: Path) -> ChannelModel:
     """The model in the TOML file at `path`, named for the file unless it says otherwise. Raises `InvalidInput`."""
+    text = _text(path)
     try:
-        fields = tomllib.loads(_text(path))
-    except (ValueError, RecursionError) as wrong:  # also text that is no UTF-8, and numbers of too many digits
+        fields = tomllib.loads(text)
+    except (ValueError, RecursionError) as wrong:  # also numbers of too many digits
         what = "it is nested too deep" if isinstance(wrong, RecursionError) else shortened(str(wrong))
         raise _invalid(path, f"is no TOML file: {what}") from None
     known = ChannelModel.__struct_fields__
@@ -186,7 +187,10 @@ def _text(path: Path) -> str:
         raise _invalid(path, f"cannot be read: {error.strerror}", "look at its permissions") from None
     if len(content) > LARGEST_FILE:
         raise _invalid(path, f"is too large for a channel's file, which has up to {LARGEST_FILE:,} bytes")
-    return content.decode()
+    try:
+        return content.decode()
+    except UnicodeDecodeError:
+        raise _invalid(path, "is not UTF-8", "a channel's file is TOML, in UTF-8") from None
 
 
 def _invalid(path: Path, message: str, hint: str = "docs/channels.md shows all fields") -> InvalidInput:

@@ -12,7 +12,7 @@ from multiprocessing.context import ForkContext, ForkServerContext
 from typing import Literal, cast
 
 from robochoc.communication.control import FromParent, FromRobot, QueueFrom, QueuesTo
-from robochoc.communication.robot_link import RobotLink
+from robochoc.communication.robot_link import Condition, RobotLink
 from robochoc.communication.robot_process import Beginning, robot_process
 from robochoc.communication.system import allow_descriptors, signals_held
 from robochoc.solver.encoding import Unsupported
@@ -96,9 +96,13 @@ class Crew:
             self._unwatch(robot)
             yield robot, words
 
-    def dying(self) -> list[RobotLink]:
-        """Robots whose processes end with their next turn."""
-        return [robot for robot in self.robots.values() if robot.is_dying]
+    def in_condition(self, *conditions: Condition) -> dict[Condition, list[RobotLink]]:
+        """The robots whose processes are in one of `conditions`, for each of these."""
+        found: dict[Condition, list[RobotLink]] = {condition: [] for condition in conditions}
+        for robot in self.robots.values():
+            if (now := robot.condition()) in found:
+                found[now].append(robot)
+        return found
 
     # Queues
 

@@ -34,10 +34,11 @@ from robochoc.communication.control import (
 )
 from robochoc.communication.crew import Crew, StartMethod
 from robochoc.communication.quiescence import Counts, FourCounters
-from robochoc.communication.robot_link import RobotLink, RobotsLost
+from robochoc.communication.robot_link import Condition, RobotLink, RobotsLost
 from robochoc.communication.robot_process import Beginning
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import Epoch, Session, over
+from robochoc.communication.stopped import Stopped
 from robochoc.communication.system import garbage_frozen
 from robochoc.observers.events import AnyEvent, Lost, Observer, Registered
 from robochoc.outcome import Verdict
@@ -60,6 +61,7 @@ class ProcessesRun(Session):
 
     `observer` is told of all events; with `progress`, somebody watches the count of messages. With `survive`, robots
     whose processes end break the search off, and are told of in its result; otherwise `RobotsLost` is raised.
+    A robot whose process is stopped (SIGSTOP) for `patience_s` seconds counts as lost (None: it is waited for).
     `brief` is what robots are told beside the problem.
     """
 
@@ -72,6 +74,7 @@ class ProcessesRun(Session):
         progress: Callable[[Progress], None] | None = None,
         start_method: StartMethod = "fork",
         survive: bool = False,
+        patience_s: float | None = None,
         brief: Brief = NO_BRIEF,
     ) -> None:
         super().__init__(team)
@@ -79,6 +82,7 @@ class ProcessesRun(Session):
         self._observer = observer
         self._progress = progress
         self._survive = survive
+        self._stopped = Stopped(patience_s)
         self._crew = Crew(start_method)
         self._shown = self._looked = 0.0
         self._began = time.monotonic()
@@ -199,9 +203,20 @@ class ProcessesRun(Session):
             self._see_ends()
             if now - self._looked >= TICK_S:
                 self._looked = now
-                self._give_up([robot for robot in self._crew.dying() if robot.report is None])
+                self._look_after(now)
             if self._searching:
                 self._ask_around(now)
+
+    def _look_after(self, now: float) -> None:
+        """Robots that die, or have been stopped for too long, are given up: of those that have not reported."""
+        found = self._crew.in_condition(Condition.DIES, Condition.STOPPED)
+        self._give_up([robot for robot in found[Condition.DIES] if robot.report is None])
+        silent = [robot.name for robot in found[Condition.STOPPED] if robot.report is None]
+        lost = self._stopped.look(silent, now)
+        if lost and not self._survive:
+            raise RobotsLost(lost)  # and they are killed, as all are
+        for name, why in lost.items():
+            self._lose(name, why)
 
     def _see_ends(self) -> None:
         """Some processes have ended: without a report, a robot is lost."""
@@ -251,7 +266,7 @@ class ProcessesRun(Session):
             case Counters(_, wave, sent, received):
                 self._counters.answer(robot.name, wave, Counts(sent, received))
             case Conclusion(_, verdict):
-                self._verdict, self._witness = Verdict(verdict), robot.name
+                self._conclude(robot.name, verdict)
             case Events(events):
                 for event in events:
                     self._observe(event)
@@ -262,6 +277,13 @@ class ProcessesRun(Session):
                 raise refusal(why) if unsupported else RobotsLost({robot.name: why})
             case never:
                 assert_never(never)
+
+    def _conclude(self, name: str, verdict: str) -> None:
+        """Take in that the robot `name` alone can tell the verdict. Raises `RobotsLost` for one that it cannot."""
+        fault = self._protocol.traits.fault_of_conclusion(verdict)
+        if fault:
+            raise RobotsLost({name: fault})
+        self._verdict, self._witness = Verdict(verdict), name
 
     def _open_queues(self, sender: RobotLink, receivers: Sequence[str]) -> None:
         if sender.name not in self._crew.robots:
@@ -309,15 +331,22 @@ class ProcessesRun(Session):
         return replace(result, lost=dict(self._lost), findings=findings)
 
     def _await_reports(self, *, late: bool) -> None:
-        """Who computes while there is no verdict is only busy: it is waited for, until the time is over."""
+        """Who computes while there is no verdict is only busy: it is waited for, until the time is over.
+
+        So is who is stopped, until patience is.
+        """
         while True:
             now = time.monotonic()
             patience = now + (LATE_WORDS_S if late else LAST_WORDS_S)
             if self._deadline is not None:
                 patience = min(patience, max(self._deadline, now + LATE_WORDS_S))
             self._wait_until(lambda: not self._silent(), patience)
-            busy = any(self._crew.robots[name].is_computing for name in self._silent())
-            if late or self._verdict is not None or not busy or over(self._deadline):
+            silent = [self._crew.robots[name] for name in self._silent()]
+            if late or over(self._deadline):
+                return
+            if any(robot.condition() is Condition.STOPPED for robot in silent):
+                continue
+            if self._verdict is not None or not any(robot.is_computing for robot in silent):
                 return
 
     def _silent(self) -> list[str]:

@@ -55,6 +55,16 @@ class FourCounters:
         """Messages sent and taken in by all together; None while somebody has not been heard."""
         return None if self._unheard else self._total
 
+    def latest(self, robot: str) -> Counts | None:
+        """The counters that `robot` has told last; None: it has told none."""
+        return self._latest.get(robot)
+
+    @property
+    def silent(self) -> tuple[str, ...]:
+        """Who has never told its counters; else who has not answered the wave under way."""
+        unheard = [robot for robot, counts in self._latest.items() if counts is None]
+        return tuple(sorted(unheard or self._unanswered))
+
     @property
     def due(self) -> bool:
         """Whether a wave is worth its cost: all have been heard, the sums balance, and none is under way."""

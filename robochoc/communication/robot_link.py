@@ -10,6 +10,7 @@ import signal
 import socket
 import time
 from collections.abc import Mapping, Sequence
+from enum import Enum, auto
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
@@ -23,7 +24,17 @@ _DEAF_S = 10.0
 _EXIT_CODE_S = 1.0
 _EXIT_CODE_POLL_S = 0.001
 _AWAITS = re.compile(r"^SigPnd:\s*([0-9a-f]+)$", re.MULTILINE)
+_STOPPED = re.compile(r"^State:\s*T\b", re.MULTILINE)
+"""Stopped by a signal; a debugger's `t` is another state."""
 _SIGKILL_BIT = 1 << (signal.SIGKILL - 1)
+
+
+class Condition(Enum):
+    """What the kernel says of a process."""
+
+    LIVES = auto()
+    STOPPED = auto()
+    DIES = auto()
 
 
 class RobotsLost(Exception):  # noqa: N818 - named for what happened
@@ -87,18 +98,20 @@ class RobotLink:
                 continue
             frame, fds = frame[sent:], ()
 
-    @property
-    def is_dying(self) -> bool:
-        """Whether the process ends with its next turn (Linux): SIGKILL awaits it, or it has no memory any more.
+    def condition(self) -> Condition:
+        """Whether the process lives, is stopped, or ends with its next turn (Linux; elsewhere it lives).
 
-        One that gives way to others (`nice`) gets that turn late on a busy machine, up to seconds after it was killed.
+        It ends when SIGKILL awaits it, or it has no memory any more. One that gives way to others (`nice`) gets that
+        turn late on a busy machine, up to seconds after it was killed.
         """
         try:
             status = Path(f"/proc/{self.process.pid}/status").read_text()
         except OSError:
-            return False
+            return Condition.LIVES
         awaits = _AWAITS.search(status)
-        return "VmSize:" not in status or (awaits is not None and bool(int(awaits[1], 16) & _SIGKILL_BIT))
+        if "VmSize:" not in status or (awaits is not None and bool(int(awaits[1], 16) & _SIGKILL_BIT)):
+            return Condition.DIES
+        return Condition.STOPPED if _STOPPED.search(status) else Condition.LIVES
 
     @property
     def is_computing(self) -> bool:

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from robochoc.solver.encoding import Unsupported
+
 _STOPPING = {signal.SIGINT, signal.SIGTERM}
 
 
@@ -18,6 +20,23 @@ def allow_descriptors(needed: int) -> None:
     if soft != resource.RLIM_INFINITY and soft < needed:
         limit = needed if hard == resource.RLIM_INFINITY else min(needed, hard)
         resource.setrlimit(resource.RLIMIT_NOFILE, (limit, hard))
+
+
+def require_descriptors(free: int) -> None:
+    """Raise `Unsupported` unless `free` more files can be opened; the soft limit is raised as far as it goes.
+
+    zenoh does not come back from a lack of them: it aborts the process.
+    """
+    try:
+        in_use = sum(1 for _ in Path("/dev/fd").iterdir())
+    except OSError:  # there is not even one for the folder
+        in_use = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    allow_descriptors(in_use + free)
+    limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if limit not in {resource.RLIM_INFINITY, -1} and limit - in_use < free:
+        raise Unsupported(
+            f"too few files may be open: {limit}, with {in_use} in use and {free} more needed; say: ulimit -n 1024"
+        )
 
 
 def own_memory() -> int:

@@ -6,13 +6,14 @@ from robochoc.formats.diagnostics import Diagnostic, InvalidInput, encodable, on
 from robochoc.formats.folder import write_team
 from robochoc.formats.robot import read_robot, robot_in
 from robochoc.formats.team import find_teams, read_team, robot_names
-from robochoc.formats.validation import check_robot, check_team
+from robochoc.formats.validation import check_event, check_robot, check_team
 from robochoc.formats.writer import robot_xml
 
 __all__ = [
     "PREDEFINED",
     "Diagnostic",
     "InvalidInput",
+    "check_event",
     "check_robot",
     "check_team",
     "encodable",

@@ -12,7 +12,7 @@ from functools import lru_cache
 from robochoc.expression import Apply, Constant, Expression, ExpressionError, Name, Type, parse, text
 from robochoc.expression.parser import MAX_DEPTH, MAX_NODES
 from robochoc.formats.diagnostics import MistakeError, shortened
-from robochoc.formats.names import BEYOND, check_cost, check_integer, check_word, digits
+from robochoc.formats.names import BEYOND, check_cost, check_integer, check_word, digits, in_short
 from robochoc.problem import Domain, Kind, Predicate, Relation, Semantics, Term, Topic
 
 MAX_VALUES = 100_000
@@ -70,8 +70,8 @@ def check_relation(relation: Relation) -> None:
         hint = "a soft relation has one, an integer or 'infinity'; no other has"
         raise MistakeError(f"{wrong} in a {relation.semantics} relation", hint)
     if relation.arity < 1:
-        number = relation.arity if relation.arity > -BEYOND else "less than 0"
-        raise MistakeError(f"a relation of arity {number}", "its tuples need a value for each variable of the scope")
+        message = f"a relation of arity {in_short(relation.arity)}"
+        raise MistakeError(message, "its tuples need a value for each variable of the scope")
     _check_tuples(relation)
     if relation.semantics is Semantics.SOFT:
         if len(relation.costs) != len(relation.tuples):
@@ -92,7 +92,7 @@ def _check_tuples(relation: Relation) -> None:
         for value in values:
             check_integer(value)
         if len(values) != relation.arity:
-            message = f"the tuple '{shown(values)}' has {len(values)} values instead of {relation.arity}"
+            message = f"the tuple '{shown(values)}' has {len(values)} values instead of {in_short(relation.arity)}"
             raise MistakeError(message, "separate values by a blank, and tuples by '|'")
     if len(set(relation.tuples)) < len(relation.tuples):
         seen: set[tuple[int, ...]] = set()
@@ -180,4 +180,4 @@ def _check_size(expression: object) -> None:
 
 def shown(terms: Sequence[Term]) -> str:
     """A scope or a tuple, as it stands in a message."""
-    return shortened(" ".join(map(str, terms)))
+    return shortened(" ".join(map(in_short, terms)))

@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from robochoc.plain_text import on_one_line as on_one_line  # noqa: PLC0414 - from here, too
 from robochoc.problem import natural
 
 MAX_PER_FILE = 100
@@ -98,8 +99,3 @@ def _place(diagnostic: Diagnostic) -> tuple[object, int]:
 def encodable(path: str) -> str:
     """`path` as text that has a UTF-8 form: a file system's names need not have one."""
     return os.fsencode(path).decode("utf-8", "replace")
-
-
-def on_one_line(text: str) -> str:
-    """`text` as it may be printed: no name in an input may break the line, or speak to the terminal."""
-    return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)

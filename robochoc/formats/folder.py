@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from robochoc.files import resolved
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput
 from robochoc.formats.robot import robot_in
 from robochoc.formats.validation import check_writable
@@ -28,7 +29,7 @@ def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
     files = {robot.name: _file(robot) for robot in team.robots}
     if folder.exists() or folder.is_symlink():
         _may_replace(folder, replace=replace)
-    folder = folder.resolve()
+    folder = resolved(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
     new = folder.with_name(f".{secrets.token_hex(8)}.new")
     old = new.with_suffix(".old")

@@ -19,7 +19,7 @@ RESERVED = "scenario"
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.]*")
 _WORD = re.compile(r"[^ \t\r\n]+")
-_NO_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_NO_XML = re.compile("[\0-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 """Characters that no XML file can hold."""
 
 
@@ -68,8 +68,8 @@ def check_cost(cost: float) -> None:
 def check_weight(weight: int) -> None:
     """Raise `MistakeError` unless a robot can have this `weight`."""
     if not 1 <= weight <= MAX_WEIGHT:
-        shown = weight if abs(weight) < BEYOND else f"of {digits(weight)} digits"
-        raise MistakeError(f"the weight {shown} is not allowed", f"expected an integer from 1 to {MAX_WEIGHT}")
+        hint = f"expected an integer from 1 to {MAX_WEIGHT}"
+        raise MistakeError(f'weight="{in_short(weight)}" in <presentation> is not allowed', hint)
 
 
 def check_unique(what: str, name: str, known: Collection[str]) -> None:
@@ -81,3 +81,8 @@ def check_unique(what: str, name: str, known: Collection[str]) -> None:
 def digits(value: int) -> int:
     """How many there are, more or less: Python writes no integer of more than a few thousand."""
     return max(19, int(value.bit_length() * 0.30103) + 1)
+
+
+def in_short(term: str | int) -> str:
+    """Return a name or an integer as it may stand in a message: Python writes no integer of thousands of digits."""
+    return term if isinstance(term, str) else str(term) if -BEYOND < term < BEYOND else f"({digits(term)} digits)"

@@ -29,7 +29,7 @@ from robochoc.formats.rules import (
     refuse_private_part,
     repeated,
 )
-from robochoc.formats.shapes import ShapeError, check_shape
+from robochoc.formats.shapes import AS_BUILT, ShapeError, check_shape
 from robochoc.problem import Constraint, Domain, Kind, Model, Predicate, Relation, Robot
 
 Definition = Domain | Relation | Predicate
@@ -66,16 +66,17 @@ class Objects:
             check_shape(robot, Robot)
         except ShapeError as error:
             name = robot.name if isinstance(getattr(robot, "name", None), str) else "?"
-            place = ObjectPlaces(name).robot()
-            self._note(place, f"{error.path.lstrip('.')}: {error}".lstrip(": "), "build it as its class says")
+            self._note(ObjectPlaces(name).robot(), error.told, AS_BUILT)
             return False
         return True
 
     def _steps(self, robot: Robot, places: ObjectPlaces) -> Iterator[None]:
         """Look at one object after the other."""
         own = dict.fromkeys(variable.name for variable in robot.variables)
-        self._ask(places.robot(), lambda: check_robot_name(robot.name))
-        self._ask(places.robot(), lambda: check_weight(robot.weight))
+        with self._at(places.robot):
+            check_robot_name(robot.name)
+        with self._at(places.robot):
+            check_weight(robot.weight)
         yield from self._variables(robot, places)
         if not own:
             return  # whatever else is wrong may follow from it
@@ -84,7 +85,8 @@ class Objects:
             self._private(constraint, own, robot.kind, places)
             yield
         for parent in robot.parents:
-            self._ask(places.neighbour(parent), lambda name=parent.name: check_name(name))  # type: ignore[misc]
+            with self._at(places.neighbour, parent):
+                check_name(parent.name)
             for constraint in parent.constraints:
                 self._shared(constraint, own, robot.kind, places)
                 yield
@@ -94,10 +96,11 @@ class Objects:
             yield
 
     def _variables(self, robot: Robot, places: ObjectPlaces) -> Iterator[None]:
-        self._ask(places.robot(), lambda: refuse_nothing_to_decide(robot.variables))
+        with self._at(places.robot):
+            refuse_nothing_to_decide(robot.variables)
         seen: set[str] = set()
         for variable in robot.variables:
-            with self._at(places.variable(variable.name)):
+            with self._at(places.variable, variable.name):
                 check_name(variable.name)
                 check_unique("variable", variable.name, seen)
             seen.add(variable.name)
@@ -112,7 +115,7 @@ class Objects:
     def _topics(self, robot: Robot, own: Collection[str], places: ObjectPlaces) -> Iterator[None]:
         seen: set[str] = set()
         for topic in robot.topics:
-            with self._at(places.part("topic", topic.name)):
+            with self._at(places.part, "topic", topic.name):
                 check_topic(topic, own)
                 check_unique("topic", topic.name, seen)
             seen.add(topic.name)
@@ -120,7 +123,7 @@ class Objects:
 
     def _children(self, robot: Robot, own: Collection[str], places: ObjectPlaces) -> Iterator[None]:
         for child in robot.children:
-            with self._at(places.neighbour(child)):
+            with self._at(places.neighbour, child):
                 check_name(child.name)
                 check_told(child.variables, own)
             for constraint in child.constraints:
@@ -133,13 +136,13 @@ class Objects:
                 yield
 
     def _private(self, constraint: Constraint, own: Collection[str], kind: Kind, places: ObjectPlaces) -> None:
-        with self._at(places.constraint(constraint)):
+        with self._at(places.constraint, constraint):
             refuse_private_part(constraint.model)
             if self._applied(constraint, kind, places):
                 check_private(constraint, own)
 
     def _shared(self, constraint: Constraint, own: Collection[str], kind: Kind, places: ObjectPlaces) -> None:
-        with self._at(places.constraint(constraint)):
+        with self._at(places.constraint, constraint):
             refuse_no_model(constraint.model)
             if self._applied(constraint, kind, places):
                 check_shared(constraint, own)
@@ -162,21 +165,18 @@ class Objects:
         known = self._known.get(id(thing))
         if known is None:
             before = len(self._found)
-            with self._at(places.part(type(thing).__name__.lower(), thing.name)):
+            with self._at(places.part, type(thing).__name__.lower(), thing.name):
                 _check_defined(thing)
             known = self._known[id(thing)] = (thing, len(self._found) == before)
         return known[1]
 
-    def _ask(self, place: Place, question: Callable[[], None]) -> None:
-        with self._at(place):
-            question()
-
     @contextmanager
-    def _at(self, place: Place) -> Iterator[None]:
+    def _at(self, place: Callable[..., Place], *part: object) -> Iterator[None]:
+        """Note a `MistakeError` raised inside; only then anybody asks for the `place` of the `part`."""
         try:
             yield
         except MistakeError as mistake:
-            self._note(place, mistake.message, mistake.hint)
+            self._note(place(*part), mistake.message, mistake.hint)
 
     def _note(self, place: Place, message: str, hint: str) -> None:
         self._found.append(place.mistake(message, hint))

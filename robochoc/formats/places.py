@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from robochoc.formats.diagnostics import Diagnostic, shortened
+from robochoc.formats.names import in_short
 from robochoc.problem import Child, Constraint, Parent
 
 
@@ -90,7 +91,7 @@ class ObjectPlaces:
 
     def constraint(self, constraint: Constraint) -> Place:
         """Return a constraint by its name, which need not be unique, and its scope."""
-        scope = shortened(" ".join(map(str, constraint.scope)))
+        scope = shortened(" ".join(map(in_short, constraint.scope)))
         return Place(f"{self.robot()}, constraint {shortened(constraint.name)} ({scope})")
 
     def neighbour(self, neighbour: Parent | Child) -> Place:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from robochoc.outcome import Epoch, Metrics, Outcome, Place, Verdict
+from robochoc.outcome import Epoch, Metrics, Outcome, Place, Thoroughness, Verdict
 
 
 class BadResult(ValueError):  # noqa: N818 - named for what was found
@@ -41,6 +41,11 @@ class _EpochForm(msgspec.Struct, omit_defaults=True):
     simulated_s: float | UnsetType = UNSET
 
 
+class _CheckedForm(msgspec.Struct):
+    by_both: int
+    by_owner: int
+
+
 class _Form(msgspec.Struct, omit_defaults=True):
     team: str
     protocol: str
@@ -62,6 +67,8 @@ class _Form(msgspec.Struct, omit_defaults=True):
     tree: dict[str, Place] = {}
     confirmed: bool = False
     channel: str | None = None
+    claimed_by: str | None = None
+    checked: _CheckedForm | None = None
 
 
 def result_json(outcome: Outcome) -> bytes:
@@ -99,6 +106,8 @@ def result_json(outcome: Outcome) -> bytes:
         tree=outcome.tree,
         confirmed=outcome.confirmed,
         channel=outcome.channel,
+        claimed_by=outcome.claimed_by,
+        checked=_CheckedForm(*outcome.checked) if outcome.checked else None,
     )
     return msgspec.json.encode(form)
 
@@ -143,6 +152,10 @@ def read_result(content: bytes) -> Outcome:
     """The outcome that a JSON result tells of. Raises `BadResult`, saying what is wrong."""
     try:
         form = msgspec.json.decode(content, type=_Form)
+    except UnicodeDecodeError as error:
+        raise BadResult("it is not UTF-8") from error
+    except RecursionError as error:
+        raise BadResult("it is nested too deep") from error
     except msgspec.MsgspecError as error:
         raise BadResult(str(error)) from error
     spent = form.metrics
@@ -168,5 +181,7 @@ def read_result(content: bytes) -> Outcome:
         tree=form.tree,
         confirmed=form.confirmed,
         channel=form.channel,
+        claimed_by=form.claimed_by,
+        checked=Thoroughness(form.checked.by_both, form.checked.by_owner) if form.checked else None,
         epochs=tuple(map(_epoch_of, form.epochs)),
     )

@@ -202,16 +202,16 @@ class _Reader:
             name = attribute(agent, "name")
             held = self._constraints(agent, context, read_shared)
             parts = tuple(constraint for constraint in held if constraint.model is Model.PKC)
-            repeated = tuple(constraint for constraint in held if constraint.model is Model.TKC)
-            if repeated:
-                copies[name] = repeated
+            kept = tuple(constraint for constraint in held if constraint.model is Model.TKC)
+            if kept:
+                copies[name] = kept
             scopes = itertools.chain.from_iterable(constraint.variables for constraint in held)
             told = tuple(dict.fromkeys(variable for variable in scopes if variable in self._own))
             if agent.get("variable") is not None:
                 told = tuple((agent.get("variable") or "").split())
                 with self._report.at(line(agent)):
                     check_told(told, self._own)
-            yield Child(name, told, parts, line(agent))
+            yield Child(name, told, parts, line(agent), kept)
 
     def _check_neighbours(self, parents: tuple[Parent, ...], children: tuple[Child, ...]) -> None:
         for neighbour, message in repeated(self._name, parents, children):

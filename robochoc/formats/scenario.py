@@ -10,6 +10,7 @@ from pathlib import Path
 from lxml import etree
 
 from robochoc.change import BadChange, changed
+from robochoc.files import resolved
 from robochoc.formats.constraints import Context, read_shared
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput, MistakeError, Report, shortened
 from robochoc.formats.robot import RobotFile, read_robot_file
@@ -106,7 +107,7 @@ class _Reader:
     def _added(self, name: str) -> Robot | None:
         """The robot in the file `name`; None where it has mistakes, which are told with that file's lines."""
         try:
-            path = (self._inside / name).resolve()
+            path = resolved(self._inside / name)
             there = path.is_file()
         except (OSError, ValueError):
             path, there = self._inside, False

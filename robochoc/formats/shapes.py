@@ -20,6 +20,9 @@ from robochoc.formats.diagnostics import shortened
 _LEAVES = (Apply, Constant, Name)
 """Expressions: they may be too deep to be walked, and have a check of their own."""
 
+AS_BUILT = "build it as its class says"
+"""What to do about a `ShapeError`."""
+
 _Check = Callable[[object], None]
 
 
@@ -30,6 +33,12 @@ class ShapeError(TypeError):
         self.path = ""
         shown = f"'{shortened(value)}'" if isinstance(value, str) else f"a {type(value).__name__}"
         super().__init__(f"{shown} where {expected} should stand")
+
+    @property
+    def told(self) -> str:
+        """What is wrong, and where in the object."""
+        where = self.path.lstrip(".")
+        return f"{where}: {self}" if where else str(self)
 
     def inside(self, step: str) -> ShapeError:
         """Return the same mistake, one `step` deeper."""

@@ -8,7 +8,7 @@ as long as that very object lives: teams cannot be changed, and `dataclasses.rep
 from __future__ import annotations
 
 import weakref
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import islice
 
@@ -29,11 +29,13 @@ from robochoc.formats.objects import Objects, repeated_robots
 from robochoc.formats.places import ObjectPlaces, Place
 from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
 from robochoc.formats.scopes import misplaced, misplaced_parts, untold
-from robochoc.formats.shapes import ShapeError, check_shape
+from robochoc.formats.shapes import AS_BUILT, ShapeError, check_shape
 from robochoc.problem import AddAgent, AddConstraint, AddValue, Change, Event, RemoveValue, Robot, Team, priority_order
 
 MAX_BETWEEN = 1000
 """So many mistakes between the robots of one team are told."""
+
+_NOTHING = Event(())
 
 _valid: dict[int, weakref.ref[Team]] = {}
 """The teams that are known to be valid, by `id`. To hash a team would take as long as to look at it."""
@@ -49,7 +51,7 @@ def check_team(team: Team) -> None:
         return
     found = _of_the_whole(team) or _mistakes(team) or list(_of_the_scenario(team))
     if found:
-        raise InvalidInput(found)
+        raise InvalidInput(dict.fromkeys(found))
     note_valid(team)
 
 
@@ -73,7 +75,7 @@ def check_writable(team: Team) -> None:
         place = Place(f"team {shortened(team.name)}")
         found.append(place.mistake("its scenario is no robot's", "write it as scenario.xml, and the team without it"))
     if found:
-        raise InvalidInput(found)
+        raise InvalidInput(dict.fromkeys(found))
     by_links = priority_order({robot.name: [parent.name for parent in robot.parents] for robot in team.robots})
     if by_links != team.order:
         check_team(replace(team, robots=tuple(team[name] for name in by_links)))
@@ -83,7 +85,20 @@ def check_robot(robot: Robot) -> None:
     """Raise `InvalidInput` with every mistake that `robot` has by itself; its neighbours are not there to be asked."""
     found = Objects().mistakes(robot)
     if found:
-        raise InvalidInput(found)
+        raise InvalidInput(dict.fromkeys(found))
+
+
+def check_event(team: Team, event: Event) -> None:
+    """Raise `InvalidInput` when `event`, which happens to `team`, brings what no team could have.
+
+    What this team cannot take is no mistake here: it may have lost the robots that somebody has counted on.
+    """
+    place = Place("an event")
+    found = list(_of_the_shape(event, Event, place)) or [
+        mistake for change in event.changes for mistake in _of_the_change(_robots(team, event), change, place)
+    ]
+    if found:
+        raise InvalidInput(dict.fromkeys(found))
 
 
 def note_valid(team: Team) -> None:
@@ -121,21 +136,27 @@ def _of_the_whole(team: Team) -> list[Diagnostic]:
     """What leaves nothing else to be asked: no robots, or objects that are none."""
     given: object = team
     place = Place("the team")
+    found = list(_of_the_shape(replace(given, robots=()) if isinstance(given, Team) else given, Team, place))
+    if found:
+        return found
+    place = Place(f"team {shortened(team.name)}")
+    robots: object = team.robots
+    if not isinstance(robots, tuple):
+        return [place.mistake(f"robots: {ShapeError(robots, 'a tuple')}", AS_BUILT)]
     try:
-        check_shape(replace(given, robots=()) if isinstance(given, Team) else given, Team)
-        place = Place(f"team {shortened(team.name)}")
-        robots: object = team.robots
-        if not isinstance(robots, tuple):
-            raise ShapeError(robots, "a tuple").inside(".robots")
         team.name.encode()
-    except ShapeError as error:
-        where = error.path.lstrip(".")
-        return [place.mistake(f"{where}: {error}" if where else str(error), "build it as its class says")]
     except UnicodeEncodeError:
         return [place.mistake("its name has no UTF-8 form", "give it another")]
     if not team.robots:
         return [place.mistake("there is no robot here", "a team has one robot or more")]
     return []
+
+
+def _of_the_shape(value: object, kind: type, place: Place) -> Iterator[Diagnostic]:
+    try:
+        check_shape(value, kind)
+    except ShapeError as error:
+        yield place.mistake(error.told, AS_BUILT)
 
 
 def _mistakes(team: Team) -> list[Diagnostic]:
@@ -170,7 +191,7 @@ def _of_the_scenario(team: Team) -> Iterator[Diagnostic]:
         place = Place(f"event {number} of the scenario")
         found = list(_of_the_time(event, place))
         for change in event.changes:
-            mistakes = list(_of_the_change(now, change, place))
+            mistakes = list(_of_the_change(_robots(now), change, place))
             found += mistakes
             if not mistakes:
                 try:
@@ -193,8 +214,14 @@ def _of_the_time(event: Event, place: Place) -> Iterator[Diagnostic]:
         yield place.mistake("an event after less than no message", "expected None, or a number of messages")
 
 
-def _of_the_change(team: Team, change: Change, place: Place) -> Iterator[Diagnostic]:
-    """What is wrong with a change whatever the team is like."""
+def _robots(team: Team, event: Event = _NOTHING) -> dict[str, Robot]:
+    """Who is there, and who comes with `event`."""
+    coming = [change.robot for change in event.changes if isinstance(change, AddAgent)]
+    return {robot.name: robot for robot in (*team.robots, *coming)}
+
+
+def _of_the_change(robots: Mapping[str, Robot], change: Change, place: Place) -> Iterator[Diagnostic]:
+    """What is wrong with a change whatever else the team is like."""
     try:
         match change:
             case AddAgent(robot):
@@ -203,8 +230,8 @@ def _of_the_change(team: Team, change: Change, place: Place) -> Iterator[Diagnos
                     check_newcomers_constraint(constraint)
             case AddConstraint(agent, _, constraint):
                 check_brought(constraint)
-                if agent in team:
-                    yield from Objects().mistakes_of_constraint(constraint, team[agent])
+                if agent in robots:
+                    yield from Objects().mistakes_of_constraint(constraint, robots[agent])
             case AddValue(_, value) | RemoveValue(_, value):
                 check_integer(value)
             case _:

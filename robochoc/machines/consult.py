@@ -8,10 +8,12 @@ from collections.abc import Iterator, Sequence
 from queue import Empty
 
 from robochoc.authority.identity import Identity
+from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.letters import MASTER, Letters, Refused
-from robochoc.communication.network.post import Arrived, CannotConnect, Post
+from robochoc.communication.network.post import CannotConnect, Post
 from robochoc.communication.network.words import Ask, Told
 from robochoc.machines.place import Place
+from robochoc.plain_text import LONGEST_REASON, on_one_line
 from robochoc.services.communicative_acts import Performative
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
 from robochoc.services.sl import Function, descriptions_in, df_on, request, searched_in
@@ -113,7 +115,9 @@ class _Asking:
             if told.performative == wanted:
                 return told.content
             if told.performative != Performative.INFORM:
-                raise NoAnswer(f"the directory answers {told.performative}: {told.content}")
+                raise NoAnswer(
+                    on_one_line(f"the directory answers {told.performative}: {told.content}", LONGEST_REASON)
+                )
             self._early.append(told)
         raise NoAnswer(f"the master at {self._place} does not answer {self._name}; is it enrolled with its Authority?")
 

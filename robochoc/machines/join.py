@@ -9,8 +9,9 @@ from pathlib import Path
 from robochoc.authority.authority import check_name
 from robochoc.authority.enrolment import EnrolmentFailed, NobodyThere, enrol, renew
 from robochoc.authority.identity import BadIdentity, Identity, default_folder
+from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.post import Post
-from robochoc.communication.network.robot import Ending, Manner, NetworkRobot
+from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.formats import check_robot
 from robochoc.machines.place import Place
 from robochoc.problem import Robot

@@ -6,11 +6,11 @@ Section 5.2: "The master waits for the confirmation of creation all agents befor
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, assert_never
 
 from msgspec import UNSET
 
@@ -31,7 +31,7 @@ from robochoc.machines.place import LOOPBACK, Place
 from robochoc.observers.checker import Refuted
 from robochoc.observers.events import Began, Observer
 from robochoc.options import Withdrawal
-from robochoc.outcome import Outcome, Verdict
+from robochoc.outcome import ALL_ROBOTS, Outcome, Verdict
 from robochoc.problem import Domain, Kind, Team, Variable
 from robochoc.protocols.traits import Traits
 from robochoc.registry import spoken
@@ -164,8 +164,8 @@ class _Lead:
         plan, members = self._plan, self._master.members
         if not self._master.gather(None if plan.gather_s is None else time.monotonic() + plan.gather_s):
             awaited = sorted(members.awaited)
-            names = ", ".join(awaited[:_TOLD]) + f" and {len(awaited) - _TOLD} others" * (len(awaited) > _TOLD)
-            raise NotComplete(f"the team is not complete after {plan.gather_s:g} s; awaited: {names or 'more robots'}")
+            names = _listed(awaited) or "more robots"
+            raise NotComplete(f"the team is not complete after {plan.gather_s:g} s; awaited: {names}")
         self._deadline = None if plan.timeout is None else time.monotonic() + plan.timeout
         kind = self._team().kind
         protocol = plan.protocol or suits(kind)
@@ -210,11 +210,12 @@ class _Lead:
             lost=tuple(self._lost),
             withdrawn=tuple(self._lost),
         )
+        self._refute(*(doubt.why for doubt in self._master.tally.doubts_about_verdict))
         ended = result.verdict is Verdict.SOLUTION
         if result.verdict is Verdict.UNKNOWN:
-            outcome = replace(outcome, reason=self._limit())
+            outcome = replace(outcome, reason=self._limit(result.witness))
         if result.verdict is Verdict.NO_SOLUTION or not (ended or traits.costs):
-            return outcome
+            return claimed(outcome)
         proven = ended and (traits.complete or not traits.costs)
         out = tuple(name for name in self._master.members.order if not self._master.tally.assigned.get(name))
         if ended and aside:
@@ -222,28 +223,32 @@ class _Lead:
         verdict = self._verdict(traits, aside=bool(out)) if proven else Verdict.UNKNOWN
         if self._plan.conditions.private:
             reason = "every robot knows its own values, and nobody else's (--private)"
-            return replace(outcome, verdict=verdict, reason=reason)
-        self._values = self._decided(result.assignments)
+            return claimed(replace(outcome, verdict=verdict, reason=reason))
+        self._values = self._told(result.assignments)
         held, cost = self._master.checked(self._values)
+        self._refute(*(doubt.why for doubt in self._master.tally.doubts_about_verdict))
         if held and (aside or not out):
             verdict = verdict if proven or not ended else Verdict.SOLUTION
-            return replace(outcome, verdict=verdict, assignment=joined(self._values), cost=cost, verified=True)
+            outcome = replace(outcome, verdict=verdict, assignment=joined(self._values), cost=cost, verified=True)
+            return claimed(replace(outcome, checked=self._master.tally.thoroughness))
         if proven:
-            raise Refuted(f"{outcome.protocol} has a solution for {outcome.team}, which the robots' own checks refute")
+            against = "; ".join(self._master.tally.objections) or f"{_listed(out)} has no value"
+            who = f"{result.witness} says that" if result.witness else "all fell quiet, so that"
+            raise Refuted(f"{who} {outcome.protocol} has a solution for {outcome.team}, but {against}")
         reason = outcome.reason or f"{outcome.protocol} has come to its end, and what it came by breaks a constraint"
         return replace(outcome, verdict=Verdict.UNKNOWN, reason=reason)
 
-    def _decided(self, reported: Mapping[str, dict[str, int]]) -> dict[str, dict[str, int]]:
-        """What each robot has decided of its own variables. Raises `RobotsLost` for one that reports what cannot be."""
-        owners = self._team().owner
-        for name, values in reported.items():
-            shown = self._master.members.robots[name].robot.variables
-            if values and not all(values.get(variable.name) in variable.domain for variable in shown):
-                raise RobotsLost({name: "it has reported values that it cannot have"})
-        return {
-            name: {variable: value for variable, value in values.items() if owners.get(variable, name) == name}
-            for name, values in reported.items()
-        }
+    def _told(self, reported: Mapping[str, dict[str, int]]) -> dict[str, dict[str, int]]:
+        """Return what was `reported`. Raises `RobotsLost` for who has values, and does not tell them."""
+        for name, assigned in self._master.tally.assigned.items():
+            if assigned and not reported[name]:
+                raise RobotsLost({name: "it has reported that it has values, and none of them"})
+        return dict(reported)
+
+    def _refute(self, *doubts: str) -> None:
+        """Raise `Refuted` if there are `doubts`: of two robots one lies, and nobody can tell which."""
+        if doubts:
+            raise Refuted(f"{self._outcome.team} has no answer that can be believed: {'; '.join(doubts)}")
 
     def _seen(self) -> Team:
         """The team as the outcome shows it: with variables that only their robots knew before."""
@@ -266,15 +271,45 @@ class _Lead:
         own = self._outcome.placed_by is None
         return Brief(self._plan.seed, self._plan.settings if own else {}, 1 + dearest if aside else None)
 
-    def _limit(self) -> str:
+    def _limit(self, witness: str | None) -> str:
+        """Return why there is no verdict, and who is to blame for it, as far as that can be told."""
         plan = self._plan
+        if witness is not None:
+            return f"{witness} gave up, as its protocol has it"
         if plan.messages is not None and sum(self._outcome.metrics.messages.values()) >= plan.messages:
-            return f"so many messages have been sent (--messages {plan.messages})"
-        return "the time was over" if plan.timeout is None else f"the time was over (--timeout {plan.timeout:g})"
+            over = f"so many messages have been sent (--messages {plan.messages})"
+        else:
+            over = "the time was over" + ("" if plan.timeout is None else f" (--timeout {plan.timeout:g})")
+        return "; ".join(filter(None, [over, self._master.tally.restless]))
 
     def _team(self) -> Team:
         members = self._master.members
         return Team(self._plan.name, tuple(members.robots[name].robot for name in members.order))
+
+
+def claimed(outcome: Outcome) -> Outcome:
+    """Return `outcome` with whom it rests on, as nobody could check it (docs/security.md, "One traitor").
+
+    That there is no solution is the word of who says so; that none costs less, or what was not told, is everybody's.
+    """
+    by: str | None = None
+    match outcome.verdict:
+        case Verdict.NO_SOLUTION:
+            by = outcome.witness
+        case Verdict.OPTIMAL:
+            by = ALL_ROBOTS
+        case Verdict.UNKNOWN:
+            by = None if outcome.bound is None else ALL_ROBOTS
+        case Verdict.SOLUTION:
+            by = (outcome.witness if outcome.aside else None) if outcome.verified else ALL_ROBOTS
+        case never:
+            assert_never(never)
+    return replace(outcome, claimed_by=by)
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return a few of `names` in words."""
+    return ", ".join(names[:_TOLD]) + f" and {len(names) - _TOLD} others" * (len(names) > _TOLD)
 
 
 def _check_settings_early(plan: Plan) -> None:
@@ -298,4 +333,5 @@ def _check_settings(protocol: str, settings: Mapping[str, str]) -> None:
 def _in_words(outcome: Outcome) -> str:
     """The outcome, as robots are told it."""
     aside = f", {len(outcome.aside)} step aside" if outcome.aside else ""
-    return f"{outcome.verdict}{aside}"
+    claim = f", claimed by {outcome.claimed_by}" if outcome.claimed_by else ""
+    return f"{outcome.verdict}{aside}{claim}"

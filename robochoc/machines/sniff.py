@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 from robochoc.authority.identity import Identity
 from robochoc.communication.network.access import journal_key
+from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.letters import MASTER, Letters, Refused
-from robochoc.communication.network.post import Arrived, Post
+from robochoc.communication.network.post import Post
 from robochoc.communication.network.publication import piece_in, question
 from robochoc.communication.network.refusals import LONGEST
 from robochoc.communication.network.words import Sniff, Sniffable

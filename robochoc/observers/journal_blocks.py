@@ -32,6 +32,10 @@ class Damaged(Exception):  # noqa: N818 - named for what was found
     """From here on nothing can be read; says where, and why."""
 
 
+class Truncated(Damaged):
+    """Only the end is missing: all that is there is as it was written."""
+
+
 def _digest(before: bytes, packed: bytes, size: int) -> bytes:
     """The checksum of a block: of the one before, its lengths, and what it holds."""
     lengths = struct.pack("<II", len(packed), size)

@@ -16,7 +16,7 @@ from typing import BinaryIO, Protocol, cast
 import msgspec
 
 from robochoc.observers.events import AnyEvent, Began
-from robochoc.observers.journal_blocks import MAGIC, Damaged, Unframer
+from robochoc.observers.journal_blocks import MAGIC, Damaged, Truncated, Unframer
 from robochoc.observers.journal_columns import BadBlock, entries_of
 from robochoc.observers.journal_entries import READ, BadJournal, Ended, Header, Line
 from robochoc.outcome import Outcome
@@ -34,13 +34,14 @@ class Journal:
     """A journal that has been read. `outcome` is None when the run broke off.
 
     `damage` says why it ends early, and where: after a crash, or in a file that was altered. None: it is whole. The
-    events are those before the damage.
+    events are those before the damage. `truncated`: only the end is missing, as after a crash; nothing was altered.
     """
 
     header: Header
     events: tuple[AnyEvent, ...]
     outcome: Outcome | None
     damage: str | None = None
+    truncated: bool = False
 
 
 def is_journal(content: bytes) -> bool:
@@ -59,18 +60,21 @@ def read_journal(content: bytes) -> Journal:
         follower = Follower(io.BytesIO(content))
         lines = follower.read(MOST_ENTRIES)
         damage = follower.damage
+        truncated = False
         if len(lines) > MOST_ENTRIES:
             damage = f"it has more than {MOST_ENTRIES:,} entries, of which the first are read"
+            truncated = True
             del lines[MOST_ENTRIES:]
         elif damage is None:
             rest, damage = follower.finish()
+            truncated = follower.truncated
             lines += rest
         first, last = lines[0], lines[-1]
         if not isinstance(first, Header):  # the follower has seen to it
             raise BadJournal("it has no header")
         outcome = last.outcome if isinstance(last, Ended) else None
         events = cast("list[AnyEvent]", lines[1:-1] if outcome else lines[1:])  # so has it here
-        return Journal(first, tuple(in_order(events)), outcome, damage)
+        return Journal(first, tuple(in_order(events)), outcome, damage, truncated)
 
 
 def in_order(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
@@ -103,6 +107,8 @@ class Follower:
 
     damage: str | None = None
     """Why nothing more will be read, and where; None: nothing is wrong so far."""
+    truncated: bool = False
+    """Whether the damage is that the end is missing, and no other."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._source = _source(file)
@@ -162,6 +168,7 @@ class Follower:
         if not self._began:
             raise BadJournal(str(damaged)) from damaged
         self.damage = f"{self._place}: more follows the end" if self._over else str(damaged)
+        self.truncated = isinstance(damaged, Truncated) and not self._over
 
     @property
     def _place(self) -> str:
@@ -242,7 +249,7 @@ class _Blocks:
 
     def rest(self) -> Sequence[Line]:
         if self._unframer.rest:
-            raise Damaged(self._unframer.rest)
+            raise Truncated(self._unframer.rest)
         return ()
 
 
@@ -274,13 +281,18 @@ class _Text:
         return self._decoded(line)
 
     def rest(self) -> Sequence[Line]:
-        return self._decoded(self._buffer) if self._buffer else ()
+        try:
+            return self._decoded(self._buffer) if self._buffer else ()
+        except Damaged as cut:
+            raise Truncated(str(cut)) from cut
 
     def _decoded(self, line: bytearray) -> Sequence[Line]:
         self._lines += 1
         try:
             entry = self._decode(line)
-        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        except UnicodeDecodeError as error:
+            raise Damaged(f"{self.place}: it is not UTF-8") from error
+        except (msgspec.MsgspecError, RecursionError) as error:
             raise Damaged(f"{self.place}: {error}") from error
         if not isfinite(entry.t):
             raise Damaged(f"{self.place}: its time is no number")

@@ -41,7 +41,7 @@ from robochoc.outcome import Verdict
 from robochoc.protocols.backtracking import Backtracking
 from robochoc.protocols.nogood import contradicts
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 
 
@@ -71,6 +71,7 @@ class ABT(Backtracking):
 
     messages = Ok | Nogood | AddLink
     traits = Traits(
+        concludes=ENDS_WITH_PROOF,
         paper="Yokoo et al. 1992; Bessiere et al. 2005; PKC: Brito et al. 2009",
         partially_known=True,
         privacy="constraints of lower robots; of PKCs every robot's part, but for the pairs that were asked about",

@@ -43,7 +43,7 @@ from robochoc.outcome import Verdict
 from robochoc.protocols.backtracking import Backtracking
 from robochoc.protocols.nogood import contradicts
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 
 Counters = tuple[tuple[int, str], ...]
@@ -106,7 +106,9 @@ class ABTDORetro(Backtracking):
     """
 
     messages = Ok | Nogood | Order | AddLink
-    traits = Traits(paper="Zivan & Meisels 2006; Zivan et al. 2009", everywhere=True, privacy="none")
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF, paper="Zivan & Meisels 2006; Zivan et al. 2009", everywhere=True, privacy="none"
+    )
     order: CurrentOrder
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

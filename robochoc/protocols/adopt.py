@@ -47,7 +47,7 @@ from robochoc.problem import INFINITE
 from robochoc.protocols.bounding import BoundingProtocol, Context, Entry, Number, Terminate
 from robochoc.protocols.dfs import TreeMessage
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 
 
@@ -81,6 +81,7 @@ class ADOPT(BoundingProtocol):
 
     messages = TreeMessage | Value | Cost | Threshold | Terminate
     traits = Traits(
+        concludes=ENDS_WITH_PROOF,
         paper="Modi, Shen, Tambe, Yokoo 2005",
         costs=True,
         everywhere=True,

@@ -55,7 +55,7 @@ from robochoc.protocols.afb_bounds import Assignment, Cost, Estimates, Prices, T
 from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 
 
@@ -108,6 +108,7 @@ class AFB(Protocol):
 
     messages = CPA | FBCPA | FBEstimate | NewSolution | Terminate
     traits = Traits(
+        concludes=ENDS_WITH_PROOF,
         paper="Gershman, Meisels & Zivan 2009",
         costs=True,
         everywhere=True,

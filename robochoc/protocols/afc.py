@@ -32,7 +32,7 @@ from robochoc.message import Message, Value
 from robochoc.outcome import Verdict
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_EITHER, Traits
 from robochoc.solver.compiled import LocalProblem
 
 Assignments = tuple[Value, ...]
@@ -74,7 +74,7 @@ class AFC(Protocol):
     """
 
     messages = CPA | FcCPA | NotOk | BacktrackCPA
-    traits = Traits(paper="Meisels & Zivan 2007", privacy="constraints of lower robots")
+    traits = Traits(concludes=ENDS_WITH_EITHER, paper="Meisels & Zivan 2007", privacy="constraints of lower robots")
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

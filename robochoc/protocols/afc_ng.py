@@ -47,7 +47,7 @@ from robochoc.outcome import Verdict
 from robochoc.protocols.nogood import NogoodStore, contradicts
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 
 Assignment = tuple[Value, int]
@@ -83,7 +83,9 @@ class AFCng(Protocol):
 
     messages = CPA | Nogood | Solved
     traits = Traits(
-        paper="Ezzahir et al. 2009; Wahbi, Ezzahir, Bessiere, Bouyakhf 2013", privacy="constraints of lower robots"
+        concludes=ENDS_WITH_PROOF,
+        paper="Ezzahir et al. 2009; Wahbi, Ezzahir, Bessiere, Bouyakhf 2013",
+        privacy="constraints of lower robots",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

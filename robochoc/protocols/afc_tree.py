@@ -38,7 +38,7 @@ from typing import assert_never, cast
 from robochoc.message import Message, Value
 from robochoc.protocols.afc_ng import CPA, AFCng, Nogood, Solved
 from robochoc.protocols.order import PriorityOrder, PseudoTree
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 
 
@@ -56,7 +56,12 @@ class AFCTree(AFCng):
     """One agent of AFC-tree. State beside AFC-ng's: `accepts`, what each child's subtree takes with the own value."""
 
     messages = CPA | Nogood | Accept | Solved
-    traits = Traits(paper="Wahbi, Ezzahir, Bessiere, Bouyakhf 2013", tree=True, privacy="constraints of lower robots")
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Wahbi, Ezzahir, Bessiere, Bouyakhf 2013",
+        tree=True,
+        privacy="constraints of lower robots",
+    )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

@@ -54,7 +54,7 @@ from robochoc.protocols.agile_order import (
 from robochoc.protocols.backtracking import Backtracking
 from robochoc.protocols.nogood import LeftSide, NogoodStore, contradicts, joined
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 
 
@@ -94,7 +94,7 @@ class AgileABT(Backtracking):
     """
 
     messages = Ok | Nogood | Order | AddLink
-    traits = Traits(paper="Bessiere et al. 2011", everywhere=True, privacy="none")
+    traits = Traits(concludes=ENDS_WITH_PROOF, paper="Bessiere et al. 2011", everywhere=True, privacy="none")
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

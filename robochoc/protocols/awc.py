@@ -34,7 +34,7 @@ from robochoc.outcome import Verdict
 from robochoc.protocols.nogood import LeftSide, joined
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 
 
@@ -106,7 +106,7 @@ class AWC(Protocol):
     """One agent of AWC. State: `view` (agent_view) and `priorities` of others, `nogoods`, own `priority`."""
 
     messages = Ok | Nogood | AddLink
-    traits = Traits(paper="Yokoo 1995; Yokoo et al. 1998", everywhere=True, privacy="none")
+    traits = Traits(concludes=ENDS_WITH_PROOF, paper="Yokoo 1995; Yokoo et al. 1998", everywhere=True, privacy="none")
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

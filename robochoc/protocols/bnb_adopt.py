@@ -54,7 +54,7 @@ from robochoc.problem import INFINITE
 from robochoc.protocols.bounding import BoundingProtocol, Context, Number, Terminate
 from robochoc.protocols.dfs import TreeMessage
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 
 
@@ -83,6 +83,7 @@ class BnBADOPT(BoundingProtocol):
 
     messages = TreeMessage | Value | Cost | Terminate
     traits = Traits(
+        concludes=ENDS_WITH_PROOF,
         paper="Yeoh, Felner, Koenig 2010; Gutierrez & Meseguer 2010",
         costs=True,
         everywhere=True,

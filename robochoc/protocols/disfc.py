@@ -37,7 +37,7 @@ from robochoc.outcome import Verdict
 from robochoc.protocols.nogood import NogoodStore
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.filters import allows
 
@@ -70,6 +70,7 @@ class DisFC(Protocol):
 
     messages = Ok | Nogood | AddLink
     traits = Traits(
+        concludes=ENDS_WITH_PROOF,
         paper="Brito and Meseguer 2003; PKC: Brito et al. 2009",
         n_ary=False,
         partially_known=True,

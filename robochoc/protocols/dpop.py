@@ -69,7 +69,7 @@ from robochoc.protocols.dpop_tables import (
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Settings
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.cost_table import EXACT, refuse_inexact
 from robochoc.solver.encoding import TooMuch
@@ -152,10 +152,12 @@ class DPOP(TreeProtocol):
 
     messages = TreeMessage | Domain | Dimensions | Proceed | UTIL | VALUE
     traits = Traits(
+        concludes=ENDS_WITH_PROOF,
         paper="Petcu & Faltings 2005",
         costs=True,
         everywhere=True,
         beyond=False,
+        tables=True,
         privacy="constraints of others, but for sums",
     )
     settings: DPOPSettings = DPOPSettings()

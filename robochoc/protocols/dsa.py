@@ -36,7 +36,7 @@ from typing import Literal
 
 from robochoc.message import Message
 from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, CycleSettings, Value, gain, said
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 
 
 class DSASettings(CycleSettings, frozen=True):
@@ -57,6 +57,7 @@ class DSA(CycleProtocol):
     messages = Value
     settings: DSASettings = DSASettings()
     traits = Traits(
+        concludes=ENDS_WITH_PROOF,
         paper="Fitzpatrick & Meertens 2001; Zhang, Wang, Xing, Wittenburg 2005",
         complete=False,
         costs=True,

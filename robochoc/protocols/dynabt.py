@@ -29,7 +29,7 @@ from robochoc.protocols.abt import ABT, AddLink, Ok
 from robochoc.protocols.nogood import NOTHING, Explanation, NogoodStore
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import DynamicProtocol
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Void, domain_key
 
@@ -44,7 +44,12 @@ class DynABT(ABT, DynamicProtocol):
     """One agent of DynABT. Beside ABT's state: `proof`, the explanation of the empty nogood it has derived."""
 
     messages = Ok | Nogood | AddLink
-    traits = Traits(paper="Omomowo, Arana, Ahriz 2008", dynamic=True, privacy="constraints of lower robots")
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Omomowo, Arana, Ahriz 2008",
+        dynamic=True,
+        privacy="constraints of lower robots",
+    )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

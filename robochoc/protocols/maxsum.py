@@ -49,7 +49,7 @@ from robochoc.problem import INFINITE
 from robochoc.protocols.cycles import CycleProtocol, CycleSettings, Domain
 from robochoc.protocols.maxsum_factor import Factor, Row
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 
 
@@ -89,6 +89,7 @@ class MaxSum(CycleProtocol):
     messages = Domain | R | Q
     settings: MaxSumSettings = MaxSumSettings()
     traits = Traits(
+        concludes=ENDS_WITH_PROOF,
         paper="Farinelli, Rogers, Petcu, Jennings 2008",
         complete=False,
         costs=True,

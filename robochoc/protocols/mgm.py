@@ -32,7 +32,7 @@ from collections.abc import Mapping
 from robochoc import message as wire
 from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, Value, gain, said
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import Burden, LocalProblem
 
 
@@ -78,6 +78,7 @@ class MGM(Gainers):
 
     messages = Value | Gain
     traits = Traits(
+        concludes=ENDS_WITH_PROOF,
         paper="Maheswaran, Pearce, Tambe 2004",
         complete=False,
         costs=True,

@@ -40,7 +40,7 @@ from robochoc import message as wire
 from robochoc.protocols.cycles import NO_GAIN, CycleSettings, Domain, Value, gain, said
 from robochoc.protocols.mgm import Gain, Gainers
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import Burden, LocalProblem
 
 Gains = list[list[tuple[int, int | float]]]
@@ -99,6 +99,7 @@ class MGM2(Gainers):
     messages = Domain | Value | Offer | Accept | Reject | Gain | Go
     settings: MGM2Settings = MGM2Settings()
     traits = Traits(
+        concludes=ENDS_WITH_PROOF,
         paper="Maheswaran, Pearce, Tambe 2004",
         complete=False,
         costs=True,

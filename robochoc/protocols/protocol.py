@@ -33,7 +33,7 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 NO_SETTINGS = Settings()
 
 
-class Said(tuple[str, Message]):
+class Said(tuple[str, Message]):  # noqa: SLOT001 - no subclass of tuple can have slots with anything in them
     """The receiver and the message, of what was said.
 
     `checks` is how many constraint checks the speaker had done by then: from it the host makes the clock that the
@@ -84,7 +84,10 @@ class Protocol(ABC):
         self.outbox.append(said)
 
     def conclude(self, verdict: Verdict) -> None:
-        """End the search of the whole team with `verdict`."""
+        """End the search of the whole team with `verdict`, one of those in `traits.concludes`; else `ValueError`."""
+        fault = self.traits.fault_of_conclusion(verdict)
+        if fault:
+            raise ValueError(fault)
         self.verdict = verdict
 
     @property

@@ -22,7 +22,7 @@ from robochoc.message import Message, Value
 from robochoc.outcome import Verdict
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_EITHER, Traits
 from robochoc.solver.compiled import LocalProblem
 
 
@@ -41,7 +41,10 @@ class SBT(Protocol):
 
     messages = CPA | Backtrack
     traits = Traits(
-        paper="Yokoo et al. 1992, 1998; Zivan & Meisels 2003", synchronous=True, privacy="constraints of lower robots"
+        concludes=ENDS_WITH_EITHER,
+        paper="Yokoo et al. 1992, 1998; Zivan & Meisels 2003",
+        synchronous=True,
+        privacy="constraints of lower robots",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

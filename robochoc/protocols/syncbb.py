@@ -34,7 +34,7 @@ from robochoc.outcome import Verdict
 from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.traits import Traits
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 
 Cost = int | float
@@ -73,7 +73,13 @@ class SyncBB(Protocol):
     """
 
     messages = Path | Backtrack | Terminate
-    traits = Traits(paper="Hirayama & Yokoo 1997", synchronous=True, costs=True, privacy="constraints of lower robots")
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Hirayama & Yokoo 1997",
+        synchronous=True,
+        costs=True,
+        privacy="constraints of lower robots",
+    )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

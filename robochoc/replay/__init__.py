@@ -1,7 +1,19 @@
 """Playing a recorded run again: the same protocol objects, the same packets, and what comes of them."""
 
 from robochoc.replay.cast import CannotReplay, Means
+from robochoc.replay.ending import Contradiction
 from robochoc.replay.insight import Choice, State, states_of
 from robochoc.replay.replay import Difference, Replayed, Stopped, replay
 
-__all__ = ["CannotReplay", "Choice", "Difference", "Means", "Replayed", "State", "Stopped", "replay", "states_of"]
+__all__ = [
+    "CannotReplay",
+    "Choice",
+    "Contradiction",
+    "Difference",
+    "Means",
+    "Replayed",
+    "State",
+    "Stopped",
+    "replay",
+    "states_of",
+]

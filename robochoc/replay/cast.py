@@ -69,7 +69,7 @@ class Means(NamedTuple):
 class Ensemble(NamedTuple):
     """The robots of one run, ready to begin: the protocol, their hosts, and what each of them knows.
 
-    Those in `mindful` go on with what they found out in the epoch before.
+    Those in `mindful` go on with what they found out in the epoch before. `compiled` is what they were made of.
     """
 
     protocol: type[Protocol]
@@ -77,6 +77,7 @@ class Ensemble(NamedTuple):
     parts: Mapping[str, Part]
     quiet: bool
     mindful: Collection[str]
+    compiled: CompiledTeam
 
 
 class Cast:
@@ -110,7 +111,8 @@ class Cast:
         self._lost.update(event.robot for event in run.events if isinstance(event, Lost))
         kept = issubclass(protocol, DynamicProtocol)
         mindful = [name for name in parts if kept and name in before and name not in epoch.fresh]
-        return Ensemble(protocol, self._hosts, parts, run.given is None or run.given.quiet, mindful)
+        quiet = run.given is None or run.given.quiet
+        return Ensemble(protocol, self._hosts, parts, quiet, mindful, epoch.compiled)
 
     def _protocol(self, run: Run) -> type[Protocol]:
         """The class that the run names; of a master's journal, the header's."""

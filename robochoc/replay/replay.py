@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -17,12 +17,13 @@ import msgspec
 from robochoc.communication.host import Host
 from robochoc.communication.run_result import Progress
 from robochoc.message import Envelope, Message
-from robochoc.observers.events import AnyEvent, Event, Received, Sent
+from robochoc.observers.events import AnyEvent, Event, Received, Sent, Settled
 from robochoc.observers.journal import Header, Journal
 from robochoc.observers.journal_entries import STAMPED_LATE
 from robochoc.protocols.protocol import Said
 from robochoc.replay.cast import Cast, Ensemble, Means
 from robochoc.replay.channels import Channels, Words
+from robochoc.replay.ending import Contradiction, Played, contradictions, played
 from robochoc.replay.steps import RobotEvent, Run, Step, runs_of, steps_of
 
 SIMULATED = "simulator"
@@ -65,8 +66,9 @@ class Replayed:
     """What a replay has come to.
 
     `steps` and `messages` (sent) are those that were played and found the same; `unfinished` steps are there in part
-    only, and were compared up to there. `damage` is why the journal ends early (None: it does not), and `ended`
-    whether it says how the run has ended.
+    only, and were compared up to there. `damage` is why the journal ends early (None: it does not); with `truncated`
+    only its end is missing, else it was altered there. `ended`: it says how the run has ended. `contradictions` are
+    what header and outcome claim and the steps do not bear out.
     """
 
     runs: int
@@ -78,11 +80,18 @@ class Replayed:
     stopped: tuple[Stopped, ...]
     damage: str | None
     ended: bool
+    contradictions: tuple[Contradiction, ...] = ()
+    truncated: bool = False
 
     @property
     def identical(self) -> bool:
-        """Whether all that could be played was the same."""
-        return self.difference is None
+        """Whether something was played, and all of it was the same."""
+        return self.steps > 0 and not self.differs
+
+    @property
+    def differs(self) -> bool:
+        """Whether anything was otherwise: a step, or what the journal claims beside its steps."""
+        return self.difference is not None or bool(self.contradictions)
 
 
 class SaysNoEnd(Exception):  # noqa: N818 - named for what happens
@@ -256,7 +265,15 @@ class Scene:
 
 def _as_it_was_told(event: AnyEvent) -> int:
     """Where an event stood in its step in the first version of journals: decisions came before words."""
-    return 0 if isinstance(event, Received) else 2 if isinstance(event, Sent) else 3 if isinstance(event, Settled) else 1
+    match event:
+        case Received():
+            return 0
+        case Sent():
+            return 2
+        case Settled():
+            return 3
+        case _:
+            return 1
 
 
 class _Replay:
@@ -270,6 +287,7 @@ class _Replay:
         self._counts: dict[str, int] = {}
         self._steps = self._messages = self._unfinished = self._runs = 0
         self._stopped: list[Stopped] = []
+        self._played: list[Played] = []
         self._gone: set[str] = set()
         """Robots of which it is not known what they have in mind."""
 
@@ -283,6 +301,11 @@ class _Replay:
             difference = self._run(Scene(run, ensemble, self._journal.header))
             if difference:
                 break
+            self._played.append(played(run, ensemble, self._journal.outcome))
+        found: Iterable[Contradiction] = ()
+        if difference is None:
+            whole = not (self._stopped or self._unfinished or self._journal.damage)
+            found = contradictions(self._journal, self._played, whole=whole)
         return Replayed(
             runs=self._runs,
             robots=len(self._counts),
@@ -291,8 +314,10 @@ class _Replay:
             unfinished=self._unfinished,
             difference=difference,
             stopped=tuple(self._stopped),
-            damage=getattr(self._journal, "damage", None),
+            damage=self._journal.damage,
             ended=self._journal.outcome is not None,
+            contradictions=tuple(found),
+            truncated=self._journal.truncated,
         )
 
     def _run(self, scene: Scene) -> Difference | None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import cast
 
 from robochoc.entry_points import EntryPoint
+from robochoc.files import resolved
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.installed import loaded, missing, named
 from robochoc.ros.sink import Sink, SinkFailed
@@ -42,9 +43,12 @@ def open_source(text: str) -> Source:
 
 
 def place_of(text: str) -> Path | str:
-    """What `text` names, the same however it is spelled: the file of a recording, else `text` itself."""
+    """What `text` names, the same however it is spelled: the file of a recording, else `text` itself.
+
+    Raises `OSError` where symbolic links lead in a circle.
+    """
     name, place = _parts(text)
-    return Path(place).resolve() if place and name in _ENDINGS.values() else text
+    return resolved(Path(place)) if place and name in _ENDINGS.values() else text
 
 
 def _parts(text: str) -> tuple[str, str]:

@@ -159,7 +159,8 @@ class AceProcess:
             raise SolverLost("the constraint solver stopped before it had seen everything")
         numbers = array("i")
         numbers.frombytes(word.solutions)
-        return question.answered(word.found, complete=word.complete, solutions=question.rows(numbers), means=Means.ACE)
+        rows = sorted(question.rows(numbers))  # whoever has found them, solutions are in the same order
+        return question.answered(word.found, complete=word.complete, solutions=rows, means=Means.ACE)
 
     def give_up(self) -> SolverTimeout:
         """End the process: there is no time left for the task in hand. What it has found so far goes with it."""

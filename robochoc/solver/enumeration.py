@@ -22,7 +22,7 @@ STEPS_BEFORE_ACE = 1_500_000
 """So many steps more all tasks may take together before ACE is started: about as long as it takes to start."""
 
 ROWS_A_STEP = 256
-"""A step looks at one value in a table of so many rows; in a longer table that takes more steps."""
+"""A step looks at one value in a table of so many rows; in a longer table, or a wider domain, that takes more."""
 PLACES_A_STEP = 4
 """At every node a step copies what is left of so many domains and tables. That bounds the memory, too."""
 
@@ -49,7 +49,7 @@ class Budget:
 class Found(NamedTuple):
     """How many solutions there are, whether there are no others, and (unless only counted) which, in order."""
 
-    count: int
+    number: int
     complete: bool
     solutions: list[Codes]
 
@@ -87,6 +87,7 @@ class _Search:
 
     def __init__(self, network: Network, budget: Budget) -> None:
         self._budget = budget
+        budget.spend(sum(len(domain) * (1 + len(domain) // ROWS_A_STEP) for domain in network.domains))
         self._code = [{1 << index: code for index, code in enumerate(domain)} for domain in network.domains]
         self._bit = [{code: 1 << index for index, code in enumerate(domain)} for domain in network.domains]
         self._looking: list[list[tuple[int, int]]] = [[] for _ in network.domains]

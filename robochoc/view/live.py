@@ -1,7 +1,7 @@
 """The scene in meshcat's live viewer: the page from a server of our own, the commands over its WebSocket.
 
 meshcat's server listens on every interface, with a zmq socket beside it, and outlives its parent. This one is the
-calling thread itself, on the loopback interface only (`loopback.py`).
+calling thread itself, on the loopback interface only, below a path that cannot be guessed (`loopback.py`).
 """
 
 from __future__ import annotations
@@ -11,10 +11,9 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from tornado.web import Application
-from tornado.websocket import WebSocketHandler
 
-from robochoc.view.address import listening, url_of
-from robochoc.view.loopback import FixedPage, application, open_in_browser, served
+from robochoc.view.address import listening, secret_path, url_of
+from robochoc.view.loopback import SecretPage, SecretSocket, application, in_browser, served
 from robochoc.view.page import live_page
 from robochoc.view.scene import Scene
 from robochoc.view.stage import commands
@@ -33,33 +32,31 @@ def serve(
 
 async def _serve(scene: Scene, port: int, ready: Callable[[str], None] | None, *, open_browser: bool) -> None:
     with listening(port) as here:
-        url = url_of(here)
-        async with served(_application(scene, here.getsockname()[1]), here):
+        secret = secret_path()
+        url = url_of(here, f"{secret}/")
+        async with served(_application(scene, here.getsockname()[1], secret), here):
             if ready:
                 ready(url)
-            if open_browser:
-                await open_in_browser(url)
-            await asyncio.Event().wait()
+            async with in_browser(url, wanted=open_browser):
+                await asyncio.Event().wait()
 
 
-def _application(scene: Scene, port: int) -> Application:
+def _application(scene: Scene, port: int, secret: str) -> Application:
     return application(
         [
-            (r"/", FixedPage, {"page": live_page(scene, port)}),
-            (r"/commands", _Commands, {"commands": commands(scene)}),
+            (r"/([^/]*)/", SecretPage, {"secret": secret, "page": live_page(scene, port)}),
+            (r"/([^/]*)/commands", _Commands, {"secret": secret, "commands": commands(scene)}),
         ]
     )
 
 
-class _Commands(WebSocketHandler):
-    """Sends each browser everything from the start; what browsers say is ignored."""
+class _Commands(SecretSocket):
+    """Sends each browser everything from the start."""
 
-    def initialize(self, commands: list[bytes]) -> None:
+    def initialize(self, secret: str, commands: list[bytes]) -> None:
+        self.secret = secret
         self.commands = commands
 
     def open(self, *_: str) -> None:
         for command in self.commands:
             self.write_message(command, binary=True)
-
-    def on_message(self, message: str | bytes) -> None:
-        del message

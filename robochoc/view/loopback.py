@@ -1,13 +1,14 @@
 """A web server of this machine's own, for pages of ours.
 
-It listens on the loopback interface only, in the calling thread, and ends with it. Other sites in the same browser
-get nothing from it: a Host that is not this machine's (DNS rebinding) is not found, and tornado refuses a WebSocket
-of another Origin.
+It listens on the loopback interface only, in the calling thread, and ends with it. Everything lives below a path that
+cannot be guessed, as others may use this machine too. Other sites in the same browser get nothing from it: a Host that
+is not this machine's (DNS rebinding) is not found, and tornado refuses a WebSocket of another Origin.
 """
 
 from __future__ import annotations
 
 import asyncio
+import hmac
 import webbrowser
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
@@ -15,7 +16,10 @@ from socket import socket
 from typing import Any
 
 from tornado.httpserver import HTTPServer
-from tornado.web import Application, RequestHandler
+from tornado.web import Application, HTTPError, RequestHandler
+from tornado.websocket import WebSocketHandler
+
+from robochoc.view.redirect import RedirectFile
 
 _HOSTS = r"(127\.0\.0\.1|localhost)$"
 _LONGEST_MESSAGE_BYTES = 1024
@@ -46,20 +50,85 @@ async def served(application: Application, listening: socket) -> AsyncIterator[N
         await server.close_all_connections()
 
 
-async def open_in_browser(url: str) -> None:
-    """Ask the user's browser to show `url`. In a thread: a browser for the terminal returns when it is closed."""
-    await asyncio.to_thread(webbrowser.open, url)
+@asynccontextmanager
+async def in_browser(url: str, *, wanted: bool) -> AsyncIterator[None]:
+    """Ask the user's browser to show `url`, if that is `wanted`; its command line does not have the secret path.
+
+    In a thread: a browser for the terminal returns when it is closed.
+    """
+    if not wanted:
+        yield
+        return
+    with RedirectFile(url) as redirect:
+        await asyncio.to_thread(webbrowser.open, redirect.url)
+        yield
 
 
-class FixedPage(RequestHandler):
-    """A page that does not change, and is not kept: the next server at this port is another."""
+def check_secret(given: str, secret: str) -> None:
+    """Raise `HTTPError` 404 unless the path `given` is the `secret` one; how long it takes tells nothing."""
+    if not hmac.compare_digest(given.encode(), secret.encode()):
+        raise HTTPError(404)
 
-    def initialize(self, page: bytes) -> None:
+
+class SecretHandler(RequestHandler):
+    """Answers those who know the secret path, the first part of the URL's, and no page of another site.
+
+    Nothing is kept by browsers: the next server at this port is another.
+    """
+
+    secret: str
+
+    def prepare(self) -> None:
+        """Refuse everybody else."""
+        check_secret(self.path_args[0], self.secret)
+        origin = self.request.headers.get("Origin")
+        if origin is not None and origin != f"http://{self.request.host}":
+            raise HTTPError(403)
+
+    def set_default_headers(self) -> None:
+        """Nothing is kept, framed, or told to other sites."""
+        for name, value in (
+            ("Cache-Control", "no-store"),
+            ("Referrer-Policy", "no-referrer"),
+            ("X-Content-Type-Options", "nosniff"),
+            ("X-Frame-Options", "DENY"),
+            ("Cross-Origin-Resource-Policy", "same-origin"),
+            ("Cross-Origin-Opener-Policy", "same-origin"),
+        ):
+            self.set_header(name, value)
+
+    def compute_etag(self) -> None:
+        """None: nothing is kept, so nothing is compared."""
+
+    def write_error(self, status_code: int, **_: Any) -> None:  # noqa: ANN401 - tornado's signature
+        """Say what is wrong in one line of text."""
+        self.set_header("Content-Type", "text/plain; charset=utf-8")
+        self.finish(f"{status_code}: {self._reason}")
+
+
+class SecretPage(SecretHandler):
+    """A page that does not change."""
+
+    def initialize(self, secret: str, page: bytes) -> None:
         """`page` is HTML, UTF-8."""
+        self.secret = secret
         self.page = page
 
-    def get(self) -> None:
+    def get(self, _secret: str) -> None:
         """Give it."""
         self.set_header("Content-Type", "text/html; charset=utf-8")
-        self.set_header("Cache-Control", "no-store")
         self.write(self.page)
+
+
+class SecretSocket(WebSocketHandler):
+    """A WebSocket for those who know the secret path; what browsers say is ignored."""
+
+    secret: str
+
+    def prepare(self) -> None:
+        """Refuse everybody else."""
+        check_secret(self.path_args[0], self.secret)
+
+    def on_message(self, message: str | bytes) -> None:
+        """Nothing is done."""
+        del message

@@ -172,7 +172,7 @@ try {
   if (commands) {
     for (const command of commands.split("\n"))
       viewer.handle_command_bytearray(Uint8Array.from(atob(command), (sign) => sign.charCodeAt(0)));
-  } else viewer.connect("ws://" + location.host + "/commands");
+  } else viewer.connect("ws://" + location.host + location.pathname + "commands");
   viewer.set_3d_pane_size();
   fit();
   requestAnimationFrame(frame);

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+PATIENCE_S = 10.0
+"""How long a robot may be away."""
 LEASE_MS = 10_000
 """How long a link may be silent. TCP survives shorter outages by itself."""
 
@@ -21,7 +23,7 @@ class Conditions:
 
     filters: tuple[str, ...] = ()
     private: bool = False
-    patience_s: float = 10.0
+    patience_s: float = PATIENCE_S
     lease_ms: int = LEASE_MS
     survive: bool = False
     protocol: str = ""

@@ -67,9 +67,9 @@ class DirectoryFacilitator:
         """`requester` asks for something, of the directory or of the master. Raises `TooOften`."""
         now = time.time()
         recent = [t for t in self._asked.get(requester, []) if now - t < 1]
-        self._asked[requester] = [*recent, now]
         if len(recent) >= ASKED_AT_MOST:
             raise TooOften(f"more than {ASKED_AT_MOST} requests a second")
+        self._asked[requester] = [*recent, now]
 
     def answer(self, requester: str, ask: Ask) -> Told:
         """The answer to what `requester` asks in SL0; `notices` has what it subscribes to."""

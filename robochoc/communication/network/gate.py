@@ -9,6 +9,7 @@ from types import MappingProxyType
 from robochoc.authority.admission import Admission
 from robochoc.authority.identity import Identity
 from robochoc.authority.registry import Right, Role
+from robochoc.communication.network.quotas import OF_A_ROBOT, OF_AN_OBSERVER, Share
 from robochoc.communication.network.router import RefusalObserver, Router
 
 Reach = Mapping[str, tuple[str, ...]]
@@ -33,6 +34,8 @@ class Gate:
         self._admission = admission
         self._router = Router(endpoint, identity, refused, lease_ms)
         self._ways = ways
+        self.admitted: tuple[str, ...] = ()
+        """Who may connect, as the router's rules have it."""
         self.sniffable = False
         """Whether those who may sniff may have the journal of this run."""
         self._rules: tuple[dict[str, tuple[str, ...]], tuple[str, ...] | None] | None = None
@@ -59,6 +62,7 @@ class Gate:
         rules = admitted, sniffers if self.sniffable else None
         if rules != self._rules:
             self._rules = rules
+            self.admitted = tuple(admitted)
             self._router.open(*rules)
 
     def may_sniff(self, name: str) -> bool:
@@ -76,6 +80,10 @@ class Gate:
     def is_robot(self, name: str) -> bool:
         """Whether `name` may take part, and not only ask."""
         return name in self._admission.names(Role.ROBOT)
+
+    def share_of(self, name: str) -> Share:
+        """What `name` may send to the master."""
+        return OF_A_ROBOT if self.is_robot(name) else OF_AN_OBSERVER
 
     def revoked(self, names: Collection[str]) -> list[str]:
         """Those of `names` that are to be turned away now."""

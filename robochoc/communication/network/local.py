@@ -28,7 +28,7 @@ from robochoc.communication.network.router import RouterFailed
 from robochoc.communication.robot_link import fate_of
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import Epoch, Session
-from robochoc.communication.system import signals_held
+from robochoc.communication.system import require_descriptors, signals_held
 from robochoc.observers.events import Observer
 from robochoc.problem import Team
 from robochoc.protocols.protocol import Protocol
@@ -40,6 +40,8 @@ LOOPBACK = "127.0.0.1"
 GRACE_S = 2.0
 """How long robots that were sent home get to end by themselves."""
 _ATTEMPTS = 5
+_DESCRIPTORS, _DESCRIPTORS_PER_ROBOT = 32, 2
+"""Open files: of the master's session, the router's pipes and the fork server, and of each robot's process."""
 _PRELOAD = ("__main__", "robochoc.communication.network.robot_process")
 """What the fork server imports once for all robots; without the program's own file each of them would."""
 _OURS = "robochoc."
@@ -74,6 +76,7 @@ class LocalNetwork(Session):
         self._household = Household(team.order)
         self._waiting = list(self.compiled.robots.values())
         watched = observer is not None
+        require_descriptors(_DESCRIPTORS + _DESCRIPTORS_PER_ROBOT * len(team.robots))
         self._context = _fork_server(protocol)
         profiles = {robot.name: profile_of(robot) for robot in team.robots}
         ways = reach(profiles, beyond=protocol.traits.beyond)

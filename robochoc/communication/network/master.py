@@ -4,7 +4,7 @@ It runs the router and is a participant like others. It registers robots (never 
 when all are there, gives each its task, orders the start, finds out by four counters when all is quiet, collects what
 was decided, has every robot check its own constraints against it, and sends everybody home.
 
-Whatever dies is noticed: a robot whose liveliness token has been gone for longer than the patience is lost.
+A robot whose liveliness token has been gone for longer than the patience is lost.
 """
 
 from __future__ import annotations
@@ -23,19 +23,23 @@ from robochoc.communication.control import Events, Failed, OfEpoch, Pause, Wave
 from robochoc.communication.network.access import ALL, journal_key
 from robochoc.communication.network.chronicle import Chronicle
 from robochoc.communication.network.conditions import Conditions
-from robochoc.communication.network.facilitator import DirectoryFacilitator, TooOften
+from robochoc.communication.network.facilitator import DirectoryFacilitator
+from robochoc.communication.network.gaps import TO_MASTER, Gaps
 from robochoc.communication.network.gate import Gate
+from robochoc.communication.network.inbox import Arrived, Inbox, Missed, Presence, Woken
 from robochoc.communication.network.letters import MASTER, Letters, Refused
 from robochoc.communication.network.members import Member, Members, NotTaken
-from robochoc.communication.network.post import Arrived, Missed, Post, Presence, Woken
+from robochoc.communication.network.post import Post
 from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.publication import Publication, PublicationDesk
+from robochoc.communication.network.requests import Requests
 from robochoc.communication.network.router import Refusal
 from robochoc.communication.network.tally import Tally
 from robochoc.communication.network.words import (
     Ask,
     Bye,
     Denied,
+    Gap,
     Joined,
     Judge,
     Leave,
@@ -55,6 +59,7 @@ from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import over
 from robochoc.observers.events import Observer
 from robochoc.outcome import Verdict
+from robochoc.plain_text import LONGEST_REASON, on_one_line
 from robochoc.protocols.traits import Traits
 from robochoc.solver.encoding import TooMuch, Unsupported
 from robochoc.solver.part import Brief
@@ -88,26 +93,27 @@ class Master:
         self.run = secrets.token_hex(8)
         self.members = members
         self.tally = Tally()
-        self._identity = identity
-        self._conditions = conditions
-        self._watched = watched
-        self._progress = progress
+        self._identity, self._conditions = identity, conditions
+        self._watched, self._progress = watched, progress
+        self._shown = self._looked = self._read_registry = 0.0
         self._began = time.monotonic()
         self._letters = Letters(MASTER, self.run)
         self._facilitator = DirectoryFacilitator(endpoint, conditions.protocol)
         self.chronicle = Chronicle(observer)
         self._refuse = self.chronicle.refuse
-        told = self._note_refusal if observer else None
-        self._gate = Gate(admission, identity, conditions.listen or endpoint, told, conditions.lease_ms, members.ways)
+        told, listen = self._note_refusal if observer else None, conditions.listen or endpoint
+        self._gate = Gate(admission, identity, listen, told, conditions.lease_ms, members.ways)
         self._desk = PublicationDesk(self.run, self._gate.may_sniff, self.chronicle)
+        self._requests = Requests(self._desk, self._facilitator, self._tell, self._refuse)
         self._dead: dict[str, str] = {}
-        self._shown = self._looked = self._read_registry = 0.0
+        self._gaps = Gaps(members, self._refuse, self._lose)
 
     def __enter__(self) -> Self:
         """Listen. Raises `RouterFailed` and `CannotConnect`."""
         try:
             self._gate.open()
-            self._post = Post(self.endpoint, self._identity, lease_ms=self._conditions.lease_ms)
+            inbox, lease_ms = Inbox(self._gate.share_of), self._conditions.lease_ms
+            self._post = Post(self.endpoint, self._identity, heard=self._gate.admitted, inbox=inbox, lease_ms=lease_ms)
             if self._desk.publication:
                 self._post.answer(journal_key(ALL), self._desk.answer)
         except BaseException:
@@ -122,7 +128,7 @@ class Master:
             self._gate.close()
 
     def publish(self, publication: Publication) -> None:
-        """Give what is written to `publication`, the journal of this run, to those who may sniff. Before it listens."""
+        """Give what is written to `publication`, this run's journal, to those who may sniff. Before it listens."""
         publication.run = self.run
         self._desk.publication = publication
         self._gate.sniffable = True
@@ -158,21 +164,22 @@ class Master:
         """
         began = time.monotonic()
         self.chronicle.begin()
+        self._gaps.begin()
         deadline = None if timeout is None else began + timeout
         self._gate.open_ways(self.members.reach(beyond=traits.beyond))
-        tally = self.tally = Tally(self.tally.epoch + 1, self.members.order, messages)
+        tally = self.tally = Tally(self.tally.epoch + 1, self.members.order, messages, self.members.declared(traits))
         for name, task in self.members.tasks(tally.epoch, protocol, traits, brief).items():
             self._tell(name, task)
         self._wait_until(lambda: tally.broken_off or tally.ready, deadline)
         if tally.verdict is None and not tally.broken_off and not over(deadline):
             self._tell_all(Search(tally.epoch))
             self.chronicle.begin()
-            tally.searching = True
+            tally.ordered = tally.searching = True
             self._wait_until(lambda: tally.verdict is not None or tally.broken_off, deadline)
             tally.searching = False
-        wall_s = time.monotonic() - began
+        tally.note_end(time.monotonic() - began, in_time=not over(deadline))
         self._collect(tally)
-        return tally.result(wall_s)
+        return tally.result(tally.lasted_s)
 
     def checked(self, assignments: Mapping[str, Mapping[str, int]]) -> tuple[bool, float]:
         """Have every robot hold its constraints against what was decided: whether all hold, and the sum of the costs.
@@ -230,8 +237,8 @@ class Master:
                     self._read(sender, content)
                 case Presence(name, there):
                     self._note_presence(name, there=there)
-                case Missed(letters):
-                    raise RobotsLost({MASTER: f"{letters} letters to it were lost for good"})
+                case Missed():
+                    self._gaps.at_the_master(item)
                 case Woken():
                     return
             if time.monotonic() >= until:
@@ -260,8 +267,9 @@ class Master:
         """Begin a wave when it could show that all is quiet, or when somebody waits for news."""
         counters = tally.counters
         if missing := tally.missing(now, self._conditions.patience_s):
-            raise RobotsLost({MASTER: f"{missing} messages between robots were lost for good"})
-        if counters.quiescent:
+            if not self._gaps.explain_missing():
+                tally.stuck = f"{missing:,} messages between robots were lost for good"
+        elif counters.quiescent:
             tally.verdict = tally.verdict or Verdict.SOLUTION
         elif tally.wave_due:
             self._tell_all(Wave(counters.begin_wave()))
@@ -272,11 +280,14 @@ class Master:
                 self._tell_all(Wave(counters.begin_wave()))
 
     def _collect(self, tally: Tally) -> None:
-        """Say that the search is over, and collect everybody's account."""
+        """Say that the search is over, and collect everybody's account. Raises `RobotsLost` when it was stuck."""
         self._tell_all(Pause())
         self._wait_until(lambda: not tally.silent, time.monotonic() + LAST_WORDS_S)
         for name in tally.silent if tally.verdict is not None else ():
             self._lose(name, "it did not report at the end")
+        doubts = self.chronicle.doubted(tally.doubts_about_counts)
+        if tally.stuck:
+            raise RobotsLost({MASTER: tally.stuck + doubts})
 
     # Letters
 
@@ -291,26 +302,24 @@ class Master:
         try:
             opened = self._letters.read(sender, content)
         except Refused as refused:
-            self._refuse(sender, "a letter to the master", str(refused))
+            self._refuse(sender, TO_MASTER, str(refused))
             return
         self._letters.take(sender, opened.number)
+        member = self.members.robots.get(sender)
         match opened.word:
             case Register(profile, visit):
                 self._register(sender, profile, visit)
             case Ask() | Sniff():
-                self._answer(sender, opened.word)
-            case _:
-                member = self.members.robots.get(sender)
-                if member is None:
-                    self._refuse(sender, "a letter to the master", "it is not registered")
-                else:
-                    self._hear(sender, member, opened.word)
+                self._requests.answer(sender, opened.word)
+            case _ if member is None:
+                self._refuse(sender, TO_MASTER, "it is not registered")
+            case word:
+                self._hear(sender, member, word)
 
     def _hear(self, name: str, member: Member, word: Word) -> None:
         match word:
             case OfEpoch():
-                if not self.tally.hear(name, word):
-                    self._refuse(name, "a letter to the master", f"{type(word).__name__} says what cannot be")
+                self._note_failure(name, self.tally.hear(name, word))
             case Joined(visit, card):
                 member.join(visit, card)
             case Shown(variables):
@@ -321,6 +330,8 @@ class Master:
                 self._note_failure(name, why, (TooMuch if elsewhere else Unsupported) if unsupported else None)
             case Objection(who, what, why):
                 self._refuse(who, what, f"{why} ({name} says so)")
+            case Gap():
+                self._gaps.between(name, word)
             case Bye():
                 member.left = True
             case _:
@@ -328,19 +339,11 @@ class Master:
 
     def _note_failure(self, name: str, why: str, refusal: type[Unsupported] | None = None) -> None:
         """The robot cannot go on (if there is a `why`); a `refusal` ends the run."""
+        why = on_one_line(why, LONGEST_REASON)
         if refusal:
             raise refusal(why)
         if why:
             self._lose(name, why, for_good=True)
-
-    def _answer(self, sender: str, word: Ask | Sniff) -> None:
-        try:
-            self._facilitator.count(sender)
-        except TooOften as often:
-            self._refuse(sender, "ask the Directory Facilitator", str(often))
-            return
-        told = self._desk.welcome(sender, word) if isinstance(word, Sniff) else self._facilitator.answer(sender, word)
-        self._tell(sender, told)
 
     # Who is there
 
@@ -358,16 +361,15 @@ class Master:
                 self._refuse(name, "be in the directory", unfit)
             self.chronicle.registered(name)
             if self._progress:
-                said = f"{len(self.members.robots)} robots registered"
-                self._progress(Progress(0, time.monotonic() - self._began, said))
+                elapsed_s, number = time.monotonic() - self._began, len(self.members.robots)
+                self._progress(Progress(0, elapsed_s, f"{number} robots registered"))
         self._welcome(name, visit)
 
     def _welcome(self, name: str, visit: str) -> None:
         self._tell(name, Welcome(visit, self.run, self._conditions.filters, self._watched, self._conditions.private))
 
     def _note_presence(self, name: str, *, there: bool) -> None:
-        member = self.members.robots.get(name)
-        if member:
+        if member := self.members.robots.get(name):
             member.note_presence(there=there)
 
     def _follow_registry(self) -> None:
@@ -379,6 +381,7 @@ class Master:
                 self._gate.follow()
                 self._lose(name, "its certificate was revoked")
         self._gate.follow()
+        self._post.hear(self._gate.admitted)
 
     def _lose(self, name: str, why: str, *, for_good: bool = False) -> None:
         """The robot is lost: before the search it may come back, unless `for_good`; in it that ends the run."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from robochoc.communication.network.access import ALL
+from robochoc.communication.network.plausibility import Declared
 from robochoc.communication.network.profile import (
     BadProfile,
     Profile,
@@ -172,6 +173,12 @@ class Members:
         """Take in what the robot `name` answers when it is asked for all that is `unseen`; returns what is wrong."""
         member = self.robots[name]
         wanted = self.unseen().get(name, ())
+        owners = self._owners()
+        for variable in variables:
+            if owners.get(variable, name) != name:
+                return f"the variable {variable} is {owners[variable]}'s, and {name}'s too"
+        if not variables.keys() <= {*wanted, *member.asked}:
+            return "it has shown variables that it was not asked for"
         shown = {variable: variables[variable] for variable in wanted if variable in variables}
         try:
             silhouette(member.profile, {**member.also, **shown})
@@ -264,6 +271,15 @@ class Members:
             )
             for name in order
         }
+
+    def declared(self, traits: Traits) -> Declared:
+        """What robots' words in a search are held against."""
+        shown = {
+            name: {variable.name: variable.domain for variable in member.robot.variables}
+            for name, member in self.robots.items()
+        }
+        dearest = {name: member.profile.dearest for name, member in self.robots.items()}
+        return Declared(traits, shown, dearest)
 
     def neighbourhood(self, name: str, values: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
         """Of the decided `values`, by robot, those that all whom `name` may share a constraint with show."""

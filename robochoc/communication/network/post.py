@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from queue import Empty, SimpleQueue
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Self
 
 import zenoh
 import zenoh.ext
@@ -21,7 +21,10 @@ import zenoh.ext
 from robochoc.authority.identity import Identity
 from robochoc.communication.network.access import ALL, letter_key, life_key, name_in
 from robochoc.communication.network.conditions import LEASE_MS
+from robochoc.communication.network.inbox import Arrived, Inbox, Missed, Presence, Woken
+from robochoc.communication.network.letters import MASTER
 from robochoc.communication.network.zenoh_config import config
+from robochoc.communication.system import require_descriptors
 
 RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}
 HEARTBEAT_S = 5.0
@@ -36,35 +39,17 @@ _FIRST_ATTEMPT_S, _LONGEST_ATTEMPT_S = 2.0, 10.0
 """So long are attempts to connect; a busy router may take its time for a handshake."""
 
 
+DESCRIPTORS = 24
+"""Open files that a session may need: threads of zenoh's have some, too."""
+
+
 class CannotConnect(Exception):  # noqa: N818 - named for what happened
     """There is no master at that address, or it does not let us in."""
 
 
-class Arrived(NamedTuple):
-    """A letter from `sender`."""
-
-    sender: str
-    content: bytes
-
-
-class Missed(NamedTuple):
-    """So many `letters` are lost for good, and zenoh cannot say whose."""
-
-    letters: int
-
-
-class Presence(NamedTuple):
-    """`name` is there, or is not any more as far as the router knows."""
-
-    name: str
-    there: bool
-
-
-class Woken(NamedTuple):
-    """Somebody in this process has something new to look at."""
-
-
-Item = Arrived | Missed | Presence | Woken
+TEAM = (MASTER, ALL)
+"""Whom robots hear: the master by a subscriber of its own, and all others."""
+_Subscriber = tuple[zenoh.ext.AdvancedSubscriber[None], zenoh.ext.SampleMissListener[None]]
 Answering = Callable[[str, bytes], bytes | None]
 """The answer to somebody's question; None: it gets none."""
 
@@ -72,6 +57,7 @@ Answering = Callable[[str, bytes], bytes | None]
 class Post:
     """The connection of `identity` with the router at `endpoint` (`HOST:PORT`); a context manager.
 
+    It knows of the lives of those in `watch`, and gets the letters of those in `heard` (more: `hear`) into `inbox`.
     `lease_ms` is how long a silent link counts as alive. Raises `CannotConnect` when there is no connection within
     `patience_s`.
     """
@@ -82,27 +68,33 @@ class Post:
         identity: Identity,
         *,
         watch: Iterable[str] = (ALL,),
+        heard: Iterable[str] = TEAM,
+        inbox: Inbox | None = None,
         patience_s: float = 10.0,
         lease_ms: int = LEASE_MS,
     ) -> None:
         self.name = identity.name
-        self.inbox: SimpleQueue[Item] = SimpleQueue()
+        self.inbox = inbox or Inbox()
         self._publishers: dict[str, zenoh.ext.AdvancedPublisher] = {}
+        self._subscribers: dict[str, _Subscriber] = {}
         self._session = _opened(endpoint, identity, patience_s, lease_ms)
-        self._subscriber = zenoh.ext.declare_advanced_subscriber(
-            self._session,
-            letter_key(self.name, ALL),
-            self._take,
-            history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
-            recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
-            subscriber_detection=True,
-        )
-        self._misses = self._subscriber.sample_miss_listener(self._note_miss)
+        self.hear(heard)
         self._token = self._session.liveliness().declare_token(life_key(self.name))
         self._watchers = [
             self._session.liveliness().declare_subscriber(life_key(name), self._note_presence, history=True)
             for name in watch
         ]
+
+    def hear(self, senders: Iterable[str]) -> None:
+        """From now on take the letters of `senders`, too; what they have written before comes soon.
+
+        Each has a subscriber of its own, for zenoh believes what a packet says of its source and number. In one for
+        all, a sender can use the source of another, whose letters then count as old ones, or as missing. It is dear:
+        the router knows of every pair, so robots hear their neighbours by one (`ALL`) and the master by its own.
+        """
+        for sender in senders:
+            if sender not in self._subscribers:
+                self._subscribers[sender] = self._subscribed(sender)
 
     def send(self, receiver: str, content: bytes) -> None:
         """Put a letter on its way. While the link is down it waits here; afterwards it is sent, or asked for."""
@@ -170,13 +162,40 @@ class Post:
     ) -> None:
         self.close()
 
+    def _subscribed(self, sender: str) -> _Subscriber:
+        """What hears `sender` alone (`ALL`: all that have no subscriber of their own), and that letters are lost.
+
+        zenoh tells of a gap just before the letter behind it, in the same thread (not `indirect`: that would be one of
+        Python's own for each). So a gap is put down to the sender of that letter, whom the router has proven, and not
+        to the source that the packet claims.
+        """
+        gap = 0
+
+        def note_miss(miss: zenoh.ext.Miss) -> None:
+            nonlocal gap
+            gap += miss.nb
+
+        def take(sample: zenoh.Sample) -> None:
+            nonlocal gap
+            lost, gap = gap, 0
+            of = name_in(str(sample.key_expr))
+            if sender == ALL and of in self._subscribers:
+                return
+            if lost:
+                self.inbox.put(Missed(of, lost))
+            self.inbox.put(Arrived(of, sample.payload.to_bytes()))
+
+        subscriber = zenoh.ext.declare_advanced_subscriber(
+            self._session,
+            letter_key(self.name, sender),
+            zenoh.handlers.Callback(take, indirect=False),
+            history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
+            recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+            subscriber_detection=True,
+        )
+        return subscriber, subscriber.sample_miss_listener(zenoh.handlers.Callback(note_miss, indirect=False))
+
     # What zenoh's threads call
-
-    def _take(self, sample: zenoh.Sample) -> None:
-        self.inbox.put(Arrived(name_in(str(sample.key_expr)), sample.payload.to_bytes()))
-
-    def _note_miss(self, miss: zenoh.ext.Miss) -> None:
-        self.inbox.put(Missed(miss.nb))
 
     def _note_presence(self, sample: zenoh.Sample) -> None:
         self.inbox.put(Presence(name_in(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT))
@@ -188,6 +207,7 @@ def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int)
         raise CannotConnect(
             f"{endpoint}: zenoh cannot check whose IPv6 address that is; call the master by a host name"
         )
+    require_descriptors(DESCRIPTORS)
     until = time.monotonic() + patience_s
     attempt_s = _FIRST_ATTEMPT_S
     while True:

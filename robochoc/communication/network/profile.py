@@ -14,7 +14,6 @@ import msgspec
 from robochoc.formats.constraints import is_name
 from robochoc.formats.extension import MAX_VALUES
 from robochoc.problem import (
-    INFINITE,
     Child,
     Constraint,
     CycleError,
@@ -35,6 +34,8 @@ MOST_VARIABLES = 10_000
 LONGEST_NAME = 255
 LARGEST_WEIGHT = 1_000_000
 """As in files."""
+LARGEST_DEAREST = 2.0**80
+"""More than the costs of any file; what it costs all robots to step aside is still a number."""
 
 
 class BadProfile(ValueError):  # noqa: N818 - named for what was found
@@ -127,7 +128,7 @@ def silhouette(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
     strangers = profile.looks_at.keys() - set(profile.children)
     if strangers:  # the master would have them show what is none of its business
         raise BadProfile(f"it looks at variables of {min(strangers)[:LONGEST_NAME]}, which is no child of it")
-    if not (0 <= profile.dearest < INFINITE and 1 <= profile.weight <= LARGEST_WEIGHT):
+    if not (0 <= profile.dearest <= LARGEST_DEAREST and 1 <= profile.weight <= LARGEST_WEIGHT):
         raise BadProfile(f"costs of {profile.dearest:g} and a weight of {profile.weight} cannot be")
     shown = {**profile.variables, **also}
     return Robot(
@@ -201,10 +202,11 @@ def among(robot: Robot, interfaces: Mapping[str, Sequence[str]]) -> Robot:
     def kept(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
         return tuple(constraint for constraint in constraints if known.issuperset(constraint.variables))
 
+    children = (child for child in robot.children if child.name in interfaces)
     return replace(
         robot,
         variables=variables,
         parents=tuple(replace(p, constraints=kept(p.constraints)) for p in robot.parents if p.name in interfaces),
-        children=tuple(replace(c, constraints=kept(c.constraints)) for c in robot.children if c.name in interfaces),
+        children=tuple(replace(c, constraints=kept(c.constraints), copies=kept(c.copies)) for c in children),
         shown=shown,
     )

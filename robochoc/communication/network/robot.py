@@ -12,7 +12,6 @@ import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from queue import Empty
 from typing import NamedTuple
 
@@ -23,8 +22,10 @@ from robochoc.authority.keyring import BadCard, KeyCard, KeyRing, UnknownPeer
 from robochoc.communication.control import Failed, Pause, Wave
 from robochoc.communication.filters import FilterStack, NotGenuine, UnknownFilter, filter_named
 from robochoc.communication.host import BadMessage
+from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
 from robochoc.communication.network.letters import MASTER, Letters, Opened, Refused
-from robochoc.communication.network.post import Arrived, Item, Missed, Post, Presence, Woken
+from robochoc.communication.network.manner import AS_USUAL, Manner
+from robochoc.communication.network.post import Post
 from robochoc.communication.network.profile import among, profile_of, ranges_of
 from robochoc.communication.network.refusals import Refusals
 from robochoc.communication.network.searcher import Searcher, Surroundings
@@ -32,6 +33,7 @@ from robochoc.communication.network.words import (
     Bye,
     Copies,
     Denied,
+    Gap,
     Joined,
     Judge,
     Leave,
@@ -50,9 +52,9 @@ from robochoc.communication.network.words import (
     Word,
 )
 from robochoc.message import Envelope
+from robochoc.plain_text import LONGEST_REASON, on_one_line
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.compiled_team import CompiledRobot, CompileRobot
-from robochoc.solver.domain import compiled_domain
+from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.encoding import TooMuch, Unsupported
 
 IDLE_S = 0.002
@@ -65,6 +67,7 @@ AHEAD_AT_MOST = 100_000
 AT_ONCE = 10_000
 """So many letters at most are one packet."""
 _VISIT_BYTES = 8
+_UNUSABLE = (Refused, NotGenuine, UnknownPeer, BadMessage)
 
 
 class Ending(NamedTuple):
@@ -82,27 +85,6 @@ class _Over(Exception):  # noqa: N818 - not an error: the way out of the loop
         self.failed = failed
 
 
-def _nothing(*_told: object) -> None:
-    """Who is told things that nobody wants to know."""
-
-
-@dataclass(frozen=True)
-class Manner:
-    """How a robot takes part.
-
-    `patience_s` is how long the master may be gone. `sniffed`: the master's observers are to be told of all that the
-    robot does, even if they do not ask for it. `place` is told the robot's place in the priority order, and how many
-    robots there are, before each search; `stage` in a few words how far it is. `compiled` compiles the robot's domain
-    again, should others have to see more of its variables than it knew.
-    """
-
-    patience_s: float = 10.0
-    sniffed: bool = False
-    place: Callable[[int, int], None] = _nothing
-    stage: Callable[[str], None] = _nothing
-    compiled: CompileRobot = compiled_domain
-
-
 class NetworkRobot:
     """The robot `own` at its `post`.
 
@@ -115,7 +97,7 @@ class NetworkRobot:
         identity: Identity,
         post: Post,
         protocol_named: Callable[[str], type[Protocol]],
-        manner: Manner = Manner(),
+        manner: Manner = AS_USUAL,
     ) -> None:
         self._own = own
         self._robot = own.robot
@@ -145,13 +127,16 @@ class NetworkRobot:
             while True:
                 self._turn(self._items())
         except _Over as over:
-            return Ending(over.why, over.failed, self._searcher.assignment if self._searcher else {})
+            return Ending(
+                on_one_line(over.why, LONGEST_REASON), over.failed, self._searcher.assignment if self._searcher else {}
+            )
         except Unsupported as refusal:
-            self._fail(Failed(str(refusal), unsupported=True, elsewhere=isinstance(refusal, TooMuch)))
-            return Ending(str(refusal), failed=True, assignment={})
+            why = on_one_line(str(refusal), LONGEST_REASON)
+            self._fail(Failed(why, unsupported=True, elsewhere=isinstance(refusal, TooMuch)))
+            return Ending(why, failed=True, assignment={})
         except Exception as error:  # noqa: BLE001 - whatever it was, the master has to know
             where = traceback.extract_tb(error.__traceback__)[-1]
-            why = f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"
+            why = on_one_line(f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})", LONGEST_REASON)
             self._fail(Failed(why))
             return Ending(why, failed=True, assignment={})
 
@@ -173,9 +158,11 @@ class NetworkRobot:
             match item:
                 case Arrived(sender, content):
                     self._read(sender, content, packet)
-                case Missed(letters):
-                    raise Unsupported(f"{letters} letters to {self._robot.name} were lost for good")
-                case Presence() | Woken():
+                case Missed(sender, letters) if sender == MASTER:
+                    raise Unsupported(f"{letters:,} letters of the master to {self._robot.name} were lost for good")
+                case Missed(sender, letters) if self._welcome:
+                    self._say(Gap(sender, letters))  # the master finds out whether the run can do without them
+                case Missed() | Presence() | Woken():
                     pass
         if self._searcher:
             self._searcher.take_in(packet)
@@ -193,7 +180,7 @@ class NetworkRobot:
 
     def _look_up(self) -> None:
         """Whether the master can be reached; behind a new router, whether it is the same one, and still takes us."""
-        now, name = time.monotonic(), self._robot.name
+        now = time.monotonic()
         router = self._post.router
         if router:
             self._connected = now
@@ -203,7 +190,9 @@ class NetworkRobot:
         elif now - self._connected > self._manner.patience_s:
             raise _Over(f"the master is gone: no link to it for {self._manner.patience_s:g} s", failed=True)
         if self._unanswered is not None and now - self._unanswered > max(self._manner.patience_s, 2 * REGISTER_AGAIN_S):
-            raise _Over(f"the master does not answer {name}: is it enrolled there, and not revoked?", failed=True)
+            raise _Over(
+                f"the master does not answer {self._robot.name}: is it enrolled there, and not revoked?", failed=True
+            )
 
     # Letters
 
@@ -223,7 +212,7 @@ class NetworkRobot:
         try:
             opened = self._letters.read(sender, content)
             self._use(sender, opened, packet)
-        except (Refused, NotGenuine, UnknownPeer, BadMessage) as refused:
+        except _UNUSABLE as refused:
             self._object(sender, str(refused))
 
     def _use(self, sender: str, opened: Opened, packet: list[Envelope]) -> None:
@@ -361,7 +350,7 @@ class NetworkRobot:
         for sender, opened in ahead:
             try:
                 self._use(sender, opened, [])
-            except (Refused, NotGenuine, UnknownPeer, BadMessage) as refused:
+            except _UNUSABLE as refused:
                 self._object(sender, str(refused))
 
     def _admit(self, cards: tuple[bytes, ...]) -> None:

@@ -12,8 +12,9 @@ from multiprocessing.connection import wait
 from typing import NamedTuple
 
 from robochoc.authority.identity import Identity, IdentityTexts
+from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.post import CannotConnect, Post
-from robochoc.communication.network.robot import Manner, NetworkRobot
+from robochoc.communication.network.robot import NetworkRobot
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
 

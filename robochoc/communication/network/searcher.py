@@ -7,7 +7,8 @@ letters and a host.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import msgspec
@@ -16,12 +17,12 @@ from robochoc.communication.control import Conclusion, Counters, Events, Ready
 from robochoc.communication.host import BadMessage, Host
 from robochoc.communication.network.profile import BadProfile, domain_of
 from robochoc.communication.network.shared import BadShared, SharedRecord, known_of, record_of
-from robochoc.communication.network.words import Account, Checked, Copies, Said, Task, ToMaster
+from robochoc.communication.network.words import Account, Checked, Copies, Exchanged, Judged, Said, Task, ToMaster
 from robochoc.communication.system import own_memory
 from robochoc.message import Envelope
 from robochoc.observers.events import AnyEvent
 from robochoc.outcome import Metrics
-from robochoc.problem import INFINITE, Kind, Model
+from robochoc.problem import INFINITE, Constraint, Kind, Model
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
@@ -65,15 +66,24 @@ class Searcher:
         self._around = around
         self._host: Host | None = None
         self._copies: dict[str, tuple[SharedRecord, ...]] = {}
+        self._learnt: dict[str, list[Constraint]] = {}
         self._early: list[Envelope] = []
         self._events: list[AnyEvent] = []
         self._decode = msgspec.msgpack.Decoder(protocol.messages).decode
         self._began = 0.0
         self._sent = self._received = 0
+        self._sent_to: Counter[str] = Counter()
+        self._received_from: Counter[str] = Counter()
+        self._clocks: dict[str, int] = {}
         self._told: tuple[int, int] | None = None
         self._searching = self._concluded = self._paused = False
         if task.interfaces.get(self._robot.name) != self._robot.interface:  # others would misread its values
             raise Unsupported(f"{self._robot.name} was told what cannot be: that it shows other variables")
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+        return self._robot.name
 
     @property
     def assignment(self) -> dict[str, int]:
@@ -130,16 +140,17 @@ class Searcher:
         if self._around.observed:
             self._host.observe(self._events.append, self._now)
         self._around.place(self._task.order.index(self._robot.name), len(self._task.order))
-        self._conclude(self._host)
         self._around.say(Ready(self.epoch))
 
     def _part(self) -> Part:
         task = self._task
         try:
-            copies = [self._known(sender, record) for sender, told in self._copies.items() for record in told]
+            known = {sender: [self._known(sender, record) for record in told] for sender, told in self._copies.items()}
             domains = {name: domain_of(name, ranges) for name, ranges in task.domains.items()}
         except (BadShared, BadProfile) as bad:
             raise Unsupported(f"{self._robot.name} was told what cannot be: {bad}") from None
+        self._learnt = {sender: [one.constraint for one in told] for sender, told in known.items()}
+        copies = [one for told in known.values() for one in told]
         brief = Brief(task.seed, task.settings, task.aside)
         copied = _sorted(copies, task.order)
         return Part(self._own, task.order, task.interfaces, copied, domains, task.links, task.secretive, brief)
@@ -179,7 +190,12 @@ class Searcher:
             raise BadMessage(f"it is no message of the protocol: {error}") from None
 
     def hear(self, envelope: Envelope) -> bool:
-        """Whether `envelope` belongs into the packet that is being made up; if not, it waits, or comes too late."""
+        """Whether `envelope` belongs into the packet that is being made up; if not, it waits, or comes too late.
+
+        Raises `BadMessage` for one of somebody who takes no part in this search.
+        """
+        if envelope.sender not in self._task.interfaces:
+            raise BadMessage(f"{envelope.sender} takes no part in this search")
         if not self._searching and not self._paused:
             self._early.append(envelope)
         return self._searching
@@ -188,6 +204,9 @@ class Searcher:
         """Give the protocol all messages that wait, unless the search is over. Raises `BadMessage`."""
         if packet and self._host and self._searching:
             self._received += len(packet)
+            for envelope in packet:
+                self._received_from[envelope.sender] += 1
+                self._clocks[envelope.sender] = max(envelope.clock, self._clocks.get(envelope.sender, 0))
             self._send(self._host, self._host.handle(packet))
             if len(self._events) > EVENTS_AT_ONCE:
                 self.report_events()
@@ -195,6 +214,7 @@ class Searcher:
     def _send(self, host: Host, envelopes: Sequence[Envelope]) -> None:
         for _, receiver, content, clock in envelopes:
             self._around.send(receiver, Said(self.epoch, clock, content))
+            self._sent_to[receiver] += 1
         self._sent += len(envelopes)
         self._conclude(host)
 
@@ -228,22 +248,48 @@ class Searcher:
         metrics = replace(self._host.metrics(), memory=own_memory())
         assigned = bool(protocol.assignment)  # who steps aside has a value, and none of its variables has
         assignment, findings = ({}, NOTHING) if private else (protocol.assignment, protocol.findings)
-        self._around.say(Account(self.epoch, assigned, assignment, metrics, findings))
+        self._around.say(Account(self.epoch, assigned, assignment, metrics, findings, self._exchanged()))
+
+    def _exchanged(self) -> dict[str, Exchanged]:
+        """The messages with each other robot, by its name."""
+        others = self._sent_to.keys() | self._received_from.keys()
+        return {
+            other: Exchanged(self._sent_to[other], self._received_from[other], self._clocks.get(other, 0))
+            for other in others
+        }
 
     def judged(self, told: Mapping[str, int]) -> Checked:
         """Hold all own constraints against what everybody has decided; of robots that stepped aside nothing is asked.
 
-        By the problem itself, not by the compiled constraints that the protocol works with.
+        Also the copies that this robot has of others' constraints. By the problem itself, not by the compiled
+        constraints that the protocol works with.
         """
         values = {**told, **self.assignment}
-        parts = [part for child in self._robot.children for part in child.constraints]
-        own = self._robot.private if self.assignment else ()
-        constraints = [one for one in (*own, *self._robot.shared, *parts) if values.keys() >= set(one.variables)]
-        cost = sum(constraint.price(values) for constraint in constraints)
-        return Checked(self.epoch, cost < INFINITE, cost if cost < INFINITE else 0)
+        robot = self._robot
+        parts = [part for child in robot.children for part in child.constraints]
+        own = robot.private if self.assignment else ()
+        held = [one for one in (*own, *robot.shared, *parts) if values.keys() >= set(one.variables)]
+        cost = sum(constraint.price(values) for constraint in held)
+        shared = _judged(robot.name, [one for one in robot.shared if one.model is not Model.PKC], values)
+        copies = [
+            *(one for child in robot.children for one in _judged(child.name, child.copies, values)),
+            *(one for sender, told_ones in self._learnt.items() for one in _judged(sender, told_ones, values)),
+        ]
+        allowed = cost < INFINITE
+        return Checked(self.epoch, allowed, cost if allowed else 0, len(held), tuple(shared), tuple(copies))
 
     def _now(self) -> float:
         return time.monotonic() - self._began
+
+
+def _judged(holder: str, constraints: Iterable[Constraint], values: Mapping[str, int]) -> Iterator[Judged]:
+    """Yield, by scope, what those `constraints` of `holder` charge whose variables all have `values`."""
+    groups: dict[tuple[str, ...], list[Constraint]] = {}
+    for one in constraints:
+        if values.keys() >= set(one.variables):
+            groups.setdefault(tuple(sorted(one.variables)), []).append(one)
+    for variables, group in groups.items():
+        yield Judged(holder, variables, len(group), sum(one.price(values) for one in group))
 
 
 def _sorted(copies: Sequence[Known], order: Sequence[str]) -> tuple[Known, ...]:

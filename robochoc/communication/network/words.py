@@ -8,7 +8,7 @@ robot to robot, and it never sees them. What both runtimes with processes say al
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import msgspec
 
@@ -51,20 +51,48 @@ class Shown(_Word, frozen=True):
     variables: dict[str, Ranges]
 
 
+class Exchanged(NamedTuple):
+    """Protocol messages with one other robot: `sent` to it, `received` from it, and the latest `clock` these had."""
+
+    sent: int = 0
+    received: int = 0
+    clock: int = 0
+
+
 class Account(OfEpoch, frozen=True):
-    """What the epoch has come to. `assigned`: I have values; in private runs `assignment` and findings stay empty."""
+    """What the epoch has come to. `assigned`: I have values; in private runs `assignment` and findings stay empty.
+
+    `exchanged` counts the messages with each other robot, so that what one says is held against what another says.
+    """
 
     assigned: bool
     assignment: dict[str, int]
     metrics: Metrics
     findings: Findings
+    exchanged: dict[str, Exchanged] = msgspec.field(default_factory=dict)
+
+
+class Judged(NamedTuple):
+    """What all totally known constraints over the same `variables` that `holder` holds charge together."""
+
+    holder: str
+    variables: tuple[str, ...]
+    constraints: int
+    price: int | float
 
 
 class Checked(OfEpoch, frozen=True):
-    """What the constraints that I hold charge for the values that you told me; `allowed`: none is broken."""
+    """What the constraints that I hold charge for the values that you told me; `allowed`: none is broken.
+
+    `held` is how many they are. Of these, `shared` are those that others may know too; `copies` are others' constraints
+    that I know.
+    """
 
     allowed: bool
     cost: int | float
+    held: int = 0
+    shared: tuple[Judged, ...] = ()
+    copies: tuple[Judged, ...] = ()
 
 
 class Objection(_Word, frozen=True):
@@ -73,6 +101,13 @@ class Objection(_Word, frozen=True):
     who: str
     what: str
     why: str
+
+
+class Gap(_Word, frozen=True):
+    """So many `letters` of `who` to me are lost for good."""
+
+    who: str
+    letters: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
 
 
 class Ask(_Word, frozen=True):
@@ -207,6 +242,7 @@ ToMaster = (
     | Checked
     | Failed
     | Objection
+    | Gap
     | Ask
     | Sniff
     | Bye

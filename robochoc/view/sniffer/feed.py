@@ -19,7 +19,7 @@ import msgspec
 from robochoc.communication.acl import text
 from robochoc.communication.performatives import act_of
 from robochoc.formats.result import result_json
-from robochoc.outcome import RULED_OUT, Epoch, Outcome, Verdict
+from robochoc.outcome import Epoch, Outcome, Verdict
 from robochoc.problem import natural
 from robochoc.view.sniffer.columns import packed
 from robochoc.view.sniffer.names import Names
@@ -227,7 +227,7 @@ def _ending(trace: Trace, outcome: Outcome) -> str:
     reason = f": {outcome.reason}" if outcome.reason else ""
     out = f"; lost: {_cut(outcome.lost)}" if outcome.lost else ""
     if outcome.aside:
-        witness = f", as {outcome.witness} {RULED_OUT}" if outcome.witness else ""
+        witness = f", as {outcome.ruled_out}" if outcome.ruled_out else ""
         flying = len({*trace.robots}.difference(outcome.withdrawn))
         better = ", no better team could" if outcome.verdict is Verdict.OPTIMAL else ""
         return f"No solution for all{witness}. {flying} fly{better}; aside: {_cut(outcome.aside)}{out}."
@@ -254,7 +254,7 @@ def _by(outcome: Outcome) -> str:
     """Who could tell alone; who gave up is named in the reason."""
     if outcome.witness is None or outcome.verdict is Verdict.UNKNOWN:
         return ""
-    return f", as {outcome.witness} {RULED_OUT if outcome.verdict is Verdict.NO_SOLUTION else 'has concluded'}"
+    return f", as {outcome.ruled_out if outcome.verdict is Verdict.NO_SOLUTION else f'{outcome.witness} has concluded'}"
 
 
 def _epochs(epochs: Sequence[Epoch]) -> str:

@@ -8,19 +8,18 @@ All that knows the trace happens in one thread, in small pieces; what robots kne
 from __future__ import annotations
 
 import asyncio
-import hmac
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from socket import socket
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import msgspec
-from tornado.web import Application, HTTPError, RequestHandler
-from tornado.websocket import WebSocketClosedError, WebSocketHandler
+from tornado.web import Application
+from tornado.websocket import WebSocketClosedError
 
 from robochoc.view.address import listening, secret_path, url_of
-from robochoc.view.loopback import application, open_in_browser, served
+from robochoc.view.loopback import SecretHandler, SecretPage, SecretSocket, application, in_browser, served
 from robochoc.view.sniffer.feed import BadRequest
 from robochoc.view.sniffer.page import page
 from robochoc.view.sniffer.session import NotBegun, Session
@@ -56,9 +55,8 @@ async def _serve(session: Session, port: int, ready: Callable[[str], None] | Non
         serving = asyncio.create_task(Server(session, here, token).serve())
         if ready:
             ready(url)
-        if open_browser:
-            await open_in_browser(url)
-        await serving
+        async with in_browser(url, wanted=open_browser):
+            await serving
 
 
 class Server:
@@ -150,9 +148,10 @@ class Server:
 
     def _application(self) -> Application:
         known = {"server": self}
+        whole = {"secret": self.token, "page": page("served")}
         return application(
             [
-                (r"/([^/]*)/", _Page, {**known, "page": page("served")}),
+                (r"/([^/]*)/", SecretPage, whole),
                 (r"/([^/]*)/news", _News, known),
                 (r"/([^/]*)/journal", _Journal, known),
                 (r"/([^/]*)/(about|columns|steps|decisions|details|states|scene)", _Answer, known),
@@ -161,43 +160,12 @@ class Server:
         )
 
 
-class _Known(RequestHandler):
+class _Known(SecretHandler):
     """Answers those who know the token, and no page of another site."""
 
-    def initialize(self, server: Server, page: bytes = b"") -> None:
+    def initialize(self, server: Server) -> None:
         self.server = server
-        self.page = page
-
-    def prepare(self) -> None:
-        if not hmac.compare_digest(self.path_args[0].encode(), self.server.token.encode()):
-            raise HTTPError(404)
-        origin = self.request.headers.get("Origin")
-        if origin is not None and origin != f"http://{self.request.host}":
-            raise HTTPError(403)
-
-    def set_default_headers(self) -> None:
-        for name, value in (
-            ("Cache-Control", "no-store"),
-            ("Referrer-Policy", "no-referrer"),
-            ("X-Content-Type-Options", "nosniff"),
-            ("X-Frame-Options", "DENY"),
-            ("Cross-Origin-Resource-Policy", "same-origin"),
-            ("Cross-Origin-Opener-Policy", "same-origin"),
-        ):
-            self.set_header(name, value)
-
-    def compute_etag(self) -> None:
-        """None: nothing is kept, so nothing is compared."""
-
-    def write_error(self, status_code: int, **_: Any) -> None:  # noqa: ANN401 - tornado's signature
-        self.set_header("Content-Type", "text/plain; charset=utf-8")
-        self.finish(f"{status_code}: {self._reason}")
-
-
-class _Page(_Known):
-    def get(self, _token: str) -> None:
-        self.set_header("Content-Type", "text/html; charset=utf-8")
-        self.write(self.page)
+        self.secret = server.token
 
 
 class _Answer(_Known):
@@ -273,15 +241,12 @@ class _Journal(_Known):
         return size
 
 
-class _News(WebSocketHandler):
+class _News(SecretSocket):
     """Tells a page how much there is; what comes while it is told is put into the next news."""
 
     def initialize(self, server: Server) -> None:
         self.server = server
-
-    def prepare(self) -> None:
-        if not hmac.compare_digest(self.path_args[0].encode(), self.server.token.encode()):
-            raise HTTPError(404)
+        self.secret = server.token
 
     def open(self, *_: str) -> None:
         self.server.connected()
@@ -301,9 +266,6 @@ class _News(WebSocketHandler):
                 await self.server.change(version)
         except (WebSocketClosedError, BadRequest, TimeoutError):
             self.close()
-
-    def on_message(self, message: str | bytes) -> None:
-        del message
 
     def on_close(self) -> None:
         self._telling.cancel()

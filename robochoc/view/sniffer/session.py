@@ -16,7 +16,7 @@ from robochoc.view.sniffer.cache import Cache
 from robochoc.view.sniffer.feed import DETAILS, BadRequest, Feed
 from robochoc.view.sniffer.following import Following
 from robochoc.view.sniffer.trace import Trace
-from robochoc.view.sniffer.window import Window
+from robochoc.view.sniffer.window import Window, opened
 
 if TYPE_CHECKING:
     from robochoc.view.sniffer.insight import Insight
@@ -44,7 +44,7 @@ class Session:
         self._written = False
         self._chosen = chosen
         self._robots = robots
-        self._descriptor = source if isinstance(source, int) else os.open(source, os.O_RDONLY)
+        self._descriptor = source if isinstance(source, int) else opened(source)
         self._window = Window(self._descriptor)
         self._following = Following(self._window, self._age_s)
         self._insight: Insight | None = None
@@ -74,7 +74,7 @@ class Session:
         try:
             if os.path.samestat(self._path.stat(), os.fstat(self._descriptor)):
                 return False
-            descriptor = os.open(self._path, os.O_RDONLY)
+            descriptor = opened(self._path)
             window = Window(descriptor)
         except OSError:  # it has been taken away: what was read is still there
             return False

@@ -17,6 +17,7 @@ from contextlib import suppress
 from typing import Self
 
 from robochoc.view.address import listening, secret_path, url_of
+from robochoc.view.redirect import RedirectFile
 
 _PATIENCE_S = 2.0
 """So long a viewer may take to end."""
@@ -37,7 +38,9 @@ class Viewer:
         with listening(port) as here:
             token = secret_path()
             self.url = url_of(here, f"{token}/")
+            self._redirect: RedirectFile | None = None
             try:
+                self._redirect = RedirectFile(self.url) if open_browser else None
                 self._process = subprocess.Popen(  # noqa: S603 - our own module
                     [sys.executable, "-P", "-m", _PROGRAM, str(here.fileno()), str(journal)],
                     stdin=theirs_in,
@@ -47,15 +50,16 @@ class Viewer:
             except BaseException:
                 os.close(heard)
                 os.close(lifeline)
+                if self._redirect:
+                    self._redirect.close()
                 raise
             finally:
                 os.close(theirs_in)
                 os.close(theirs_out)
         self._heard, self._lifeline = heard, lifeline
         # Not as arguments: those can be read by everybody on this machine.
-        settings = json.dumps(
-            {"token": token, "chosen": [*chosen][:_MOST_CHOSEN], "url": self.url, "open": open_browser}
-        ).encode()
+        shown = self._redirect.url if self._redirect else None
+        settings = json.dumps({"token": token, "chosen": [*chosen][:_MOST_CHOSEN], "shown": shown}).encode()
         with suppress(BrokenPipeError):  # it is gone already, which is said later
             os.write(lifeline, settings + b"\n")
 
@@ -68,7 +72,10 @@ class Viewer:
     def wait_until_seen(self, most_s: float) -> bool:
         """Wait until a page has connected; False after `most_s` seconds without one."""
         ready, _, _ = select.select([self._heard], [], [], most_s)
-        return bool(ready and os.read(self._heard, 1))
+        seen = bool(ready and os.read(self._heard, 1))
+        if seen and self._redirect:
+            self._redirect.close()
+        return seen
 
     def finish(self) -> None:
         """Tell it that nothing more will be written."""
@@ -96,3 +103,5 @@ class Viewer:
                 raise
         finally:
             os.close(self._heard)
+            if self._redirect:
+                self._redirect.close()

@@ -58,9 +58,9 @@ def main() -> None:
     if not line:
         return
     settings = json.loads(line)
-    if settings["open"]:
+    if settings["shown"]:
         # In a thread: a browser for the terminal returns when it is closed.
-        threading.Thread(target=partial(webbrowser.open, settings["url"]), daemon=True).start()
+        threading.Thread(target=partial(webbrowser.open, settings["shown"]), daemon=True).start()
     over = False
     listening = socket.socket(fileno=int(sys.argv[1]))
     while listening.fileno() not in select.select([listening.fileno(), parent.heard], [], [])[0]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import stat
+from pathlib import Path
 from typing import Any
 
 _HEAD_BYTES = 256
@@ -14,6 +15,22 @@ class NoFile(OSError):  # noqa: N818 - named for what was found
     """It is a pipe, a device, or a folder: what has been read of it could not be read again."""
 
 
+def opened(path: Path) -> int:
+    """Return a descriptor of the file at `path`, for reading. A FIFO is not waited for. Raises `OSError`."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        _check_file(descriptor)
+    except BaseException:
+        os.close(descriptor)
+        raise
+    return descriptor
+
+
+def _check_file(descriptor: int) -> None:
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        raise NoFile("it is no file that can be read twice")
+
+
 class Window(io.RawIOBase):
     """Reads the file `descriptor` from its start up to `end`, which whoever reads moves on.
 
@@ -21,8 +38,7 @@ class Window(io.RawIOBase):
     """
 
     def __init__(self, descriptor: int) -> None:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise NoFile("it is no file that can be read twice")
+        _check_file(descriptor)
         self._descriptor = descriptor
         self.place = 0
         self.end = 0

@@ -1,0 +1,113 @@
+"""What has come and waits to be read: bounded for each sender, so that nobody's flood fills the memory.
+
+Letters beyond a sender's share (`quotas.py`) are dropped before anybody looks at them, and counted: `Missed` stands in
+the queue where the first of them was. That is a loss of that sender's, and of nobody else. Threads may share it.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from queue import Empty
+from typing import NamedTuple
+
+from robochoc.communication.network.quotas import OF_A_NEIGHBOUR, Share, Usage
+
+
+class Arrived(NamedTuple):
+    """A letter from `sender`."""
+
+    sender: str
+    content: bytes
+
+
+class Missed(NamedTuple):
+    """So many `letters` of `sender` are lost for good, or it has made it look so: zenoh believes its numbers.
+
+    `dropped`: they were more than its share, and were dropped here.
+    """
+
+    sender: str
+    letters: int
+    dropped: bool = False
+
+
+class Presence(NamedTuple):
+    """`name` is there, or is not any more as far as the router knows."""
+
+    name: str
+    there: bool
+
+
+class Woken(NamedTuple):
+    """Somebody in this process has something new to look at."""
+
+
+Item = Arrived | Missed | Presence | Woken
+
+
+class Inbox:
+    """A queue of items, first in, first out. `share_of` says what a sender may have; it is asked once for each."""
+
+    def __init__(
+        self,
+        share_of: Callable[[str], Share] = lambda _sender: OF_A_NEIGHBOUR,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._share_of = share_of
+        self._clock = clock
+        self._items: deque[Item] = deque()
+        self._usage: dict[str, Usage] = {}
+        self._changed = threading.Condition()
+
+    def put(self, item: Item) -> None:
+        """Append `item`, or drop a letter that is beyond its sender's share."""
+        with self._changed:
+            if isinstance(item, Arrived):
+                usage = self._usage_of(item.sender)
+                if not usage.takes(len(item.content), self._clock()):
+                    usage.dropped += 1
+                    if usage.dropped > 1:
+                        return
+                    item = Missed(item.sender, 1, dropped=True)
+            self._items.append(item)
+            self._changed.notify()
+
+    def get(self, timeout: float | None = None) -> Item:
+        """The oldest item, as soon as there is one. Raises `Empty` when there is none within `timeout` seconds."""
+        with self._changed:
+            if not self._changed.wait_for(lambda: self._items, timeout):
+                raise Empty
+            return self._taken()
+
+    def get_nowait(self) -> Item:
+        """The oldest item. Raises `Empty`."""
+        with self._changed:
+            if not self._items:
+                raise Empty
+            return self._taken()
+
+    def empty(self) -> bool:
+        """Whether nothing waits."""
+        return not self._items
+
+    def _usage_of(self, sender: str) -> Usage:
+        usage = self._usage.get(sender)
+        if usage is None:
+            usage = self._usage[sender] = Usage(self._share_of(sender), self._clock())
+        return usage
+
+    def _taken(self) -> Item:
+        item = self._items.popleft()
+        match item:
+            case Arrived(sender, content):
+                self._usage[sender].release(len(content))
+            case Missed(sender, dropped=True):
+                usage = self._usage[sender]
+                letters, usage.dropped = usage.dropped, 0
+                return item._replace(letters=letters)
+            case _:
+                pass
+        return item

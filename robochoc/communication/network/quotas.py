@@ -1,0 +1,80 @@
+"""What a sender may have of a receiver: letters and bytes that wait, and letters, bytes and events a second. Pure.
+
+The limits are far beyond what honest robots need: docs/security.md has the measurement.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+MIB = 2**20
+BURST_S = 60.0
+"""What was not used in so many seconds may be used at once: after an outage all comes together."""
+EVENTS_A_SECOND = 10_000
+"""That a robot may tell the master, in the long run."""
+NO_LIMIT = 1e15
+
+
+class Share(NamedTuple):
+    """What one sender may have: so many letters and bytes waiting, and so many a second in the long run."""
+
+    letters: int
+    size: int
+    letters_a_second: float = NO_LIMIT
+    size_a_second: float = NO_LIMIT
+
+
+OF_A_NEIGHBOUR = Share(200_000, 256 * MIB)
+"""At a robot: how fast neighbours talk is the protocol's affair; what waits is memory."""
+OF_A_ROBOT = Share(50_000, 64 * MIB, 2_000, 16 * MIB)
+"""At the master."""
+OF_AN_OBSERVER = Share(1_000, 16 * MIB, 50, MIB)
+"""At the master: an observer asks, and waits for the answer."""
+
+
+class Allowance:
+    """So much `a_second`, of which what was not used in the last `BURST_S` seconds is left. Times are monotonic."""
+
+    def __init__(self, a_second: float, now: float) -> None:
+        self._a_second = a_second
+        self._left = BURST_S * a_second
+        self._since = now
+
+    def has(self, amount: float, now: float) -> bool:
+        """Whether `amount` is left at the time `now`."""
+        grown = (now - self._since) * self._a_second
+        self._left, self._since = min(BURST_S * self._a_second, self._left + grown), now
+        return amount <= self._left
+
+    def use(self, amount: float) -> None:
+        """So much of it is gone."""
+        self._left -= amount
+
+
+class Usage:
+    """What one sender has of its `share` now."""
+
+    def __init__(self, share: Share, now: float) -> None:
+        self.dropped = 0
+        """Letters that were too much, and that nobody was told of yet."""
+        self._share = share
+        self._letters = self._size = 0
+        self._often = Allowance(share.letters_a_second, now)
+        self._much = Allowance(share.size_a_second, now)
+
+    def takes(self, size: int, now: float) -> bool:
+        """Whether a letter of `size` bytes is within the share; if so, it waits from now on."""
+        if self._letters >= self._share.letters or self._size + size > self._share.size:
+            return False
+        if not (self._often.has(1, now) and self._much.has(size, now)):
+            return False
+        self._often.use(1)
+        self._much.use(size)
+        self._letters += 1
+        self._size += size
+        return True
+
+    def release(self, size: int) -> None:
+        """A letter of `size` bytes waits no more."""
+        self._letters -= 1
+        self._size -= size

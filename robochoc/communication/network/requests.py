@@ -1,0 +1,35 @@
+"""What anybody may ask of the master besides taking part: the Directory Facilitator's answers, and the journal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from robochoc.communication.network.facilitator import DirectoryFacilitator, TooOften
+from robochoc.communication.network.publication import PublicationDesk
+from robochoc.communication.network.words import Ask, Sniff, Sniffable, Told
+
+
+class Requests:
+    """Answers requests, so many a second of each: `tell` takes answers, and `refuse` who was refused what, and why."""
+
+    def __init__(
+        self,
+        desk: PublicationDesk,
+        facilitator: DirectoryFacilitator,
+        tell: Callable[[str, Told | Sniffable], None],
+        refuse: Callable[[str, str, str], None],
+    ) -> None:
+        self._desk = desk
+        self._facilitator = facilitator
+        self._tell = tell
+        self._refuse = refuse
+
+    def answer(self, sender: str, word: Ask | Sniff) -> None:
+        """Answer `sender`, unless it asks too often."""
+        try:
+            self._facilitator.count(sender)
+        except TooOften as often:
+            self._refuse(sender, "ask the Directory Facilitator", str(often))
+            return
+        told = self._desk.welcome(sender, word) if isinstance(word, Sniff) else self._facilitator.answer(sender, word)
+        self._tell(sender, told)

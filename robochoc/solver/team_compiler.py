@@ -1,0 +1,79 @@
+"""Compiles a whole team, within the time of a run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from itertools import count
+from typing import TYPE_CHECKING
+
+from robochoc.problem import Robot, Team
+from robochoc.solver.cache import SolutionCache
+from robochoc.solver.compile import Compiler, Limits, Source
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.failures import SolverTimeout
+
+if TYPE_CHECKING:
+    from robochoc.solver.ace import AceProcess
+
+
+class NoLocalSolutionError(Exception):
+    """The private constraints of `robot` leave it no local solution."""
+
+    def __init__(self, robot: str) -> None:
+        super().__init__(f"{robot} alone has none: its private constraints leave it no local solution")
+        self.robot = robot
+
+
+class OutOfTimeError(Exception):
+    """The time for everything was over before the robots could start."""
+
+
+class TeamCompiler:
+    """Compiles teams of one run. `seconds` is how long solvers took for it; no solver, no time.
+
+    `deadline` is on the monotonic clock. `stage` is told in a few words how far it is. For the others see `Compiler`.
+    """
+
+    seconds: float = 0.0
+
+    def __init__(
+        self,
+        limits: Limits | None,
+        cache: SolutionCache | None,
+        deadline: float | None,
+        solver: AceProcess | None,
+        stage: Callable[[str], None],
+    ) -> None:
+        self._compiler = partial(Compiler, limits, cache, deadline, solver)
+        self._stage = stage
+
+    def compile(self, team: Team, *, every: bool = False) -> CompiledTeam:
+        """Return `team`, which is what robots will work on, compiled.
+
+        Raises `NoLocalSolutionError` at the first robot without values, unless `every` robot is wanted;
+        `OutOfTimeError`; and as `Compiler.compile` does.
+        """
+        began = time.monotonic()
+        solved, number = False, count(1)
+
+        def compile_robot(robot: Robot) -> CompiledDomain:
+            nonlocal solved
+            self._stage(f"compiling {robot.name} ({next(number)} of {len(team.robots)})")
+            try:
+                compilation = compiler.compile(robot)
+            except SolverTimeout:
+                raise OutOfTimeError(f"the time (--timeout) was over while {robot.name} was compiled") from None
+            solved = solved or compilation.source is not Source.DIRECT
+            if not (compilation.domain.values or every):
+                raise NoLocalSolutionError(robot.name)
+            return compilation.domain
+
+        try:
+            with self._compiler() as compiler:
+                return CompiledTeam(team, compile_robot)
+        finally:
+            if solved:
+                self.seconds += time.monotonic() - began

@@ -1,0 +1,48 @@
+"""How a browser is told a secret address: by a file of the user's own that leads there, as Jupyter does it.
+
+What stands on a command line, or in the environment of some processes, everybody on the machine can read. So the
+browser is given the path of a file, mode 0600 in a folder with mode 0700, and the file holds the address.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from html import escape
+from pathlib import Path
+from typing import Self
+
+_PAGE = """\
+<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>robochoc</title>
+<meta name="referrer" content="no-referrer">
+<meta http-equiv="refresh" content="0; url={url}">
+</head><body><p><a href="{url}">The page is here.</a></p></body></html>
+"""
+
+
+class RedirectFile:
+    """A file that leads a browser to `url`, until it is closed. Raises `OSError` where none can be written."""
+
+    def __init__(self, url: str) -> None:
+        self._folder = Path(tempfile.mkdtemp(prefix="robochoc-"))
+        try:
+            file = self._folder / "page.html"
+            with os.fdopen(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w", encoding="utf-8") as page:
+                page.write(_PAGE.format(url=escape(url)))
+        except BaseException:
+            self.close()
+            raise
+        self.url = file.as_uri()
+        """What a browser is to open: `file://...`, which is no secret."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Take it away. Does nothing when that has been done."""
+        shutil.rmtree(self._folder, ignore_errors=True)

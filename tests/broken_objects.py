@@ -1,0 +1,440 @@
+"""Broken teams as Python objects: those cases of `broken.py` that data can express, and what only data can get wrong.
+
+Every case starts from the team of `broken_case.TEAM`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+from robochoc.expression import Apply, Constant, Expression, Name
+from robochoc.formats import PREDEFINED
+from robochoc.problem import (
+    AddAgent,
+    AddConstraint,
+    AddValue,
+    Change,
+    Child,
+    Constraint,
+    Domain,
+    Event,
+    Kind,
+    Model,
+    Parent,
+    Predicate,
+    Relation,
+    RemoveAgent,
+    RemoveValue,
+    Robot,
+    Semantics,
+    Team,
+    Term,
+    Topic,
+    Variable,
+)
+
+Breakage = Callable[[Team], Team]
+
+
+def robot(which: str, **changes: object) -> Breakage:
+    """The robot `which`, with other parts."""
+    return lambda team: with_robot(team, replace(team[which], **cast("Any", changes)))
+
+
+def with_robot(team: Team, changed: Robot) -> Team:
+    return replace(team, robots=tuple(changed if one.name == changed.name else one for one in team.robots))
+
+
+def each(edit: Callable[[Robot], Robot]) -> Breakage:
+    return lambda team: replace(team, robots=tuple(map(edit, team.robots)))
+
+
+def constraint(which: str, holder: str = "", **changes: object) -> Breakage:
+    """The constraint `which`, changed wherever it stands (or with the robot `holder` only)."""
+
+    def edited(constraints: tuple[Constraint, ...]) -> tuple[Constraint, ...]:
+        return tuple(replace(one, **cast("Any", changes)) if one.name == which else one for one in constraints)
+
+    def edit(one: Robot) -> Robot:
+        if holder not in {"", one.name}:
+            return one
+        return replace(
+            one,
+            private=edited(one.private),
+            parents=tuple(replace(parent, constraints=edited(parent.constraints)) for parent in one.parents),
+            children=tuple(replace(child, constraints=edited(child.constraints)) for child in one.children),
+        )
+
+    return each(edit)
+
+
+def over(name: str, *terms: str | int, holder: str = "") -> Breakage:
+    """The constraint `name`, over other terms."""
+    return constraint(name, holder, scope=terms, parameters=terms)
+
+
+def domain(*ranges: range) -> Breakage:
+    """Robot2 with another domain."""
+    return robot("Robot2", variables=(Variable("V2", Domain("D1", ranges)),))
+
+
+def relation(*rows: tuple[int, ...], semantics: Semantics = Semantics.CONFLICTS, **more: object) -> Breakage:
+    """Robot2 with another relation."""
+    return constraint("C2", definition=Relation("r1", 2, semantics, rows, **cast("Any", more)))
+
+
+def predicate(body: Expression, *parameters: str, name: str = "p1") -> Breakage:
+    """Robot2 with another predicate."""
+    return constraint("C1", definition=Predicate(name, parameters or ("X", "Y", "i", "j"), body))
+
+
+def parents(name: str, *listed: Parent) -> Breakage:
+    return robot(name, parents=listed)
+
+
+def child(name: str, of: str, **changes: object) -> Breakage:
+    """The child `name` of the robot `of`, changed."""
+    return lambda team: robot(
+        of,
+        children=tuple(replace(one, **cast("Any", changes)) if one.name == name else one for one in team[of].children),
+    )(team)
+
+
+def no_child(name: str, of: str) -> Breakage:
+    return lambda team: robot(of, children=tuple(one for one in team[of].children if one.name != name))(team)
+
+
+def moved(name: str, holder: str, to: str) -> Breakage:
+    """The shared constraint `name` of `holder`, under another parent."""
+
+    def edit(team: Team) -> Team:
+        (it,) = (one for one in team[holder].shared if one.name == name)
+        rest = (
+            replace(parent, constraints=tuple(one for one in parent.constraints if one.name != name))
+            for parent in team[holder].parents
+        )
+        return parents(
+            holder,
+            *(replace(one, constraints=(*one.constraints, it)) if one.name == to else one for one in rest),
+        )(team)
+
+    return edit
+
+
+def weighted(then: Breakage) -> Breakage:
+    return lambda team: then(each(lambda one: replace(one, kind=Kind.DISWCSP))(team))
+
+
+def both(first: Breakage, second: Breakage) -> Breakage:
+    return lambda team: second(first(team))
+
+
+def topic(z: Expression) -> Breakage:
+    x = Apply("mul", (Constant(2), Name("V3")))
+    return robot("Robot3", topics=(Topic("/drone3/waypoint3", x=x, y=Constant(-1), z=z),))
+
+
+def ring(_: Team) -> Team:
+    def one(name: str, parent: str, below: str) -> Robot:
+        values = (Variable(f"V{name}", Domain("D1", (range(1, 3),))),)
+        return Robot(name, values, parents=(Parent(parent),), children=(Child(below, (f"V{name}",)),))
+
+    return Team("ring", (one("A", "C", "B"), one("B", "A", "C"), one("C", "B", "A")))
+
+
+def nested(levels: int) -> Expression:
+    body: Expression = Name("X")
+    for _ in range(levels):
+        body = Apply("abs", (body,))
+    return body
+
+
+def doubled(times: int) -> Expression:
+    """A small tree that would be written with more characters than there are atoms."""
+    body: Expression = Name("X")
+    for _ in range(times):
+        body = Apply("add", (body, body))
+    return Apply("eq", (body, body))
+
+
+def shared_variable(team: Team) -> Team:
+    (variable,) = team["Robot3"].variables
+    team = robot("Robot3", variables=(replace(variable, name="V2"),), topics=())(team)
+    team = over("C4", "V1", "V2", holder="Robot3")(team)
+    return over("C5", "W1", "V1", "V2")(team)
+
+
+def unseen_variable(team: Team) -> Team:
+    (variable,) = team["Robot2"].variables
+    team = robot("Robot2", variables=(replace(variable, name="W2"), variable))(team)
+    return over("C3", "V1", "W2", holder="Robot1")(team)
+
+
+def turned_link(team: Team) -> Team:
+    team = no_child("Robot3", "Robot1")(team)
+    return robot("Robot1", parents=(Parent("Robot3"),))(team)
+
+
+AS_IN_FILES: dict[str, Breakage] = {
+    "a domain of 10^9 values": domain(range(1, 10**9 + 1)),
+    "a domain of 10^18 values": domain(range(1 - 10**18, 10**18)),
+    "a reversed range": domain(range(4, 2)),
+    "overlapping ranges": domain(range(1, 5), range(3, 7)),
+    "an empty domain": domain(),
+    "no variable": robot("Robot1", variables=()),
+    "two variables of one name": robot("Robot2", variables=(Variable("V2", Domain("D1", (range(1, 5),))),) * 2),
+    "a tuple too short": relation((1, 1), (2,), (3, 3)),
+    "a tuple twice": relation((1, 1), (1, 1), (3, 3)),
+    "a soft relation in a DisCSP": relation((1, 1), semantics=Semantics.SOFT, costs=(5,)),
+    "a defaultCost without soft": relation((1, 1), default_cost=1),
+    "a negative cost": weighted(relation((1, 1), semantics=Semantics.SOFT, costs=(-5,))),
+    "a predefined name": predicate(Apply("lt", (Name("X"), Name("Y"))), name="neq"),
+    "two parameters of one name": predicate(Apply("ne", (Name("X"), Name("X"))), "X", "X", "i", "j"),
+    "an unknown operator": predicate(Apply("nee", (Name("X"), Name("Y")))),
+    "an unknown parameter": predicate(Apply("ne", (Name("X"), Name("Z")))),
+    "a predicate that is a number": predicate(Apply("add", (Name("X"), Name("Y")))),
+    "deep expressions": predicate(nested(9000)),
+    "a topic over another's variable": topic(Name("V1")),
+    "a topic of a Boolean": topic(Apply("eq", (Name("V3"), Constant(1)))),
+    "no variables in a scope": over("C4", 1, 3),
+    "too few terms": over("C5", "V2", "V3"),
+    "a relation of another arity": over("C2", "V1", "V2", 3),
+    "a parameter outside the scope": constraint("C1", scope=("V2", 1, 2)),
+    "a scope that is not passed": constraint("C1", parameters=("V1", "V2", 1, 3)),
+    "parameters of a relation": constraint(
+        "C1", definition=Relation("r1", 2, Semantics.CONFLICTS, ((1, 1),)), parameters=("V1", "V2")
+    ),
+    "a shared constraint without model": constraint("C4", model=None),
+    "a private constraint with a part": constraint("C0", model=Model.PKC),
+    "another's variable in private": over("C0", "V1", "V2"),
+    "own variables only with a parent": over("C4", "V3", 3),
+    "others' variables only": over("C4", "V1", "W1"),
+    "a cost in a DisCSP": constraint("C4", cost=3),
+    "a cost on a relation": weighted(constraint("C2", cost=3)),
+    "a child that is not listed back": no_child("Robot3", "Robot2"),
+    "each the other's parent": turned_link,
+    "itself as neighbour": robot("Robot3", children=(Child("Robot3"),)),
+    "a neighbour twice": robot("Robot3", children=(Child("Robot1"),)),
+    "a cycle of parents": ring,
+    "a DisWCSP among DisCSPs": robot("Robot2", kind=Kind.DISWCSP),
+    "two owners of one variable": shared_variable,
+    "a variable that its owner does not have": over("C4", "V9", "V3"),
+    "a constraint under the wrong parent": moved("C4", "Robot3", "Robot2"),
+    "n-ary under the higher parent": moved("C5", "Robot3", "Robot1"),
+    "n-ary in a higher file": over("C3", "V3", "V2", holder="Robot2"),
+    "a PKC of three robots": constraint("C5", model=Model.PKC),
+    "a part over a third robot": over("C3", "V1", "V3", holder="Robot1"),
+    "a part over what its owner shows to nobody": unseen_variable,
+    "a child told what is not one's own": child("Robot3", "Robot2", variables=("V1",)),
+    "a child told twice": child("Robot3", "Robot2", variables=("V2", "V2")),
+    "a child told too little": child("Robot3", "Robot1", variables=("V1",)),
+}
+"""By the names of the cases in `broken.py`: the same mistakes, with the same messages."""
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """What is done to the team, and for each mistake where it is and what is said of it."""
+
+    breakage: Breakage
+    expected: tuple[tuple[str, str], ...]
+
+
+def wrong(breakage: Breakage, *expected: tuple[str, str]) -> Wrong:
+    return Wrong(breakage, expected)
+
+
+VALUES = Domain("D", (range(1, 5),))
+NEWCOMER = Robot("Late", (Variable("VL", VALUES),))
+
+
+def bound(*terms: Term, model: Model = Model.TKC) -> Constraint:
+    return Constraint("C", PREDEFINED["ne"], terms, terms, model)
+
+
+def scenario(*changes: Change, after: int | None = None) -> Breakage:
+    return lambda team: replace(team, scenario=(Event(changes, after),))
+
+
+OF_OBJECTS: dict[str, Wrong] = {
+    "no robots": wrong(lambda team: replace(team, robots=()), ("team", "no robot here")),
+    "robots in a list": wrong(
+        lambda team: replace(team, robots=cast("Any", list(team.robots))), ("team", "robots: a list where a tuple")
+    ),
+    "a robot that is none": wrong(
+        lambda team: replace(team, robots=(*team.robots, cast("Any", "Robot4"))),
+        ("robot ?", "'Robot4' where a Robot should stand"),
+    ),
+    "a name of the team without UTF-8": wrong(
+        lambda team: replace(team, name="\udcff"), ("team", "its name has no UTF-8")
+    ),
+    "two robots of one name": wrong(
+        lambda team: replace(team, robots=(*team.robots, team["Robot3"])), ("robot Robot3", "a second robot 'Robot3'")
+    ),
+    "a missing robot": wrong(
+        lambda team: replace(team, robots=team.robots[:2]),
+        ("robot Robot1, child Robot3", "the child 'Robot3' is not in the team"),
+        ("robot Robot2, child Robot3", "the child 'Robot3' is not in the team"),
+    ),
+    "parents that are left out": wrong(
+        parents("Robot3"),
+        ("robot Robot1, child Robot3", "'Robot3' does not list 'Robot1' as its parent"),
+        ("robot Robot2, child Robot3", "'Robot3' does not list 'Robot2' as its parent"),
+    ),
+    "a child before its parent": wrong(
+        lambda team: replace(team, robots=team.robots[::-1]),
+        ("robot Robot2", "before its parent 'Robot1' in the team"),
+        ("robot Robot3", "before its parent 'Robot1' in the team"),
+    ),
+    "a robot's name with a blank": wrong(
+        lambda team: replace(team, robots=(*team.robots, replace(NEWCOMER, name="The last"))),
+        ("robot The last", "'The last' cannot be a robot's name"),
+    ),
+    "a robot called as the scenario's file": wrong(
+        lambda team: replace(team, robots=(*team.robots, replace(NEWCOMER, name="scenario"))),
+        ("robot scenario", "cannot be a robot's name"),
+    ),
+    "a robot's name longer than a file's": wrong(
+        lambda team: replace(team, robots=(*team.robots, replace(NEWCOMER, name="R" * 252))),
+        ("robot RRR", "cannot be a robot's name"),
+    ),
+    "a variable's name with a blank": wrong(
+        lambda team: replace(team, robots=(*team.robots, replace(NEWCOMER, variables=(Variable("V L", VALUES),)))),
+        ("robot Late, variable V L", "the name 'V L' is not allowed"),
+    ),
+    "a domain's name with a blank": wrong(
+        robot("Robot2", variables=(Variable("V2", Domain("of values", (range(1, 5),))),)),
+        ("robot Robot2, domain of values", "the name 'of values' is not allowed"),
+    ),
+    "a constraint without a name": wrong(constraint("C4", name=""), ("constraint", "the name '' is not allowed")),
+    "a topic's name that no XML holds": wrong(
+        robot("Robot3", topics=(Topic("/a\0b"),)), ("robot Robot3, topic", "is not allowed")
+    ),
+    "two topics of one name": wrong(
+        robot("Robot3", topics=(Topic("/a"), Topic("/a"))), ("robot Robot3, topic /a", "a second topic '/a'")
+    ),
+    "a term that is no name": wrong(
+        over("C4", "V1,V3"), ("robot Robot3, constraint C4 (V1,V3)", "'V1,V3' is neither a variable's name")
+    ),
+    "a constant of 19 digits": wrong(
+        over("C1", "V1", "V2", 1, 10**18), ("robot Robot2, constraint C1", "an integer of 19 digits")
+    ),
+    "a constant of 5000 digits": wrong(
+        constraint("C5", definition=PREDEFINED["ne"], scope=("V3", "V2", 10**5000), parameters=("V3", "V2")),
+        ("robot Robot3, constraint C5", "an integer of 5001 digits"),
+    ),
+    "a weight of 0": wrong(robot("Robot1", weight=0), ("robot Robot1", 'weight="0" in <presentation> is not allowed')),
+    "a weight of 5000 digits": wrong(robot("Robot1", weight=10**5000), ("robot Robot1", "(5001 digits)")),
+    "a value of 19 digits": wrong(
+        domain(range(10**18, 10**18 + 1)), ("robot Robot2, domain D1", "an integer of 19 digits")
+    ),
+    "every second value": wrong(domain(range(1, 9, 2)), ("robot Robot2, domain D1", "range(1, 9, 2) has a step")),
+    "ranges that descend": wrong(
+        domain(range(5, 9), range(1, 3)), ("robot Robot2, domain D1", "ranges of domain D1 are not in order")
+    ),
+    "a tuple's value of 19 digits": wrong(
+        relation((1, -(10**18))), ("robot Robot2, relation r1", "an integer of 19 digits")
+    ),
+    "more tuples than costs": wrong(
+        weighted(relation((1, 1), (2, 2), semantics=Semantics.SOFT, costs=(5,))),
+        ("robot Robot2, relation r1", "2 tuples, but 1 costs"),
+    ),
+    "costs without soft": wrong(
+        relation((1, 1), costs=(5,)), ("robot Robot2, relation r1", "costs in a conflicts relation")
+    ),
+    "a cost of half": wrong(
+        weighted(relation((1, 1), semantics=Semantics.SOFT, costs=(0.5,))),
+        ("robot Robot2, relation r1", "the cost 0.5 is no integer"),
+    ),
+    "a default cost that is no number": wrong(
+        weighted(relation((1, 1), semantics=Semantics.SOFT, costs=(1,), default_cost=float("nan"))),
+        ("robot Robot2, relation r1", "the cost nan is no integer"),
+    ),
+    "a default cost below 0": wrong(
+        weighted(relation((1, 1), semantics=Semantics.SOFT, costs=(1,), default_cost=float("-inf"))),
+        ("robot Robot2, relation r1", "the cost -inf is no integer"),
+    ),
+    "a predicate's negative cost": wrong(
+        weighted(constraint("C4", cost=-1)), ("robot Robot3, constraint C4 (V1 V3)", "the cost -1 is negative")
+    ),
+    "a relation of no arity": wrong(
+        constraint("C2", definition=Relation("r1", 0, Semantics.CONFLICTS, ())),
+        ("robot Robot2, relation r1", "a relation of arity 0"),
+    ),
+    "an expression of exponential size": wrong(
+        predicate(doubled(60)), ("robot Robot2, predicate p1", "the expression is too long")
+    ),
+    "an alias for an operator": wrong(
+        predicate(Apply("neq", (Name("X"), Name("Y")))), ("robot Robot2, predicate p1", "says something else")
+    ),
+    "a name that is a call": wrong(
+        predicate(Apply("ne", (Name("abs(X)"), Name("Y")))), ("robot Robot2, predicate p1", "says something else")
+    ),
+    "a Boolean constant": wrong(
+        predicate(Apply("ne", (Constant(True), Name("Y")))),
+        ("robot Robot2, predicate p1", "a Constant where a term should stand"),
+    ),
+    "an operator of too few": wrong(
+        predicate(Apply("ne", (Name("X"),))), ("robot Robot2, predicate p1", "'ne' takes 2 arguments, not 1")
+    ),
+    "a totally known constraint twice": wrong(
+        constraint("C3", "Robot1", model=Model.TKC),
+        ("robot Robot1, constraint C3 (V1 V2)", "totally known constraint (TKC) with the child 'Robot2'"),
+    ),
+    "another's variable shown": wrong(robot("Robot2", shown=("V1",)), ("robot Robot2", "is to show 'V1'")),
+    "a list of variables": wrong(
+        lambda team: with_robot(team, replace(team["Robot2"], variables=cast("Any", [*team["Robot2"].variables]))),
+        ("robot Robot2", "variables: a list where a tuple should stand"),
+    ),
+    "a kind that is a word": wrong(
+        robot("Robot2", kind="DisCSP"), ("robot Robot2", "kind: 'DisCSP' where one of Kind should stand")
+    ),
+    "a value that is True": wrong(
+        relation((1, cast("Any", True))),
+        ("robot Robot2", "definition.tuples[0][1]: a bool where an integer should stand"),
+    ),
+    "a scope that is a word": wrong(
+        constraint("C4", scope="V1 V3"), ("robot Robot3", "constraints[0].scope: 'V1 V3' where a tuple should stand")
+    ),
+    "a definition that is a function": wrong(
+        constraint("C4", definition=print), ("robot Robot3", "where Relation or Predicate should stand")
+    ),
+    "a scenario's unknown robot": wrong(scenario(RemoveAgent("Robot9")), ("event 1", "there is no robot 'Robot9'")),
+    "a scenario's value of 19 digits": wrong(scenario(AddValue("V1", 10**18)), ("event 1", "an integer of 19 digits")),
+    "a scenario's time before the beginning": wrong(
+        scenario(RemoveValue("V1", 1), after=-1), ("event 1", "after less than no message")
+    ),
+    "a scenario after which nobody is left": wrong(
+        scenario(*(RemoveAgent(f"Robot{number}") for number in (1, 2, 3))), ("event 1", "all robots have left")
+    ),
+    "a scenario's robot without variables": wrong(
+        scenario(AddAgent(replace(NEWCOMER, variables=()))), ("robot Late", "the robot has no variable")
+    ),
+    "a scenario's partially known constraint": wrong(
+        scenario(AddConstraint("Robot2", "Robot1", bound("V1", "V2", model=Model.PKC))),
+        ("event 1", "a partially known constraint (PKC) in a scenario"),
+    ),
+    "a scenario's robot with a part": wrong(
+        scenario(
+            AddAgent(
+                replace(
+                    NEWCOMER,
+                    parents=(Parent("Robot1", (bound("V1", "VL", model=Model.PKC),)),),
+                )
+            )
+        ),
+        ("event 1", "(PKC) of a robot that a scenario adds"),
+    ),
+    "a scenario's constraint of too many": wrong(
+        scenario(AddConstraint("Robot2", "Robot1", bound("V1", "V2", 3))),
+        ("robot Robot2, constraint C (V1 V2 3)", "ne takes 2 terms"),
+    ),
+}
+"""What files cannot say, or say in other words."""
+
+
+def breakages() -> Mapping[str, Breakage]:
+    """All that can be done to the team so that it is not valid any more."""
+    return {**AS_IN_FILES, **{name: one.breakage for name, one in OF_OBJECTS.items()}}

@@ -1,0 +1,84 @@
+"""What waits for a participant is bounded for each sender, and a flood is its sender's loss."""
+
+from __future__ import annotations
+
+from queue import Empty
+
+import pytest
+
+from robochoc.communication.network.inbox import Arrived, Inbox, Item, Missed, Woken
+from robochoc.communication.network.quotas import BURST_S, OF_A_ROBOT, OF_AN_OBSERVER, Allowance, Share
+
+
+def all_in(inbox: Inbox) -> list[Item]:
+    items: list[Item] = []
+    while not inbox.empty():
+        items.append(inbox.get_nowait())
+    return items
+
+
+def test_what_is_more_than_a_senders_share_is_dropped_and_told_once() -> None:
+    inbox = Inbox(lambda _sender: Share(2, 100), clock=lambda: 0.0)
+    for number in range(1000):
+        inbox.put(Arrived("A", str(number).encode()))
+    inbox.put(Arrived("B", b"mine"))
+    inbox.put(Woken())
+    expected = [Arrived("A", b"0"), Arrived("A", b"1"), Missed("A", 998, dropped=True), Arrived("B", b"mine"), Woken()]
+    assert all_in(inbox) == expected
+    inbox.put(Arrived("A", b"again"))
+    assert all_in(inbox) == [Arrived("A", b"again")], "there is room again"
+
+
+def test_bytes_that_wait_are_bounded() -> None:
+    inbox = Inbox(lambda _sender: Share(1000, 100), clock=lambda: 0.0)
+    for _ in range(5):
+        inbox.put(Arrived("A", bytes(40)))
+    assert all_in(inbox) == [Arrived("A", bytes(40))] * 2 + [Missed("A", 3, dropped=True)]
+    inbox.put(Arrived("A", bytes(101)))
+    assert all_in(inbox) == [Missed("A", 1, dropped=True)]
+
+
+def test_so_many_a_second_in_the_long_run() -> None:
+    now = 0.0
+    inbox = Inbox(lambda _sender: OF_AN_OBSERVER, clock=lambda: now)
+
+    def taken(letters: int) -> int:
+        count = 0
+        for _ in range(letters):
+            inbox.put(Arrived("A", b""))
+            count += isinstance(inbox.get_nowait(), Arrived)
+        return count
+
+    burst = BURST_S * OF_AN_OBSERVER.letters_a_second
+    assert taken(10_000) == burst
+    now += 2
+    assert taken(10_000) == 2 * OF_AN_OBSERVER.letters_a_second
+    now += 10_000
+    assert taken(10_000) == burst
+
+
+def test_what_a_sender_may_have_is_asked_once() -> None:
+    asked: list[str] = []
+
+    def share_of(sender: str) -> Share:
+        asked.append(sender)
+        return OF_A_ROBOT
+
+    inbox = Inbox(share_of)
+    for sender in ("A", "B", "A", "B"):
+        inbox.put(Arrived(sender, b""))
+    assert asked == ["A", "B"]
+
+
+def test_nothing_is_there() -> None:
+    with pytest.raises(Empty):
+        Inbox().get_nowait()
+    with pytest.raises(Empty):
+        Inbox().get(timeout=0)
+
+
+def test_an_allowance_without_a_limit_and_a_clock_that_stands_still() -> None:
+    allowance = Allowance(1e15, 0.0)
+    for _ in range(3):
+        assert allowance.has(2**53, 0.0)
+        allowance.use(2**53)
