@@ -13,8 +13,8 @@ from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.registry import offers
-from robochoc.solver.cost_table import EXACT, refuse_inexact
 from robochoc.solver.encoding import Unsupported
+from robochoc.solver.exact import EXACT, refuse_inexact
 from robochoc.solver.priced import HIGHEST
 
 PAIR = 2

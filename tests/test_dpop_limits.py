@@ -19,8 +19,8 @@ from robochoc.message import Message, encode
 from robochoc.problem import Constraint, Relation, Semantics
 from robochoc.protocols.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
 from robochoc.run import Options, Runtime, Withdrawal, solve
-from robochoc.solver.cost_table import EXACT
 from robochoc.solver.encoding import TooMuch, Unsupported
+from robochoc.solver.exact import EXACT
 from robochoc.solver.part import Brief
 
 

@@ -14,8 +14,8 @@ from robochoc.options import Options, Runtime, Withdrawal
 from robochoc.problem import Constraint, Kind, Model, Relation, Semantics, Team
 from robochoc.registry import Offer, offers
 from robochoc.run import solve
-from robochoc.solver.cost_table import EXACT
 from robochoc.solver.encoding import Unsupported
+from robochoc.solver.exact import EXACT
 
 
 def dear(cost: int, pairs: str = "AB BC") -> Team:

@@ -24,8 +24,8 @@ from robochoc.problem import INFINITE
 from robochoc.protocols.alike import one_by_one
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.sfb import SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
-from robochoc.solver.cost_table import EXACT
 from robochoc.solver.encoding import TooMuch
+from robochoc.solver.exact import EXACT
 from robochoc.solver.part import Brief
 
 BOTH = ((1,), (2,))

@@ -71,8 +71,8 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.cost_table import EXACT, refuse_inexact
 from robochoc.solver.encoding import TooMuch
+from robochoc.solver.exact import EXACT, refuse_inexact
 
 GIB = 1 << 30
 MOST_AXES = 1_000

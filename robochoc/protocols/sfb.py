@@ -56,7 +56,7 @@ from robochoc.protocols.protocol import Protocol, Settings
 from robochoc.protocols.sfb_bounds import BOUND, ForwardBounds, Rows, dearest
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.cost_table import EXACT, refuse_inexact
+from robochoc.solver.exact import EXACT, refuse_inexact
 
 MIB = 1 << 20
 Domain = tuple[Value, ...]

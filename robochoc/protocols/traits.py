@@ -26,7 +26,7 @@ class Traits:
     across machines keeps them from it. `tree`: it works on a pseudo-tree. `dynamic`: it goes on when the problem
     changes (then it is a `DynamicProtocol`). `concludes`: the verdicts with which one robot alone may end the search;
     whoever claims another is refused. `tables`: it computes with tables of floats, and refuses costs that could add up
-    to 2^53 or more (`cost_table.refuse_inexact`). `privacy`: what neighbours do not come to know.
+    to 2^53 or more (`solver/exact.py`). `privacy`: what neighbours do not come to know.
     """
 
     paper: str = ""

@@ -1,6 +1,6 @@
 """What a constraint charges for every combination of values, as an array: for protocols that compute with tables.
 
-Costs are floats, as a broken hard constraint costs `inf`; integers up to 2^53 are exact in them (`EXACT`). A table has
+Costs are floats, as a broken hard constraint costs `inf`; integers up to 2^53 are exact in them (`exact.py`). A table has
 at most as many entries as a constraint may have tuples of values to be tried on (`MOST_TUPLES`).
 """
 
@@ -15,12 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.message import Value
-from robochoc.solver.encoding import MOST_TUPLES, TooMuch, Unsupported
+from robochoc.solver.encoding import MOST_TUPLES, Unsupported
 from robochoc.solver.shared import Others, SharedConstraint
 
 Array = NDArray[np.float64]
-EXACT = 1 << 53
-"""Below it, floats hold all integers."""
 
 
 class CostTable(NamedTuple):
@@ -57,9 +55,3 @@ def cost_table(
             seen.add(others)
             charges[place] = constraint.prices(others)
     return len(seen) * size, CostTable(constraint.key, constraint.agents, charges)
-
-
-def refuse_inexact(most: float) -> None:
-    """Raises `TooMuch` where costs could add up to `most`, and floats do not hold all integers up to there."""
-    if most >= EXACT:
-        raise TooMuch("costs could add up to 2^53 or more, which tables do not hold exactly")
