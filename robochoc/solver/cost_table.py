@@ -1,7 +1,7 @@
 """What a constraint charges for every combination of values, as an array: for protocols that compute with tables.
 
-Costs are floats, as a broken hard constraint costs `inf`; integers up to 2^53 are exact in them (`exact.py`). A table has
-at most as many entries as a constraint may have tuples of values to be tried on (`MOST_TUPLES`).
+Costs are floats, as a broken hard constraint costs `inf`; integers up to 2^53 are exact in them (`exact.py`). A table
+has at most as many entries as a constraint may have tuples of values to be tried on (`MOST_TUPLES`).
 """
 
 from __future__ import annotations
