@@ -86,6 +86,7 @@ def test_it_judges_its_own_constraint(site: Site) -> None:
     assert master.output.startswith("files: solution, checked; on their owner's word alone: 1 of 1 constraint\n")
 
 
+@SLOW
 def test_its_parent_has_a_copy_of_the_constraint(site: Site) -> None:
     master, status = betrayed(site, "a wrong value", team=PAIR, copied=True)
     assert status == 4, master.output
