@@ -6,6 +6,7 @@ Run as a program it lets a team speak one of them: `python faulty_protocols.py T
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import time
 from typing import cast
@@ -106,6 +107,15 @@ class Spins(Speaks):
     def settle(self) -> None:
         while True:
             pass
+
+
+class StopsItself(Speaks):
+    """The first robot is stopped, as by SIGSTOP from elsewhere, before it says its word."""
+
+    def start(self) -> None:
+        if self.is_first:
+            os.kill(os.getpid(), signal.SIGSTOP)
+        super().start()
 
 
 class Floods(Speaks):

@@ -13,7 +13,6 @@ import msgspec
 import pytest
 from golden import odd_team
 from problems import random_team
-from program import ROOT
 from replays import as_told, in_binary, in_text, random_run, recorded, with_events
 
 from robochoc.communication.processes import ProcessesRun
@@ -33,7 +32,6 @@ from robochoc.observers.events import (
     actor,
 )
 from robochoc.observers.journal import Header, Journal, Recorder, read_journal
-from robochoc.outcome import Verdict
 from robochoc.protocols.abt import ABT, Nogood
 from robochoc.protocols.dynabt import DynABT
 from robochoc.registry import protocol_names
@@ -97,60 +95,6 @@ def test_events_that_never_were_in_a_file_will_do() -> None:
     journal, told = as_told(random_team(Random(5)), Options(protocol="adopt", runtime=Runtime.SIMULATOR))
     assert identical(replay(with_events(journal, told)))
     assert identical(replay(with_events(journal, in_binary(told))))
-
-
-# What a journal claims beside its steps
-
-
-def test_a_header_that_is_another_runs_is_found(four: Journal) -> None:
-    for field, value in (("protocol", "afc"), ("seed", 7), ("order", ("Robot1.2", "Robot1.1"))):
-        changes: dict[str, Any] = {field: value}
-        header = msgspec.structs.replace(four.header, **changes)
-        assert four.outcome is not None
-        own = replace(four.outcome, **changes) if field != "order" else four.outcome
-        found = replay(replace(four, header=header, outcome=own))
-        assert [one.what for one in found.contradictions] == [f"the header's {field}"]
-        assert not found.identical
-    for field, value in (("team", "five"), ("runtime", "processes")):
-        found = replay(replace(four, header=msgspec.structs.replace(four.header, **{field: value})))
-        assert [one.what for one in found.contradictions] == [f"the outcome's {field}"]
-
-
-def test_an_outcome_that_does_not_follow_is_found(four: Journal) -> None:
-    outcome = four.outcome
-    assert outcome is not None
-    metrics = outcome.metrics
-    other = dict(outcome.assignment)
-    other.popitem()
-    for field, claimed in (
-        ("verdict", replace(outcome, verdict=Verdict.SOLUTION)),
-        ("verdict", replace(outcome, verdict=Verdict.NO_SOLUTION)),
-        ("assignment", replace(outcome, assignment=other)),
-        ("cost", replace(outcome, cost=17.0)),
-        ("withdrawn", replace(outcome, withdrawn=outcome.withdrawn[1:])),
-        ("messages", replace(outcome, metrics=replace(metrics, messages={"Ok": 1}))),
-        ("bytes", replace(outcome, metrics=replace(metrics, bytes=metrics.bytes + 1))),
-        ("ncccs", replace(outcome, metrics=replace(metrics, ncccs=metrics.ncccs - 1))),
-        ("checks", replace(outcome, metrics=replace(metrics, checks=0))),
-    ):
-        found = replay(replace(four, outcome=claimed))
-        assert found.difference is None
-        assert [one.what for one in found.contradictions] == [f"the outcome's {field}"]
-        assert not found.identical
-
-
-def test_a_solution_is_not_a_proof_that_there_is_none() -> None:
-    solvable = recorded(read_team(ROOT / "docs" / "examples" / "scouts"), replace(FOUR, withdraw=None))
-    assert replay(solvable).identical
-    assert solvable.outcome is not None
-    assert solvable.outcome.verdict == "solution"
-    claimed = replace(solvable.outcome, verdict=Verdict.NO_SOLUTION, assignment={}, cost=None)
-    found = replay(replace(solvable, outcome=claimed))
-    assert {one.what for one in found.contradictions} == {
-        "the outcome's verdict",
-        "the outcome's assignment",
-        "the outcome's cost",
-    }
 
 
 # What ends early

@@ -18,6 +18,7 @@ from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.observers.events import Sent
 from robochoc.observers.journal import Journal, Recorder, lines_of
+from robochoc.options import Options
 from robochoc.outcome import Verdict
 
 THE_SAME = """\
@@ -156,6 +157,11 @@ def test_where_nothing_is_compared_there_is_no_success(two: Journal, tmp_path: P
         assert "nothing was compared" in said
         told: dict[str, Any] = msgspec.json.decode(ended(tmp_path / "journal", "--json")[1])
         assert told["identical"] is False
+
+
+def test_a_run_without_robots_has_nothing_to_be_compared(tmp_path: Path) -> None:
+    content = recorded(queens3d(2), Options(protocol="central"))
+    assert ended(written(content, tmp_path / "journal"))[0] == INVALID
 
 
 def test_a_verdict_that_does_not_follow_is_a_difference(two: Journal, tmp_path: Path) -> None:

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import logging
+import os
+import re
 import signal
 import sys
 from pathlib import Path
+from threading import Thread
 
 import pytest
 from faults import PROGRAM, running, wait_until
-from faulty_protocols import TEAM, Spins
+from faulty_protocols import TEAM, Spins, StopsItself
 
 from robochoc.communication.processes import ProcessesRun
+from robochoc.communication.robot_link import Condition, RobotsLost
 from robochoc.communication.stopped import TOLD_S, Stopped
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
+from robochoc.observers.events import AnyEvent, Lost
 from robochoc.outcome import Verdict
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
@@ -67,20 +72,58 @@ def test_time_in_which_nobody_looked_does_not_count() -> None:
     assert stopped.look([], 3600.1) == {}
 
 
-@pytest.mark.parametrize("runtime", [["--on-loss", "fail"], ["--on-loss", "withdraw", "--messages", "2000"]])
-def test_a_stopped_robot_is_lost_when_patience_is_over(runtime: list[str], team: Path, tmp_path: Path) -> None:
-    command = [PROGRAM, "solve", str(team), "--timeout", "60", "--patience", "0.5", *runtime]
+FIRST = TEAM.robots[0].name
+WHY = re.compile(r"its process had been stopped \(SIGSTOP\) for \d+ s")
+
+
+def test_a_stopped_robot_is_lost_when_patience_is_over() -> None:
+    lost: list[AnyEvent] = []
+    with ProcessesRun(TEAM, StopsItself, patience_s=0.3, observer=lost.append) as session:
+        with pytest.raises(RobotsLost) as refused:
+            session.search()
+        pids = [robot.process.pid for robot in session._crew.robots.values()]  # noqa: SLF001 - nothing else knows them
+    assert [*refused.value.robots] == [FIRST]
+    assert WHY.fullmatch(refused.value.robots[FIRST])
+    assert [event.robot for event in lost if isinstance(event, Lost)] == [FIRST]
+    assert not any(Path(f"/proc/{pid}").exists() for pid in pids)
+
+
+def test_the_others_go_on_without_it() -> None:
+    with ProcessesRun(TEAM, StopsItself, patience_s=0.3, survive=True) as session:
+        result = session.search()
+        assert FIRST not in session._crew.robots  # noqa: SLF001 - nothing else knows them
+    assert [*result.lost] == [FIRST]
+    assert WHY.fullmatch(result.lost[FIRST])
+
+
+def test_one_that_goes_on_is_not_lost() -> None:
+    with ProcessesRun(TEAM, StopsItself, patience_s=300) as session:
+        waker = Thread(target=wake, args=(session,))
+        waker.start()
+        result = session.search()
+        waker.join()
+    assert result.verdict is Verdict.SOLUTION
+    assert result.lost == {}
+
+
+def wake(session: ProcessesRun) -> None:
+    """Let the first robot go on, once it is stopped."""
+    robots = session._crew.robots  # noqa: SLF001 - nothing else knows them
+    wait_until(lambda: FIRST in robots and robots[FIRST].condition() is Condition.STOPPED, "it is not stopped")
+    pid = robots[FIRST].process.pid
+    assert pid is not None
+    os.kill(pid, signal.SIGCONT)
+
+
+@pytest.mark.slow
+def test_the_command_gives_a_stopped_robot_up(team: Path, tmp_path: Path) -> None:
+    command = [PROGRAM, "solve", str(team), "--timeout", "60", "--patience", "0.5"]
     with running(command, tmp_path / "run") as run:
         run.strike(signal.SIGSTOP, run.wait_for_robots(COUNT)[20])
         run.end()
+        assert run.status() == 4
         why = "Robot3.7 was lost: its process had been stopped (SIGSTOP) for "
-        if "withdraw" in runtime:
-            assert run.status() in {0, 3}
-            assert "1 was lost" in run.output()
-            assert "Robot3.7" in run.output()
-        else:
-            assert run.status() == 4
-            assert run.errors().startswith(f"{team}: {why}")
+        assert run.errors().startswith(f"{team}: {why}")
         assert run.left_behind() == []
 
 

@@ -35,6 +35,7 @@ def report(journal: Journal, replayed: Replayed) -> str:
     if replayed.difference is not None:
         lines += _shown(replayed.difference)
     elif replayed.contradictions:
+        lines.append("  different, though all steps are the same:" if replayed.steps else "  different:")
         lines += _contradicted(replayed.contradictions)
     elif not replayed.steps:
         lines.append("  nothing was compared: it holds no step of any robot that could be played")
@@ -111,7 +112,6 @@ def _shown(difference: Difference) -> Iterator[str]:
 
 def _contradicted(found: Sequence[Contradiction]) -> Iterator[str]:
     """What the journal claims that its steps do not bear out."""
-    yield "  different, though all steps are the same:"
     for one in found:
         yield f"    {one.what}"
         yield f"      recorded  {_cut(msgspec.json.encode(one.recorded).decode())}"

@@ -17,6 +17,7 @@ from robochoc.communication.run_result import RunResult
 from robochoc.observers.checker import Refuted
 from robochoc.observers.events import AnyEvent, Lost, Received, Sent
 from robochoc.observers.journal import Header, Journal, metrics_of
+from robochoc.options import CENTRAL
 from robochoc.outcome import Epoch, Outcome, Verdict
 from robochoc.registry import speaker
 from robochoc.replay.cast import Ensemble
@@ -56,7 +57,10 @@ def contradictions(journal: Journal, runs: Sequence[Played], *, whole: bool) -> 
     yield from _beginning(header, [one.run for one in runs], outcome.placed_by if outcome else None)
     if outcome is None:
         return
-    yield from _differing("the outcome's ", outcome, header, ("team", "protocol", "seed", "runtime"))
+    same = ["team", "protocol", "seed"]
+    if header.protocol != CENTRAL:  # which has no runtime
+        same.append("runtime")
+    yield from _differing("the outcome's ", outcome, header, same)
     events = list(chain.from_iterable(one.run.events for one in runs))
     lost = bool(outcome.lost) or any(isinstance(event, Lost) for event in events)
     if not whole or lost or not runs or any(one.run.given is None for one in runs):

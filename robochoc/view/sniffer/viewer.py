@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Self
 
+from robochoc.communication.system import signals_held
 from robochoc.view.address import listening, secret_path, url_of
 from robochoc.view.redirect import RedirectFile
 
@@ -41,12 +42,13 @@ class Viewer:
             self._redirect: RedirectFile | None = None
             try:
                 self._redirect = RedirectFile(self.url) if open_browser else None
-                self._process = subprocess.Popen(  # noqa: S603 - our own module
-                    [sys.executable, "-P", "-m", _PROGRAM, str(here.fileno()), str(journal)],
-                    stdin=theirs_in,
-                    stdout=theirs_out,
-                    pass_fds=(here.fileno(), journal),
-                )
+                with signals_held():  # until it has said itself what they do: Ctrl-C reaches it, too
+                    self._process = subprocess.Popen(  # noqa: S603 - our own module
+                        [sys.executable, "-P", "-m", _PROGRAM, str(here.fileno()), str(journal)],
+                        stdin=theirs_in,
+                        stdout=theirs_out,
+                        pass_fds=(here.fileno(), journal),
+                    )
             except BaseException:
                 os.close(heard)
                 os.close(lifeline)
