@@ -119,6 +119,8 @@ class Outcome:
     withdrawn: tuple[str, ...] = ()
     metrics: Metrics = field(default_factory=Metrics)
     verified: bool = False
+    """Whether the checker has held the assignment against every constraint of a team that was found valid before; for
+    `no-solution`, whether the central judge has come to the same."""
     witness: str | None = None
     """Who ended the search: for `no-solution`, the robot that has `RULED_OUT`."""
     reason: str | None = None

@@ -16,9 +16,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from itertools import pairwise
 
 from robochoc.expression import Expression, Undefined, evaluate
+from robochoc.ranges import joined
 
 Assignment = Mapping[str, int]
 """Values of variables, by name."""
@@ -63,8 +63,7 @@ class Domain:
     ranges: tuple[range, ...]
 
     def __post_init__(self) -> None:
-        if any(_touch(before, after) for before, after in pairwise(self.ranges)):
-            object.__setattr__(self, "ranges", _merged(self.ranges))
+        object.__setattr__(self, "ranges", joined(self.ranges))
 
     def __iter__(self) -> Iterator[int]:
         for part in self.ranges:
@@ -353,21 +352,6 @@ class Team:
             yield from robot.shared
             for child in robot.children:
                 yield from child.constraints
-
-
-def _touch(before: range, after: range) -> bool:
-    return bool(before) and bool(after) and before.step == after.step == 1 and before.stop == after.start
-
-
-def _merged(ranges: Iterable[range]) -> tuple[range, ...]:
-    """`ranges`, in which those that touch are put together."""
-    merged: list[range] = []
-    for part in ranges:
-        if merged and _touch(merged[-1], part):
-            merged[-1] = range(merged[-1].start, part.stop)
-        else:
-            merged.append(part)
-    return tuple(merged)
 
 
 class CycleError(ValueError):

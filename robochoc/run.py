@@ -16,14 +16,14 @@ from robochoc.communication.run_result import Progress
 from robochoc.communication.session import Session
 from robochoc.defaults import FIRST_FIT, MINIMISES
 from robochoc.epochs import Announcer, Field, Journey, Opening, Played
-from robochoc.formats import check_event, check_team
+from robochoc.formats import check_team, held_to_rules
 from robochoc.observers.checker import Refuted
 from robochoc.observers.events import Observer
 from robochoc.observers.objective import aside_cost
 from robochoc.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.orders import CannotTurn, Order, favourable, order_of
 from robochoc.outcome import Epoch, Metrics, Outcome, Verdict
-from robochoc.problem import INFINITE, Event, Team
+from robochoc.problem import INFINITE, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.refusals import instead, refuse_central, refuse_field, refuse_unfit
@@ -56,13 +56,12 @@ def solve(
     """Let `team` solve its problem, epoch by epoch if it changes, and hold each answer against every constraint.
 
     Who solves many teams may lend a `solver` that stays warm between them. A `field` is told of each epoch's answer,
-    and says what happens next: the problem changes over time. When a limit is reached, the verdict is
-    `unknown`. Raises `InvalidInput` for a team, or a field's event, that is not valid; `UnknownProtocol`,
-    `Unsupported`, `RobotsLost` (processes), `CompileFailed` and `SolverLost` (the constraint solver), `SolverMissing`,
-    and `Refuted` when a second opinion does not agree.
+    and says what happens next: the problem changes over time. When a limit is reached, the verdict is `unknown`. Raises
+    `InvalidInput` (team, field's event), `UnknownProtocol`, `Unsupported`, `RobotsLost` (processes), `CompileFailed`,
+    `SolverLost` (the constraint solver), `SolverMissing`, and `Refuted` when a second opinion does not agree.
     """
     check_team(team)
-    field = field and _checked(field)
+    field = field and held_to_rules(field)
     try:
         if field:
             refuse_field(team, options)
@@ -70,18 +69,6 @@ def solve(
         return run.centrally() if options.protocol == CENTRAL else run.distributed()
     except CannotTurn as refused:
         raise Unsupported(str(refused)) from None
-
-
-def _checked(field: Field) -> Field:
-    """`field`, whose events are held against the rules of teams before they happen."""
-
-    def checked(team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
-        event = field(team, epoch, left_s)
-        if event:
-            check_event(team, event)
-        return event
-
-    return checked
 
 
 class _Run:

@@ -6,7 +6,7 @@ from robochoc.formats.diagnostics import Diagnostic, InvalidInput, encodable, on
 from robochoc.formats.folder import write_team
 from robochoc.formats.robot import read_robot, robot_in
 from robochoc.formats.team import find_teams, read_team, robot_names
-from robochoc.formats.validation import check_event, check_robot, check_team
+from robochoc.formats.validation import check_event, check_robot, check_team, held_to_rules
 from robochoc.formats.writer import robot_xml
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "check_team",
     "encodable",
     "find_teams",
+    "held_to_rules",
     "on_one_line",
     "read_robot",
     "read_team",

@@ -8,9 +8,10 @@ as long as that very object lives: teams cannot be changed, and `dataclasses.rep
 from __future__ import annotations
 
 import weakref
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import islice
+from typing import TypeVar
 
 from robochoc.change import BadChange, changed
 from robochoc.formats.copies import differing_copies
@@ -36,6 +37,7 @@ MAX_BETWEEN = 1000
 """So many mistakes between the robots of one team are told."""
 
 _NOTHING = Event(())
+_Ended = TypeVar("_Ended")
 
 _valid: dict[int, weakref.ref[Team]] = {}
 """The teams that are known to be valid, by `id`. To hash a team would take as long as to look at it."""
@@ -99,6 +101,18 @@ def check_event(team: Team, event: Event) -> None:
     ]
     if found:
         raise InvalidInput(dict.fromkeys(found))
+
+
+def held_to_rules(field: Callable[[Team, _Ended, float | None], Event | None]) -> Callable[..., Event | None]:
+    """Return `field`, which says what happens to a team, with its events held against the rules before they happen."""
+
+    def checked(team: Team, ended: _Ended, left_s: float | None) -> Event | None:
+        event = field(team, ended, left_s)
+        if event:
+            check_event(team, event)
+        return event
+
+    return checked
 
 
 def note_valid(team: Team) -> None:
