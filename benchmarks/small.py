@@ -7,6 +7,7 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from crew import crew
@@ -34,7 +35,7 @@ def measured() -> Section:
         for folder in (ROOT / "docs" / "examples" / "arm", *sorted(Path(scratch).iterdir())):
             for words in (("solve", "--no-cache"), ("solve", "--no-cache", "--ace")):
                 command = [ROBOCHOC, *words, "--runtime", "simulator", "--json", str(folder)]
-                samples = repeated(f"{folder.name}: {' '.join(words)}", lambda c=command: timed_command(c), TIMES)
+                samples = repeated(f"{folder.name}: {' '.join(words)}", partial(timed_command, command), TIMES)
                 wall, cpu = (spread(figures) for figures in zip(*((s.wall_s, s.cpu_s) for s in samples), strict=True))
                 commands.append((folder.name, " ".join(words), wall, cpu))
     rows: list[Row] = [("variables", "combinations", "solutions", "steps", "here", "warm ACE", "ACE from its start")]

@@ -53,7 +53,8 @@ if TYPE_CHECKING:
     metavar="NAME",
     help=(
         f"The robots solve it together by this one; by default {SATISFIES}, and {MINIMISES} where there are costs."
-        " central: no robots, ACE decides all files merged into one model. All that there are: robochoc protocols."
+        " central: no robots, one model of all files merged, solved by ACE if it is not small. All that there are:"
+        " robochoc protocols."
     ),
 )
 @click.option(
