@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable, Mapping, Sequence
-from typing import Self
+from typing import Self, cast
 
 import msgspec
 
@@ -176,8 +176,8 @@ class Host:
         """Let the protocol act, count its checks, and wrap what it has said."""
         act()
         self._tick()
-        self.said_at = [said.checks for said in self.protocol.outbox]
-        said = [self._wrap(said, clock) for said, clock in zip(self.protocol.outbox, self._stamps, strict=True)]
+        self.said_at = [said.checks for said in self._outbox]
+        said = [self._wrap(said, clock) for said, clock in zip(self._outbox, self._stamps, strict=True)]
         self._forget_said()
         self._step_began = self._checks
         if self._observer:
@@ -209,13 +209,17 @@ class Host:
         """Each check done since the last look moves the clock by one; what was said meanwhile is stamped with it."""
         before = self.clock - self._checks
         self._answers = len(self._stamps)
-        self._stamps += [before + said.checks for said in self.protocol.outbox[self._answers :]]
+        self._stamps += [before + said.checks for said in self._outbox[self._answers :]]
         self._checks = self.protocol.problem.checks
         self.clock = before + self._checks
 
     def _time(self, checks: int) -> float:
         """The time when so many checks were done."""
         return self._now() if self._then is None else self._then(checks)
+
+    @property
+    def _outbox(self) -> list[Said]:
+        return cast("list[Said]", self.protocol.outbox)
 
     def _forget_said(self) -> None:
         self.protocol.outbox.clear()

@@ -60,7 +60,8 @@ class Protocol(ABC):
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         self.problem = problem
         self.order = order
-        self.outbox: list[Said] = []
+        self.outbox: list[tuple[str, Message]] = []
+        """Receivers and messages, each pair as a `Said`."""
         self.value: int | None = None
         """The own value, as its place in the compiled domain; None: unassigned."""
         self.verdict: Verdict | None = None

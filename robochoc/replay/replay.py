@@ -20,7 +20,6 @@ from robochoc.message import Envelope, Message
 from robochoc.observers.events import AnyEvent, Event, Received, Sent, Settled
 from robochoc.observers.journal import Header, Journal
 from robochoc.observers.journal_entries import STAMPED_LATE
-from robochoc.protocols.protocol import Said
 from robochoc.replay.cast import Cast, Ensemble, Means
 from robochoc.replay.channels import Channels, Words
 from robochoc.replay.ending import Contradiction, Played, contradictions, played
@@ -98,7 +97,7 @@ class SaysNoEnd(Exception):  # noqa: N818 - named for what happens
     """A protocol has said so much in one step that it may never end."""
 
 
-class _Outbox(list[Said]):
+class _Outbox(list[tuple[str, Message]]):
     """An outbox that takes so many messages: a protocol that goes round in a circle mostly speaks on the way."""
 
     def __init__(self, most: int, listen: Callable[[str, Message], None]) -> None:
@@ -106,7 +105,7 @@ class _Outbox(list[Said]):
         self._most = most
         self._listen = listen
 
-    def append(self, said: Said) -> None:
+    def append(self, said: tuple[str, Message]) -> None:
         """Take one more. Raises `SaysNoEnd`."""
         if len(self) >= self._most:
             raise SaysNoEnd(f"{len(self):,} messages in one step, and no end of it")
