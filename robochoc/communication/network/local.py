@@ -12,9 +12,11 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from multiprocessing.connection import wait
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
+from multiprocessing.util import get_temp_dir
 from types import MappingProxyType
 from typing import cast
 
@@ -67,16 +69,17 @@ class LocalNetwork(Session):
         conditions: Conditions = Conditions(),
         brief: Brief = NO_BRIEF,
     ) -> None:
+        require_descriptors(_DESCRIPTORS + _DESCRIPTORS_PER_ROBOT * len(team.robots))
         self._protocol = protocol
         self._brief = brief
+        self._context = _fork_server(protocol)
+        conditions = replace(conditions, scratch=get_temp_dir())
         self._conditions = conditions
         self._processes: dict[str, BaseProcess] = {}
         self._sent_home = False
         self._household = Household(team.order)
         self._waiting = [(robot, domains.get(robot.name)) for robot in team.robots]
         watched = observer is not None
-        require_descriptors(_DESCRIPTORS + _DESCRIPTORS_PER_ROBOT * len(team.robots))
-        self._context = _fork_server(protocol)
         profiles = {robot.name: profile_of(robot) for robot in team.robots}
         ways = reach(profiles, beyond=protocol.traits.beyond)
         self._master = self._opened(
