@@ -192,12 +192,17 @@ class LocalNetwork(Session):
 
 
 def _fork_server(protocol: type[Protocol]) -> ForkServerContext:
-    """Start the fork server, if it does not run yet: while it imports, the router is opened."""
+    """Start the fork server, if it does not run yet: while it imports, the router is opened.
+
+    Signals wait meanwhile: half done, its folder would be left. The fork server inherits that, so it does not hear what
+    reaches the whole group while it imports; it ends with this process.
+    """
     context = multiprocessing.get_context("forkserver")
     own = [protocol.__module__] if protocol.__module__.startswith(_OURS) else []
     context.set_forkserver_preload([*_PRELOAD, *own])
     try:
-        multiprocessing.forkserver.ensure_running()
+        with signals_held():
+            multiprocessing.forkserver.ensure_running()
     except OSError as error:  # such as a temporary folder whose path is too long for a socket
         raise Unsupported(f"robots' processes cannot be started: {error} (see TMPDIR)") from error
     return context
