@@ -20,6 +20,7 @@ from clocks import waiting
 from faults import Run, running, wait_until
 from held import CHAIN, Held
 from network_runs import NetworkRun, free_endpoint
+from program import ROOT
 from relays import Relay
 
 from robochoc.authority.authority import Authority
@@ -367,4 +368,17 @@ def test_a_parent_that_is_struck_at_any_time_leaves_no_process(
 
 def left_nothing(run: Run) -> None:
     assert "Traceback" not in run.errors(), run.errors()
-    assert [path for path in run.left_behind() if "pymp-" not in path or run.status() != -signal.SIGKILL] == []
+    wait_until(lambda: not run.left_behind(), f"it leaves {run.left_behind()}")
+
+
+# What a machine lacks
+
+
+def test_too_few_open_files_are_one_line() -> None:
+    """Zenoh aborted the process."""
+    command = ["robochoc", "solve", str(ROOT / "instances" / "queens3d-4"), "--runtime", "network"]
+    limited = ["sh", "-c", 'ulimit -n 20 && exec "$@"', "sh", sys.executable, "-m", *command]
+    result = subprocess.run(limited, capture_output=True, text=True, check=False)
+    assert result.returncode == 2, result.stderr
+    assert "too few files may be open: 20, with" in result.stderr
+    assert result.stderr.count("\n") == 1

@@ -15,13 +15,15 @@ from network_runs import NetworkRun, free_endpoint, letter
 
 from robochoc.authority.admission import Household
 from robochoc.authority.registry import Right, Role
+from robochoc.communication.control import Failed
 from robochoc.communication.network.access import ALL, letter_key
 from robochoc.communication.network.conditions import LEASE_MS, Conditions
 from robochoc.communication.network.inbox import Arrived, Missed
 from robochoc.communication.network.letters import MASTER
 from robochoc.communication.network.post import Post
+from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.router import Router
-from robochoc.communication.network.words import Ask
+from robochoc.communication.network.words import Ask, Register, Said
 from robochoc.communication.robot_link import RobotsLost
 from robochoc.outcome import Verdict
 
@@ -95,8 +97,6 @@ def test_a_gap_between_robots_that_is_none_is_told_and_ends_nothing(tmp_path: Pa
 def test_a_gap_between_robots_that_is_one_names_the_sender(tmp_path: Path) -> None:
     """With the key of RX3 somebody has taken the number of a letter of RX3, and there is a gap."""
     with watched(tmp_path, Conditions(patience_s=3)) as run:
-        from robochoc.communication.network.words import Said  # noqa: PLC0415 - of this test alone
-
         with run.post("RX3") as post:
             put_with_a_gap(post, "RX2", letter(run, "RX3", "RX2", Said(0, 0, b"")))
             run.wait_for_refusal("RX3", "a letter to RX2", "lost for good")
@@ -130,3 +130,15 @@ def test_a_gap_is_put_down_to_whose_key_it_came_on() -> None:
             assert careful.inbox.get(timeout=PATIENCE_S) == Arrived("A", b"2")
     finally:
         router.close()
+
+
+def test_why_a_robot_fails_reaches_other_owners_as_plain_text(tmp_path: Path) -> None:
+    with NetworkRun(tmp_path, absent=["RX3"]) as run, run.post("RX3") as post:
+        post.send(MASTER, letter(run, "RX3", MASTER, Register(profile_of(CHAIN["RX3"]), "1")))
+        run.wait_until(lambda: "RX3" in run.master.members.robots, "it is not registered")
+        post.send(MASTER, letter(run, "RX3", MASTER, Failed("\x1b[2J\u202e" + "x" * 1_000_000)))
+        with pytest.raises(RobotsLost) as lost:
+            run.wait_for_result()
+    assert str(lost.value).startswith(r"RX3 was lost: \x1b[2J\u202exxx")
+    assert len(str(lost.value)) < 1000
+    assert {ending.why for ending in run.endings.values()} == {"the run is over"}

@@ -30,9 +30,10 @@ class Gate:
         refused: RefusalObserver | None,
         lease_ms: int,
         ways: Reach = MappingProxyType({}),
+        scratch: str = "",
     ) -> None:
         self._admission = admission
-        self._router = Router(endpoint, identity, refused, lease_ms)
+        self._router = Router(endpoint, identity, refused, lease_ms, scratch)
         self._ways = ways
         self.admitted: tuple[str, ...] = ()
         """Who may connect, as the router's rules have it."""

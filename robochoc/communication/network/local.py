@@ -12,9 +12,11 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from multiprocessing.connection import wait
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
+from multiprocessing.util import get_temp_dir
 from typing import cast
 
 from robochoc.authority.admission import Household
@@ -68,16 +70,17 @@ class LocalNetwork(Session):
     ) -> None:
         super().__init__(team)
         team = self.compiled.team
+        require_descriptors(_DESCRIPTORS + _DESCRIPTORS_PER_ROBOT * len(team.robots))
         self._protocol = protocol
         self._brief = brief
+        self._context = _fork_server(protocol)
+        conditions = replace(conditions, scratch=get_temp_dir())
         self._conditions = conditions
         self._processes: dict[str, BaseProcess] = {}
         self._sent_home = False
         self._household = Household(team.order)
         self._waiting = list(self.compiled.robots.values())
         watched = observer is not None
-        require_descriptors(_DESCRIPTORS + _DESCRIPTORS_PER_ROBOT * len(team.robots))
-        self._context = _fork_server(protocol)
         profiles = {robot.name: profile_of(robot) for robot in team.robots}
         ways = reach(profiles, beyond=protocol.traits.beyond)
         self._master = self._opened(
@@ -196,12 +199,17 @@ class LocalNetwork(Session):
 
 
 def _fork_server(protocol: type[Protocol]) -> ForkServerContext:
-    """Start the fork server, if it does not run yet: while it imports, the router is opened."""
+    """Start the fork server, if it does not run yet: while it imports, the router is opened.
+
+    Signals wait meanwhile: half done, its folder would be left. The fork server inherits that, so it does not hear what
+    reaches the whole group while it imports; it ends with this process.
+    """
     context = multiprocessing.get_context("forkserver")
     own = [protocol.__module__] if protocol.__module__.startswith(_OURS) else []
     context.set_forkserver_preload([*_PRELOAD, *own])
     try:
-        multiprocessing.forkserver.ensure_running()
+        with signals_held():
+            multiprocessing.forkserver.ensure_running()
     except OSError as error:  # such as a temporary folder whose path is too long for a socket
         raise Unsupported(f"robots' processes cannot be started: {error} (see TMPDIR)") from error
     return context

@@ -102,7 +102,7 @@ class Master:
         self.chronicle = Chronicle(observer)
         self._refuse = self.chronicle.refuse
         told, listen = self._note_refusal if observer else None, conditions.listen or endpoint
-        self._gate = Gate(admission, identity, listen, told, conditions.lease_ms, members.ways)
+        self._gate = Gate(admission, identity, listen, told, conditions.lease_ms, members.ways, conditions.scratch)
         self._desk = PublicationDesk(self.run, self._gate.may_sniff, self.chronicle)
         self._requests = Requests(self._desk, self._facilitator, self._tell, self._refuse)
         self._dead: dict[str, str] = {}

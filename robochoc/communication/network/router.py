@@ -74,14 +74,17 @@ class Router:
     """Runs the router's process with the master's `identity`, on `endpoint` (`HOST:PORT`).
 
     `refused` is told of refusals, from a thread of its own (None: nobody wants to know, which is much faster). Whoever
-    opens it closes it.
+    opens it closes it. `scratch` is removed by the router's process if this one dies (see `Conditions`).
     """
 
-    def __init__(self, endpoint: str, identity: Identity, refused: RefusalObserver | None, lease_ms: int) -> None:
+    def __init__(
+        self, endpoint: str, identity: Identity, refused: RefusalObserver | None, lease_ms: int, scratch: str = ""
+    ) -> None:
         self.endpoint = endpoint
         self._identity = identity
         self._refused = refused
         self._lease_ms = lease_ms
+        self._scratch = scratch
         self._process: subprocess.Popen[bytes] | None = None
         self._reader: threading.Thread | None = None
 
@@ -99,7 +102,7 @@ class Router:
         self._process = process
         if process.stdin is None or process.stdout is None:
             raise RouterFailed("it has no standard streams")
-        process.stdin.write(json.dumps(self._settings(reach, sniffers)).encode() + b"\n")
+        process.stdin.write(f"{json.dumps(self._scratch)}\n{json.dumps(self._settings(reach, sniffers))}\n".encode())
         process.stdin.flush()
         said = self._wait_until_ready(process.stdout)
         self._reader = threading.Thread(target=self._read, args=[process.stdout, Log(reach), said], daemon=True)
