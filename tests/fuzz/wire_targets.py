@@ -1,0 +1,372 @@
+"""What comes over the wire: letters and what is in them, requests to the Directory, ACL, questions of newcomers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+from random import Random
+
+import msgspec
+from complex_problems import random_complex_team
+from cost_problems import random_cost_team
+from problems import random_team
+
+from fuzz.harness import Target, assert_said
+from fuzz.mutations import one_of, spoilt_bytes, spoilt_msgpack, spoilt_text
+from robochoc.authority.certificates import (
+    BadCertificate,
+    ca_certificate,
+    check_issued,
+    holder_of,
+    hosts_of,
+    leaf_certificate,
+    moment,
+    new_key,
+    pem,
+    read_certificate,
+    read_request,
+    signing_request,
+)
+from robochoc.authority.frames import (
+    BadFrame,
+    Certified,
+    Denied,
+    Introduce,
+    Introduction,
+    Redeem,
+    Renew,
+    decode_answer,
+    decode_question,
+)
+from robochoc.authority.keyring import BadCard, KeyCard
+from robochoc.communication.acl import ACLMessage, BadACL, parse, text
+from robochoc.communication.control import Conclusion, Counters, Events, Failed, Pause, Ready, Wave
+from robochoc.communication.network import words
+from robochoc.communication.network.letters import MASTER, Letters, Refused
+from robochoc.communication.network.profile import (
+    BadProfile,
+    Profile,
+    acquaintances,
+    contradictions,
+    domain_of,
+    in_priority_order,
+    missing,
+    profile_of,
+    ranges_of,
+    silhouette,
+)
+from robochoc.communication.network.shared import BadShared, SharedRecord, known_of, record_of
+from robochoc.formats import on_one_line
+from robochoc.observers.events import AnyEvent, Decided, Sent
+from robochoc.outcome import Metrics, Place, Verdict
+from robochoc.problem import Robot, Team
+from robochoc.protocols.findings import Findings
+from robochoc.services.communicative_acts import Performative
+from robochoc.services.descriptions import AgentDescription, ServiceDescription
+from robochoc.services.directory import Directory
+from robochoc.services.facilitator import handle, subscribe
+from robochoc.services.identifier import AgentIdentifier, identifier_on
+from robochoc.services.sl import Function, df_on, request
+from robochoc.solver.explanation import Known
+
+LATEST = 1_800_000_000.0
+PLATFORM = "host:7447/robochoc"
+
+
+@cache
+def _teams() -> Sequence[Team]:
+    chance = Random(2)
+    return [maker(chance) for maker in (random_team, random_cost_team, random_complex_team)]
+
+
+@cache
+def _robots() -> Sequence[Robot]:
+    return [robot for team in _teams() for robot in team.robots]
+
+
+def _packed(value: object) -> bytes:
+    return msgspec.msgpack.encode(value)
+
+
+# Letters
+
+
+@cache
+def letters(receiver: str) -> Sequence[bytes]:
+    """Letters to the master, or to a robot, with every word."""
+    metrics = Metrics({"Ok": 3}, 80, 5, 9, 0.25)
+    epoch = 1
+    findings = Findings(bound=3, place=Place("R", ("S",)))
+    events: list[AnyEvent] = [
+        Sent(t=0, sender="A", receiver="B", type="Ok", content={"value": [1]}, bytes=9, clock=3),
+        Decided(t=0.5, robot="A", assignment={"V": 1}, clock=4),
+    ]
+    said: list[words.Word] = [
+        *(words.Register(profile_of(one), "visit") for one in _robots()),
+        words.Joined("visit", b""),
+        words.Shown({"V": ((1, 3), (5, 7))}),
+        Ready(epoch),
+        Counters(epoch, 1, 7, 7),
+        Conclusion(epoch, Verdict.NO_SOLUTION),
+        Events(events),
+        words.Account(epoch, assigned=True, assignment={"V": 1}, metrics=metrics, findings=findings),
+        words.Checked(epoch, allowed=True, cost=3),
+        Failed("it broke"),
+        words.Objection("A", "a letter", "it is a replay"),
+        words.Ask(1, _requests()[0].decode()),
+        words.Sniff(2),
+        words.Bye(),
+    ]
+    if receiver != MASTER:
+        said = [
+            words.Welcome("visit", "run", ("sealed",), observed=True, private=False),
+            words.Denied("visit", "revoked"),
+            words.Show(("V", "W")),
+            words.Task(
+                epoch,
+                protocol="abt",
+                order=("A", "B"),
+                interfaces={"A": ("V",), "B": ("W",)},
+                domains={"V": ((1, 3),), "W": ((1, 3),)},
+                links={"B": ("A",)},
+                secretive=(),
+                seed=7,
+                settings={"window": "1"},
+                aside=None,
+                cards=(b"card",),
+            ),
+            words.Search(epoch),
+            Wave(3),
+            Pause(),
+            words.Judge(epoch, {"V": 1}),
+            words.Revoked("B"),
+            words.Told(1, "inform", "((done x))"),
+            words.Sniffable(2, "run", ""),
+            words.Leave("solved", failed=False),
+        ]
+        said += [words.Said(epoch, 5, b"\x92\xa2Ok\x91\x01"), words.Copies(epoch, records()[0])]
+    return [_packed(["run", place + 1, word]) for place, word in enumerate(said)]
+
+
+def check_letter(receiver: str, content: bytes) -> bool:
+    """A letter is read or refused; a word that is accepted can be looked at, and written again."""
+    senders = [MASTER] if receiver == MASTER else [MASTER, "B"]
+    accepted = False
+    for sender in senders[::-1] if receiver != MASTER else ["B"]:
+        for _ in range(2):
+            reader = Letters(receiver, "run")
+            try:
+                number = msgspec.msgpack.decode(content)[1]
+                if isinstance(number, int) and 1 < number < 1 << 62:
+                    reader.take(sender, number - 1)
+            except Exception:  # noqa: BLE001, S110 - then it expects the first one
+                pass
+            try:
+                opened = reader.read(sender, content)
+            except Refused as refused:
+                on_one_line(str(refused)).encode()
+                continue
+            accepted = True
+            _look_into(opened.word)
+            writer = Letters(sender, "run")
+            again = Letters(receiver, "run").read(sender, writer.write(receiver, opened.word))
+            assert repr(again.word) == repr(opened.word), "another word is read from what was written"
+    return accepted
+
+
+def _look_into(word: words.Word) -> None:
+    match word:
+        case words.Register(profile):
+            _introduce(profile)
+        case words.Shown(variables):
+            for name, ranges in variables.items():
+                _refused_or(BadProfile, partial(domain_of, name, ranges))
+        case words.Joined(_, card):
+            _refused_or(BadCard, partial(KeyCard.decode, card))
+        case words.Ask(_, text):
+            check_request(text.encode())
+        case words.Copies(_, content):
+            check_records(content)
+        case _:
+            pass
+
+
+def _refused_or(refusal: type[ValueError], act: Callable[[], object]) -> bool:
+    """Whether `act` went well; a `refusal` says why not."""
+    try:
+        act()
+    except refusal as refused:
+        assert_said(refused)
+        return False
+    return True
+
+
+def _introduce(profile: Profile) -> bool:
+    try:
+        robot = silhouette(profile, {})
+    except BadProfile as bad:
+        assert_said(bad)
+        return False
+    others = {one.name: profile_of(one) for one in _teams()[0].robots}
+    profiles = {**others, profile.name: profile}
+    wrong = list(contradictions(profiles))
+    missing(profiles)
+    acquaintances(profiles)
+    if not wrong:
+        in_priority_order(profiles)
+    assert {one.name: ranges_of(one.domain) for one in robot.variables} == profile.variables
+    return True
+
+
+# Shared constraints
+
+
+@cache
+def records() -> Sequence[bytes]:
+    """Constraints as they travel."""
+    found = [
+        record_of(Known(f"{robot.name}<{one.name}", one))
+        for robot in _robots()
+        for one in (*robot.private, *robot.shared)
+    ]
+    return [_packed(found[start : start + 3]) for start in range(0, len(found), 3)]
+
+
+def check_records(content: bytes) -> bool:
+    """Constraints are read or refused; what is read can be asked, and travels on."""
+    try:
+        found = msgspec.msgpack.decode(content, type=tuple[SharedRecord, ...])
+    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError):
+        return False
+    accepted = False
+    for record in found:
+        try:
+            known = known_of(record)
+        except BadShared as bad:
+            assert_said(bad)
+            continue
+        accepted = True
+        one = known.constraint
+        for value in (0, 1, -7, 10**6):
+            assert one.price(dict.fromkeys(one.variables, value)) >= 0
+        again = known_of(msgspec.msgpack.decode(_packed(record_of(known)), type=SharedRecord))
+        assert repr(again) == repr(known), "another constraint is read from what was written"
+    return accepted
+
+
+# The Directory, and ACL
+
+
+@cache
+def _requests() -> Sequence[bytes]:
+    df = df_on(PLATFORM)
+    service = ServiceDescription("s", "robot", "me", ("abt",), ("o",), ("sl",), (("k", "v"),))
+    whole = AgentDescription(
+        f"R@{PLATFORM}", (service,), ("abt",), ("o",), ("sl",), lease_s=60.0, addresses=("tcp/1.2.3.4:5",)
+    )
+    asked = [
+        *((function, whole, None) for function in Function),
+        (Function.SEARCH, AgentDescription(services=(ServiceDescription(type="robot"),)), 3),
+    ]
+    return [request(df, function, description, most).encode() for function, description, most in asked]
+
+
+def check_request(content: bytes) -> bool:
+    """The Directory answers whatever it is asked, and what it answers can be read."""
+    text_asked = content.decode("utf-8", "replace")
+    fresh, used = Directory(), Directory()
+    handle(used, f"R@{PLATFORM}", _requests()[0].decode(), 0)
+    accepted = False
+    for directory in (fresh, used):
+        for ask in (handle, subscribe, handle):
+            performative, answer = ask(directory, f"R@{PLATFORM}", text_asked, 1.0)
+            assert len(answer) < 1 << 20, "the answer is long"
+            accepted = accepted or performative in {Performative.INFORM, Performative.AGREE}
+    return accepted
+
+
+@cache
+def acts() -> Sequence[bytes]:
+    """Messages of FIPA ACL."""
+    one, other = identifier_on(PLATFORM, "A", ("tcp/1.2.3.4:5",)), AgentIdentifier("B@p", (), ())
+    return [
+        text(ACLMessage(Performative.INFORM, one, (other,), content='say "hi" \\ é')).encode(),
+        text(
+            ACLMessage(
+                Performative.REQUEST,
+                *(one, (other, one), (one,), "(x)", "fipa-sl0", "utf-8", "o", "p", "c", "r", "i"),
+                reply_by="20260131T120000000Z",
+                user=(("x-clock", "7"), ("x-a", "b c")),
+            )
+        ).encode(),
+    ]
+
+
+def check_act(content: bytes) -> bool:
+    """A message of FIPA ACL is read or refused; what is read is written, and read as the same."""
+    try:
+        message = parse(content.decode("utf-8", "replace"))
+    except BadACL as bad:
+        assert_said(bad)
+        return False
+    assert parse(text(message)) == message, "another message is read from what was written"
+    return True
+
+
+# Enrolment
+
+
+@cache
+def _authority() -> tuple[bytes, bytes, bytes]:
+    key, own, now = new_key(), new_key(), moment(LATEST)
+    ca = ca_certificate(key, now)
+    leaf = leaf_certificate((ca, key), own.public_key(), "R1", ["localhost", "10.0.0.1"], (now, moment(LATEST + 3600)))
+    return pem(ca), pem(leaf), signing_request(own, "R1")
+
+
+@cache
+def questions() -> Sequence[bytes]:
+    """Questions of robots that want to be certified, and answers to them."""
+    ca, leaf, asked = _authority()
+    frames = (Introduce(), Redeem(b"s" * 32, asked), Renew(asked), Introduction(ca), Certified(leaf), Denied("no"))
+    return [_packed(frame) for frame in frames]
+
+
+def check_question(content: bytes) -> bool:
+    """A question or answer is read or refused, and so is what is in it."""
+    accepted = False
+    for decode in (decode_question, decode_answer):
+        try:
+            frame = decode(content)
+        except BadFrame as bad:
+            assert_said(bad)
+            continue
+        accepted = True
+        assert decode(_packed(frame)) == frame
+        match frame:
+            case Redeem(_, asked) | Renew(asked):
+                _refused_or(BadCertificate, partial(read_request, asked))
+            case Introduction(certificate) | Certified(certificate):
+                _refused_or(BadCertificate, partial(_look_at, certificate))
+            case _:
+                pass
+    return accepted
+
+
+def _look_at(content: bytes) -> None:
+    certificate = read_certificate(content)
+    check_issued(certificate, read_certificate(_authority()[0]), moment(LATEST))
+    hosts_of(certificate)
+    holder_of(certificate)
+
+
+_of_msgpack = one_of(spoilt_msgpack, spoilt_msgpack, spoilt_msgpack, spoilt_bytes)
+_of_text = one_of(spoilt_text, spoilt_text, spoilt_bytes)
+TARGETS = (
+    Target("letter-to-master", partial(letters, MASTER), _of_msgpack, partial(check_letter, MASTER)),
+    Target("letter-to-robot", partial(letters, "A"), _of_msgpack, partial(check_letter, "A")),
+    Target("shared-constraints", records, _of_msgpack, check_records),
+    Target("directory", _requests, _of_text, check_request),
+    Target("acl", acts, _of_text, check_act),
+    Target("enrolment", questions, _of_msgpack, check_question),
+)
