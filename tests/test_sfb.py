@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import doctest
 import math
+from collections import Counter
 from random import Random
 
 import pytest
 from agents import told, value
-from cost_problems import random_cost_team
+from cost_problems import least_cost, random_cost_team
 from problems import team_of
 from sfb_robots import CHAIN, agents, cpas, introduced, row, rows, team
 
@@ -16,13 +17,18 @@ import robochoc.protocols.sfb
 from robochoc.communication.host import BadSettings, settings_of
 from robochoc.communication.schedule import RandomChannels
 from robochoc.communication.simulator import Simulation
-from robochoc.message import Message
+from robochoc.message import Message, encode
+from robochoc.observers.events import Received, Sent
 from robochoc.outcome import Verdict
 from robochoc.problem import INFINITE
+from robochoc.protocols.alike import one_by_one
 from robochoc.protocols.findings import NOTHING
-from robochoc.protocols.sfb import SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
+from robochoc.protocols.sfb import LARGEST, SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
 from robochoc.solver.cost_table import EXACT
 from robochoc.solver.encoding import TooMuch
+from robochoc.solver.part import Brief
+
+BOTH = ((1,), (2,))
 
 # Before the search
 
@@ -31,23 +37,23 @@ def test_the_first_robot_tells_its_values_and_each_adds_its_own() -> None:
     robots = agents(team(CHAIN))
     for robot in robots.values():
         robot.start()
-    assert robots["RA"].outbox == [("RB", Above([[(1,), (2,)]]))]
+    assert robots["RA"].outbox == [("RB", Above.of([BOTH]))]
     assert robots["RB"].outbox == []
-    assert told(robots["RB"], ("RA", Above([[(1,), (2,)]]))) == [("RC", Above([[(1,), (2,)]] * 2))]
+    assert told(robots["RB"], ("RA", Above.of([BOTH]))) == [("RC", Above.of([BOTH] * 2))]
 
 
 def test_the_last_robot_turns_round_with_what_its_values_are_charged() -> None:
     robots = agents(team({**CHAIN, "C": (5, 0)}))
-    said = told(robots["RC"], ("RB", Above([[(1,), (2,)]] * 2)))
-    assert said == [("RB", Below([[(1,), (2,)]], [[5, 0]], 5))]
+    said = told(robots["RC"], ("RB", Above.of([BOTH] * 2)))
+    assert said == [("RB", Below.of([(BOTH, (5, 0))], 5))]
 
 
 def test_on_the_way_up_each_robot_adds_the_most_that_it_can_come_to() -> None:
     """Charges, and constraints of which it is the last but one: each constraint counts once, infinite costs not."""
     robots = agents(team({**CHAIN, "BC": (0, math.inf, 2, 1)}))
-    told(robots["RB"], ("RA", Above([[(1,), (2,)]])))
-    said = told(robots["RB"], ("RC", Below([[(1,), (2,)]], [[0, 0]], 0)))
-    assert said == [("RA", Below([[(1,), (2,)]] * 2, [[0, 0], [0, 0]], 2))]
+    told(robots["RB"], ("RA", Above.of([BOTH])))
+    said = told(robots["RB"], ("RC", Below.of([(BOTH, (0, 0))], 0)))
+    assert said == [("RA", Below.of([(BOTH, (0, 0))] * 2, 2))]
     assert "RC" not in robots["RA"].problem.neighbours
 
 
@@ -60,7 +66,7 @@ def test_a_robot_without_values_ends_the_search_at_the_start() -> None:
     robots = agents(team_of({"A": (1, 2), "B": (), "C": (1,)}, []))
     robots["RB"].start()
     assert robots["RB"].verdict is Verdict.NO_SOLUTION
-    assert told(robots["RB"], ("RA", Above([[(1,), (2,)]]))) == []
+    assert told(robots["RB"], ("RA", Above.of([BOTH]))) == []
 
 
 def test_a_robot_alone_solves_its_problem_in_silence() -> None:
@@ -68,6 +74,42 @@ def test_a_robot_alone_solves_its_problem_in_silence() -> None:
     robot.start()
     assert robot.assignment == {"A": 2}
     assert robot.outbox == []
+
+
+def test_robots_that_are_alike_are_told_of_once() -> None:
+    domains = [BOTH] * 500 + [((7,),)] + [BOTH] * 499
+    said = Above.of(domains)
+    assert said == Above([BOTH, ((7,),)], [(0, 500), (1, 1), (0, 499)])
+    assert one_by_one(said.domains, said.runs) == domains
+    assert len(encode(said)) < 60
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        Above([BOTH], []),
+        Above([BOTH], [(0, 2)]),
+        Above([BOTH], [(0, 10**12)]),
+        Above([BOTH], [(1, 1)]),
+        Above([BOTH], [(-1, 1)]),
+        Above([BOTH], [(0, 2), (0, -1)]),
+    ],
+)
+def test_domains_of_more_or_fewer_robots_than_there_are_above_are_refused(message: Above) -> None:
+    robot = agents(team(CHAIN))["RB"]
+    with pytest.raises(ValueError, match="cannot say"):
+        robot.receive("RA", message)
+
+
+@pytest.mark.parametrize(
+    "message",
+    [Below([BOTH], [], [(0, 1)], 0), Below([BOTH], [(0,)], [(0, 1)], 0), Below([BOTH], [(0, 0)], [(0, 2)], 0)],
+)
+def test_charges_that_do_not_fit_are_refused(message: Below) -> None:
+    robot = agents(team(CHAIN))["RB"]
+    told(robot, ("RA", Above.of([BOTH])))
+    with pytest.raises(ValueError, match="cannot say"):
+        robot.receive("RC", message)
 
 
 # Many at a time
@@ -85,13 +127,74 @@ def test_no_bundle_is_larger_than_the_setting() -> None:
     assert [message.count for _, message in said if isinstance(message, CPAs)] == [2, 4, 4, 2]
 
 
-def test_no_message_is_much_larger_than_it_may_be(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(robochoc.protocols.sfb, "MESSAGE_BYTES", 6)
-    robots, _ = introduced(team(CHAIN), SFBSettings(window=1))
-    said = told(robots["RB"], ("RA", cpas(row(0), ceiling=10)))
-    assert [message.count for _, message in said if isinstance(message, CPAs)] == [1, 1]
-    assert told(robots["RB"], ("RC", Explored())) == []
-    assert told(robots["RB"], ("RC", Explored())) == [("RA", Explored())]
+def test_what_does_not_fit_into_a_message_waits_until_that_is_explored() -> None:
+    robots, _ = introduced(team(CHAIN), SFBSettings(memory=3 * 6))  # a CPA for RC has 6 bytes
+    said = told(robots["RB"], ("RA", cpas(row(0), row(0), ceiling=10)))
+    for _ in range(4):
+        assert [message.count for _, message in said if isinstance(message, CPAs)] == [1]
+        said = told(robots["RB"], ("RC", Explored()))
+    assert said == [("RA", Explored())]
+
+
+def test_what_waits_is_pruned_like_what_is_not_extended() -> None:
+    robots, _ = introduced(team(CHAIN), SFBSettings(memory=1))
+    told(robots["RB"], ("RA", cpas(row(0), ceiling=10)))
+    said = told(robots["RB"], ("RC", Solution(1, [1, 0, 0])), ("RC", Explored()))
+    assert said == [("RA", Solution(1, [1, 0, 0])), ("RA", Explored())]
+
+
+def test_what_waits_counts_for_the_bound() -> None:
+    robots, _ = introduced(team({"AB": (2, 5, 4, 9)}), SFBSettings(memory=1))
+    told(robots["RA"], ("RB", Solution(9, [1, 1])), ("RB", Explored()))
+    assert robots["RA"].findings.bound == 4
+
+
+class Watcher:
+    """Sees to it that no message of CPAs is larger than `share`, or holds one; and that no more than `window` wait."""
+
+    def __init__(self, share: float, window: int) -> None:
+        self.share = share
+        self.window = window
+        self.under_way: Counter[str] = Counter()
+
+    def __call__(self, event: object) -> None:
+        if isinstance(event, Sent) and event.type == "CPAs":
+            assert len(event.content["rows"]) <= self.share or event.content["count"] == 1
+            self.under_way[event.sender] += 1
+            assert self.under_way[event.sender] <= self.window
+        elif isinstance(event, Received) and event.type == "Explored":
+            self.under_way[event.receiver] -= 1
+
+
+def keeps_to_its_share(seed: int) -> None:
+    """A random problem, memory and window: shares are kept, the answer is right, and the bound is proven."""
+    chance = Random(f"sfb memory {seed}")
+    problem = random_cost_team(chance)
+    memory, window = chance.choice((1, 7, 50, 300, 2000)), chance.choice((1, 1, 3))
+    watcher = Watcher(memory / (len(problem.robots) * window), window)
+    settings = {"memory": str(memory), "window": str(window), "batch": str(chance.choice((1, 3, 4096)))}
+    end = Simulation(problem, SFB, RandomChannels(seed), observer=watcher, brief=Brief(settings=settings)).run(60)
+    least, best = least_cost(problem), end.findings["RX00"].best
+    assert (INFINITE if best is None else best.cost) == least
+    assert (end.verdict is Verdict.NO_SOLUTION) == (best is None)
+    assert best is None or end.findings["RX00"].bound == least
+
+
+def test_messages_keep_to_their_share_whatever_the_memory_and_the_answer_is_right() -> None:
+    for seed in range(20):
+        keeps_to_its_share(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_messages_keep_to_their_share_on_thousands_of_problems() -> None:
+    for seed in range(20, 2000):
+        keeps_to_its_share(seed)
+
+
+def test_with_much_memory_messages_are_no_larger_than_others_can_take() -> None:
+    robot = introduced(team(CHAIN), SFBSettings(memory=1 << 40))[0]["RA"]
+    assert robot.share == LARGEST
 
 
 def test_no_more_messages_are_under_way_than_the_window_allows() -> None:
@@ -122,7 +225,7 @@ def test_bundles_are_explored_in_the_order_in_which_they_came() -> None:
     assert told(robots["RB"], ("RC", Explored())) == [("RA", Explored())] * 2
 
 
-@pytest.mark.parametrize("settings", [{"batch": "0"}, {"window": "0"}, {"batch": "many"}])
+@pytest.mark.parametrize("settings", [{"batch": "0"}, {"window": "0"}, {"memory": "0"}, {"batch": "many"}])
 def test_settings_that_will_not_do_are_refused(settings: dict[str, str]) -> None:
     with pytest.raises(BadSettings):
         settings_of(SFB, settings)
@@ -206,8 +309,8 @@ def test_all_robots_hold_an_optimal_solution_in_the_end() -> None:
         ("RA", CPAs(1, cpas(row(0)).rows, 9, 2**62)),
         ("RA", CPAs(1, cpas(row(0)).rows, -1, 10)),
         ("RA", cpas([0, 0, 99, 0, 0, 0, 0], ceiling=10)),
-        ("RA", Above([[(1,)]])),
-        ("RC", Below([[(1,)]], [[0]], 1)),
+        ("RA", Above.of([((1,),)])),
+        ("RC", Below.of([(((1,),), (0,))], 1)),
         ("RC", Explored()),
         ("RC", Solution(3, [0, 0])),
         ("RC", Solution(3, [0, 9, 0])),

@@ -294,7 +294,7 @@ TWO = Setting(
          "no solution has V = 1 and W = 2: take another value"),
         ("CPAs", {"count": 1, "rows": "", "least": 7, "ceiling": 9},
          "1 partial assignment for Robot1.1 to extend; the best solution so far costs 7"),
-        ("Below", {"domains": [], "charges": [], "most": 0}, "nobody is below me"),
+        ("Below", {"domains": [], "charges": [], "runs": [], "most": 0}, "nobody is below me"),
         ("UTIL", {"width": 1, "costs": bytes([3, 255, 9])},
          "a piece of my table: 3 costs, from 3 to 9, and 1 infinite"),
         ("UTIL", {"width": 2, "costs": "//8="}, "a piece of my table: 1 cost, and 1 infinite"),

@@ -15,11 +15,12 @@ AIJ 107, 1999). Whoever takes a value adds the prices of the constraints that it
 scope know it. So the holder alone knows the bound, and prunes before it sends: no estimate is asked for.
 
 That a message carries many CPAs, all of the same robots, is ours. The first ones go alone, straight down to a first
-solution; then each robot extends twice as many at a time as the time before, up to `batch`, the lowest bounds first.
-The search stays depth first, by bundles: proofs by branch and bound hardly mind, as most of what they visit has to be
-visited in any order, and hundreds of nodes cost one message. One robot acts at a time; with the setting `window` at 2
-or more, robots extend the next CPAs while those below are busy with the last ones, an idea of concurrent search
-(Zivan, Meisels: "Concurrent search for distributed CSPs", AIJ 170, 2006). On two cores it gained nothing.
+solution; then each robot extends twice as many at a time as the time before, up to `batch` and to what may be under way
+(`memory`), the lowest bounds first. The search stays depth first, by bundles: proofs by branch and bound hardly mind,
+as most of what they visit has to be visited in any order, and hundreds of nodes cost one message. One robot acts at a
+time; with the setting `window` at 2 or more, robots extend the next CPAs while those below are busy with the last ones,
+an idea of concurrent search (Zivan, Meisels: "Concurrent search for distributed CSPs", AIJ 170, 2006). On two cores it
+gained nothing.
 
 Complete, for minimisation. First two waves tell all robots each other's values: down the order, and back up, with
 what the values are charged and the most that costs can come to. The last robot turns CPAs into solutions. Each that
@@ -42,12 +43,14 @@ tables that are made before the search (see `LocalProblem.tables`), so all const
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Sequence
-from typing import assert_never, cast
+from collections.abc import Iterable, Sequence
+from typing import Self, assert_never, cast
 
 from robochoc.message import Message, Value
 from robochoc.outcome import Verdict
+from robochoc.protocols.alike import Run, fitting, grouped, one_by_one
 from robochoc.protocols.findings import NOTHING, Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol, Settings
@@ -56,25 +59,46 @@ from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.cost_table import EXACT, refuse_inexact
 
-MESSAGE_BYTES = 1 << 22
-"""About how large messages become: as much is extended at once as fits, if everything can be extended."""
+MIB = 1 << 20
+LARGEST = 4 * MIB
+"""No message of several CPAs has more bytes of them, however much memory there is: runtimes have limits, too."""
+Domain = tuple[Value, ...]
+Charges = tuple[float, ...]
 
 
 class Above(Message, frozen=True):
-    """The values of all robots above the receiver, in priority order."""
+    """The values of all robots above the receiver: `domains` are the distinct ones, `runs` say who has which."""
 
-    domains: list[list[Value]]
+    domains: list[Domain]
+    runs: list[Run]
+
+    @classmethod
+    def of(cls, domains: Iterable[Domain]) -> Self:
+        """Tell of robots with these `domains`, in priority order."""
+        return cls(*grouped(domains))
 
 
 class Below(Message, frozen=True):
-    """The values of all robots below the receiver, in priority order, and what each of them is charged for each.
+    """The values of all robots below the receiver, and what each of them is charged for each; `runs` say who has which.
 
     `most` is the most that these charges, and the constraints whose lowest two robots are below, can come to.
     """
 
-    domains: list[list[Value]]
-    charges: list[list[float]]
+    domains: list[Domain]
+    charges: list[Charges]
+    runs: list[Run]
     most: int
+
+    @classmethod
+    def of(cls, robots: Iterable[tuple[Domain, Charges]], most: int) -> Self:
+        """Tell of robots with these domains and charges, in priority order."""
+        kinds, runs = grouped(robots)
+        return cls([domain for domain, _ in kinds], [charges for _, charges in kinds], runs, most)
+
+    @property
+    def robots(self) -> list[tuple[Domain, Charges]]:
+        """Each robot's domain and charges."""
+        return one_by_one(list(zip(self.domains, self.charges, strict=True)), self.runs)
 
 
 class CPAs(Message, frozen=True):
@@ -101,27 +125,58 @@ class Solution(Message, frozen=True):
 
 
 class SFBSettings(Settings, frozen=True):
-    """`batch`: how many CPAs are extended at once, at most. `window`: how many messages of them may be under way."""
+    """How much is extended and sent at once.
+
+    `batch`: how many CPAs are extended at once, at most. `window`: how many messages of them each robot may have under
+    way, sent and not yet explored. `memory`: bytes that the CPAs in all these messages of all robots may take together.
+
+    Each message has the same share, memory / (robots * window) and 4 MiB at most, unless it holds a single CPA. That
+    is certain: what does not fit is not extended yet, or waits with the robot that has extended it (no more than a
+    share, or what comes of a single CPA). With less memory there are more messages, and the verdict is the same. How
+    much is sent in all is not bounded: as much as the search has to visit. Nor are the first waves: their messages grow
+    with the number of different domains and charges, and with how often robots next to each other differ in them.
+    """
 
     batch: int = 4096
     window: int = 1
+    memory: int = 64 * MIB
 
     def __post_init__(self) -> None:
-        if self.batch < 1 or self.window < 1:
-            raise ValueError("batch and window are 1 or more")
+        if self.batch < 1 or self.window < 1 or self.memory < 1:
+            raise ValueError("batch, window and memory are 1 or more")
 
 
 class Batch:
-    """What came in one message: `rows` are still to be extended; of the others, `sent` messages are under way."""
+    """What came in one message: `rows` are still to be extended; `ready` is extended, and waits to be sent.
+
+    Of the others, `sent` messages are under way.
+    """
 
     def __init__(self, rows: Rows) -> None:
         self.rows = rows
+        self.ready = rows[:0]
         self.sent = 0
+
+    @property
+    def left(self) -> bool:
+        """Whether there is anything to be sent yet."""
+        return bool(len(self.rows) or len(self.ready))
+
+    @property
+    def bound(self) -> int | None:
+        """The lowest bound of what is to be sent yet."""
+        return min((int(rows[:, BOUND].min()) for rows in (self.rows, self.ready) if len(rows)), default=None)
 
     def take(self, count: int, least: int) -> Rows:
         """Of the next `count` rows those that may still cost less than `least`."""
         rows, self.rows = self.rows[:count], self.rows[count:]
         return rows[rows[:, BOUND] < least]
+
+    def part(self, count: int, least: int) -> Rows:
+        """The next `count` rows that are ready and may still cost less than `least`; the others go on waiting."""
+        rows = self.ready[self.ready[:, BOUND] < least]
+        self.ready = rows[count:]
+        return rows[:count]
 
 
 class SFB(Protocol):
@@ -145,10 +200,10 @@ class SFB(Protocol):
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
-        rank = order.rank[problem.agent]
-        self.previous = order.names[rank - 1] if rank else None
-        self.next = order.names[rank + 1] if rank + 1 < len(order.names) else None
-        self.domains: list[list[Value]] = []
+        self.rank = order.rank[problem.agent]
+        self.previous = order.names[self.rank - 1] if self.rank else None
+        self.next = order.names[self.rank + 1] if self.rank + 1 < len(order.names) else None
+        self.domains: list[Domain] = []
         self.best: Solution | None = None
         self.least = self.ceiling = 0
         self.batches: deque[Batch] = deque()
@@ -170,10 +225,10 @@ class SFB(Protocol):
         if not self._expects(sender, message):
             raise ValueError(f"{sender} says {type(message).__name__}, which it cannot say now")
         match cast("Above | Below | CPAs | Explored | Solution", message):
-            case Above(domains):
-                self._tell_below(domains)
+            case Above(domains, runs):
+                self._tell_below(one_by_one(domains, runs))
             case Below() as below:
-                self._tell_above(below)
+                self._tell_above(below.robots, below.most)
             case CPAs() as cpas:
                 self._process_cpas(cpas)
             case Explored():
@@ -187,10 +242,13 @@ class SFB(Protocol):
     def _expects(self, sender: str, message: Message) -> bool:
         """Whether `message` may come from `sender` at this point: from the robot before, or from the next one."""
         match message:
-            case Above():
-                return sender == self.previous and not self.domains
-            case Below():
-                return sender == self.next and bool(self.domains) and not self._priced
+            case Above(domains, runs):
+                fits = fitting(len(domains), runs, self.rank)
+                return sender == self.previous and not self.domains and fits
+            case Below(domains, charges, runs):
+                alike = len(domains) == len(charges) and all(map(_same_length, domains, charges))
+                fits = alike and fitting(len(domains), runs, len(self.order.names) - self.rank - 1)
+                return sender == self.next and bool(self.domains) and not self._priced and fits
             case CPAs(_, _, least, ceiling):
                 return sender == self.previous and self._priced and least >= 0 and 0 < ceiling <= EXACT
             case Explored():
@@ -210,8 +268,8 @@ class SFB(Protocol):
     def settle(self) -> None:
         """Extend what is there, as long as messages may be sent; say what has been explored."""
         while self.batches and self.verdict is None:
-            batch = next((batch for batch in self.batches if len(batch.rows)), None)
-            if not len(self.batches[0].rows) and not self.batches[0].sent:
+            batch = next((batch for batch in self.batches if batch.left), None)
+            if not self.batches[0].left and not self.batches[0].sent:
                 self.batches.popleft()
                 self._explored()
             elif batch is not None and len(self.under_way) < self.settings.window:
@@ -221,26 +279,25 @@ class SFB(Protocol):
 
     # Before the search
 
-    def _tell_below(self, domains: Sequence[list[Value]]) -> None:
-        self.domains = [*domains, list(self.problem.values)]
+    def _tell_below(self, domains: Sequence[Domain]) -> None:
+        self.domains = [*domains, self.problem.values]
         if self.next is None:
-            self._tell_above(Below([], [], 0))
+            self._tell_above([], 0)
         else:
-            self.send(self.next, Above(self.domains))
+            self.send(self.next, Above.of(self.domains))
 
-    def _tell_above(self, below: Below) -> None:
+    def _tell_above(self, below: Sequence[tuple[Domain, Charges]], most: int) -> None:
         """Know everybody's values, and price the constraints; the first robot begins."""
-        own = self.domains[-1]
-        self.domains = [*self.domains, *below.domains]
+        own = self.problem.values, tuple(map(_whole, self.problem.costs({})))
+        self.domains += [domain for domain, _ in below]
         self.bounds = ForwardBounds(self.problem, self.order, self.domains)
-        charges = [self.problem.costs({}), *below.charges]
-        most = below.most + self.bounds.most + dearest(charges[0])
+        most += self.bounds.most + dearest(own[1])
         refuse_inexact(most)
         if self.previous is not None:
-            self.send(self.previous, Below([own, *below.domains], charges, most))
+            self.send(self.previous, Below.of([own, *below], most))
         else:
             self._count_up_to(most + 1)
-            self.batches.append(Batch(self.bounds.nothing(charges)))
+            self.batches.append(Batch(self.bounds.nothing([own[1], *(charges for _, charges in below)])))
 
     def _count_up_to(self, ceiling: int) -> None:
         self.bounds.count_up_to(ceiling)
@@ -256,21 +313,25 @@ class SFB(Protocol):
         self.batches.append(Batch(self.bounds.read(cpas.rows, cpas.count)))
 
     def _extend(self, batch: Batch) -> None:
-        """Add the own values to the next few CPAs, and send on what may become a cheaper solution."""
+        """Add the own values to the next few CPAs, if none are ready, and send what may become a cheaper solution."""
         if self.next is None:
             self._complete(batch.take(len(batch.rows), self.least))
             return
-        fit = max(1, MESSAGE_BYTES // (self.bounds.width * len(self.problem.values)))
-        rows = self.bounds.extended(batch.take(min(self.width, fit), self.least), self.least)
-        self.width = min(2 * self.width, self.settings.batch)
-        step = max(1, MESSAGE_BYTES // self.bounds.width)
-        for start in range(0, len(rows), step):
-            self._send_cpas(batch, rows[start : start + step])
+        fit = max(1, self.share // self.bounds.width)
+        if not len(batch.ready):
+            many = max(1, fit // len(self.problem.values))
+            batch.ready = self.bounds.extended(batch.take(min(self.width, many), self.least), self.least)
+            self.width = min(2 * self.width, self.settings.batch)
+        rows = batch.part(fit, self.least)
+        if len(rows):
+            batch.sent += 1
+            self.under_way.append((batch, int(rows[:, BOUND].min())))
+            self.send(self.next, CPAs(len(rows), rows.tobytes(), self.least, self.ceiling))
 
-    def _send_cpas(self, batch: Batch, rows: Rows) -> None:
-        batch.sent += 1
-        self.under_way.append((batch, int(rows[0, BOUND])))
-        self.send(str(self.next), CPAs(len(rows), rows.tobytes(), self.least, self.ceiling))
+    @property
+    def share(self) -> int:
+        """The bytes that one message of CPAs may take."""
+        return min(LARGEST, self.settings.memory // (len(self.order.names) * self.settings.window))
 
     def _complete(self, rows: Rows) -> None:
         """The last robot's part: the cheapest of all that these become is a solution, if it is cheap enough."""
@@ -311,6 +372,15 @@ class SFB(Protocol):
             return NOTHING
         bound = None
         if self.previous is None:
-            left = [int(batch.rows[:, BOUND].min()) for batch in self.batches if len(batch.rows)]
+            left = [batch.bound for batch in self.batches if batch.bound is not None]
             bound = min([self.least, *left, *(least for _, least in self.under_way)])
         return Findings(self.heard, bound)
+
+
+def _whole(cost: float) -> float:
+    """`cost` as it travels: integers take fewer bytes."""
+    return cost if cost == math.inf else int(cost)
+
+
+def _same_length(domain: Domain, charges: Charges) -> bool:
+    return len(domain) == len(charges)

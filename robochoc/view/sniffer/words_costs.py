@@ -103,12 +103,22 @@ def _sizes(names: Sequence[str], domains: object) -> str:
     return row(told) or "nobody"
 
 
+def _each(setting: Setting, said: Content) -> list[object]:
+    """Each robot's domain, of robots that are told of in runs; of no more robots than there are."""
+    domains = listed(said["domains"])
+    found: list[object] = []
+    for run in listed(said["runs"]):
+        kind, robots = map(whole, listed(run))
+        found += [domains[kind]] * min(robots, len(setting.order) - len(found))
+    return found
+
+
 def _above(setting: Setting, said: Content) -> str:
-    return f"above you there are {_sizes(setting.order, said['domains'])}"
+    return f"above you there are {_sizes(setting.order, _each(setting, said))}"
 
 
 def _below(setting: Setting, said: Content) -> str:
-    domains = listed(said["domains"])
+    domains = _each(setting, said)
     if not domains:
         return "nobody is below me"
     order = list(setting.order)

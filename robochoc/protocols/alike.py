@@ -1,0 +1,32 @@
+"""What many robots have, told once for all that have the same: for `sfb`, whose first waves tell of all robots.
+
+Teams often have few kinds of robots. So a list with an item for each robot travels as its distinct items, and runs:
+which item it is, and for how many robots in succession. Alike robots take a few bytes then, however many they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Sequence
+from itertools import groupby
+from typing import TypeVar
+
+Run = tuple[int, int]
+"""The place of an item among the distinct ones, and how many robots in succession have it."""
+T = TypeVar("T", bound=Hashable)
+
+
+def grouped(items: Iterable[T]) -> tuple[list[T], list[Run]]:
+    """The distinct ones of `items`, in the order of their first places, and the runs."""
+    places: dict[T, int] = {}
+    numbers = [places.setdefault(item, len(places)) for item in items]
+    return list(places), [(place, len(list(same))) for place, same in groupby(numbers)]
+
+
+def one_by_one(distinct: Sequence[T], runs: Sequence[Run]) -> list[T]:
+    """The list that `grouped` was given. Only for runs that are `fitting`."""
+    return [distinct[place] for place, count in runs for _ in range(count)]
+
+
+def fitting(kinds: int, runs: Sequence[Run], robots: int) -> bool:
+    """Whether `runs` of so many kinds tell of so many robots."""
+    return sum(count for _, count in runs) == robots and all(0 <= at < kinds and count > 0 for at, count in runs)
