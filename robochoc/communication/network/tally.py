@@ -20,7 +20,7 @@ _LARGEST_COUNT = 2**53
 
 def _is_sound(metrics: Metrics) -> bool:
     """Whether a robot can have counted that: names of messages are printed, and numbers added up."""
-    counts = (metrics.bytes, metrics.ncccs, metrics.checks, metrics.memory, *metrics.messages.values())
+    counts = (metrics.bytes, metrics.ncccs, metrics.checks, metrics.memory, metrics.largest, *metrics.messages.values())
     return all(map(is_name, metrics.messages)) and all(0 <= count <= _LARGEST_COUNT for count in counts)
 
 
