@@ -17,7 +17,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from random import Random
 
-from fuzz.harness import CPU_S, STACKED, Findings, Target, spoilt, tried
+from fuzz.harness import CPU_S, Findings, Target, spoilt, tried
 from fuzz.mutations import LARGEST
 
 GRACE_S = 120
@@ -176,7 +176,7 @@ def _guided(options: argparse.Namespace) -> None:
             os._exit(0)  # libFuzzer would end the process as well, and leave no time to report
 
     def mutate(content: bytes, most: int, _seed: int) -> bytes:
-        for _ in range(chance.randint(1, STACKED)):
+        for _ in range(chance.choice((1, 1, 2))):  # libFuzzer asks for several in a row
             content = target.mutation(chance, content)
         return content[:most]
 
