@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo demo-11 test test-slow lint type format bench journals clean
+.PHONY: demo demo-11 test test-slow fuzz lint type format bench journals clean
 
 $(READY): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
@@ -29,6 +29,12 @@ test: $(READY)
 
 test-slow: $(READY)
 	$(BIN)/pytest -n 2 --dist worksteal -m slow
+
+# Findings are kept in out/fuzz. A seed repeats what the loop did; a kept input is tried again by
+# PYTHONPATH=tests .venv/bin/python -m fuzz --target NAME FILE
+SECONDS ?= 600
+fuzz: $(READY)  ## spoilt inputs for all that reads them: make fuzz SECONDS=600 SEED=1 ENGINE=loop
+	PYTHONPATH=tests $(BIN)/python -m fuzz --seconds $(SECONDS) $(if $(SEED),--seed $(SEED)) $(if $(ENGINE),--engine $(ENGINE))
 
 lint: $(READY)
 	$(BIN)/ruff check .

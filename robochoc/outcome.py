@@ -28,7 +28,7 @@ class Metrics:
     constraint checks; `checks`: constraint checks of all robots; `wall_s`: seconds of wall-clock time;
     `compile_s`: seconds before that, in which local domains were compiled; `memory`: bytes that the largest robot's
     process had to itself at the end (0 where robots have no processes); `simulated_s`: seconds of simulated time, by a
-    channel model (0 where there was none).
+    channel model (0 where there was none); `largest`: bytes of the largest message's content.
     """
 
     messages: dict[str, int] = field(default_factory=dict)
@@ -39,6 +39,7 @@ class Metrics:
     compile_s: float = 0.0
     memory: int = 0
     simulated_s: float = 0.0
+    largest: int = 0
 
     def __add__(self, other: Metrics) -> Metrics:
         """The cost of two runs, one after the other."""
@@ -52,6 +53,7 @@ class Metrics:
             compile_s=self.compile_s + other.compile_s,
             memory=max(self.memory, other.memory),
             simulated_s=self.simulated_s + other.simulated_s,
+            largest=max(self.largest, other.largest),
         )
 
 

@@ -26,7 +26,7 @@ RESULT_KEYS = {
     "team", "protocol", "runtime", "seed", "verdict", "assignment", "cost", "withdrawn", "epochs", "metrics",
     "verified",
 }  # fmt: skip
-METRIC_KEYS = {"messages", "bytes", "ncccs", "checks", "wall_s"}
+METRIC_KEYS = {"messages", "bytes", "largest", "ncccs", "checks", "wall_s"}
 
 
 # generate

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap_ros2._dynamic import generate_dynamic
 
@@ -59,6 +59,7 @@ string frame_id
 
 
 @given(BATTERIES, st.sampled_from([1, 2]))
+@settings(deadline=None)
 def test_what_is_written_is_read(fields: dict[str, Any], version: Version) -> None:
     types = types_of(version)
     found = types.decode(BATTERY, types.encode(BATTERY, fields))

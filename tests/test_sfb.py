@@ -23,7 +23,7 @@ from robochoc.outcome import Verdict
 from robochoc.problem import INFINITE
 from robochoc.protocols.alike import one_by_one
 from robochoc.protocols.findings import NOTHING
-from robochoc.protocols.sfb import SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
+from robochoc.protocols.sfb import LARGEST, SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
 from robochoc.solver.encoding import TooMuch
 from robochoc.solver.exact import EXACT
 from robochoc.solver.part import Brief
@@ -166,16 +166,35 @@ class Watcher:
             self.under_way[event.receiver] -= 1
 
 
+def keeps_to_its_share(seed: int) -> None:
+    """A random problem, memory and window: shares are kept, the answer is right, and the bound is proven."""
+    chance = Random(f"sfb memory {seed}")
+    problem = random_cost_team(chance)
+    memory, window = chance.choice((1, 7, 50, 300, 2000)), chance.choice((1, 1, 3))
+    watcher = Watcher(memory / (len(problem.robots) * window), window)
+    settings = {"memory": str(memory), "window": str(window), "batch": str(chance.choice((1, 3, 4096)))}
+    end = Simulation(problem, SFB, RandomChannels(seed), observer=watcher, brief=Brief(settings=settings)).run(60)
+    least, best = least_cost(problem), end.findings["RX00"].best
+    assert (INFINITE if best is None else best.cost) == least
+    assert (end.verdict is Verdict.NO_SOLUTION) == (best is None)
+    assert best is None or end.findings["RX00"].bound == least
+
+
 def test_messages_keep_to_their_share_whatever_the_memory_and_the_answer_is_right() -> None:
-    chance = Random("sfb memory")
-    for seed in range(30):
-        problem = random_cost_team(chance)
-        memory, window = chance.choice((1, 50, 300, 2000)), chance.choice((1, 1, 3))
-        watcher = Watcher(memory / (len(problem.robots) * window), window)
-        brief = Brief(settings={"memory": str(memory), "window": str(window)})
-        end = Simulation(problem, SFB, RandomChannels(seed), observer=watcher, brief=brief).run(60)
-        best = end.findings["RX00"].best
-        assert (INFINITE if best is None else best.cost) == least_cost(problem)
+    for seed in range(20):
+        keeps_to_its_share(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_messages_keep_to_their_share_on_thousands_of_problems() -> None:
+    for seed in range(20, 2000):
+        keeps_to_its_share(seed)
+
+
+def test_with_much_memory_messages_are_no_larger_than_others_can_take() -> None:
+    robot = introduced(team(CHAIN), SFBSettings(memory=1 << 40))[0]["RA"]
+    assert robot.share == LARGEST
 
 
 def test_no_more_messages_are_under_way_than_the_window_allows() -> None:

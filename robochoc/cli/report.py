@@ -12,6 +12,8 @@ from robochoc.outcome import ALL_ROBOTS, Metrics, Outcome, Verdict
 from robochoc.problem import Kind, Team, natural
 
 WIDTH = 100
+_LARGE = 1 << 16
+"""Bytes: a message as large as that is worth a word."""
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 
 
@@ -154,9 +156,14 @@ def _metrics(outcome: Outcome) -> str:
     types = ", ".join(f"{count:,} {kind}" for kind, count in kinds)
     total = sum(spent.messages.values())
     return (
-        f"{total:,} message{'s' * (total != 1)} ({types or 'none'}), {spent.bytes:,} bytes,"
+        f"{total:,} message{'s' * (total != 1)} ({types or 'none'}), {spent.bytes:,} bytes{_largest(spent)},"
         f" {spent.ncccs:,} NCCCs, {spent.checks:,} checks, {spent.wall_s:.2f} s{_local(spent)}"
     )
+
+
+def _largest(spent: Metrics) -> str:
+    """The largest message, where it is a large one."""
+    return f" (the largest message {spent.largest:,})" if spent.largest >= _LARGE else ""
 
 
 def _local(spent: Metrics) -> str:

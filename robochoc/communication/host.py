@@ -60,7 +60,7 @@ class Host:
         self._equip(brief)
         self.clock = 0
         self.sent: dict[str, int] = {}
-        self.bytes = 0
+        self.bytes = self.largest = 0
         self.said_at: list[int] = []
         """Of each message that the last step has said: `checks` as it was then."""
         self._stamps: list[int] = []
@@ -112,7 +112,7 @@ class Host:
             self.protocol = type(self.protocol)(problem, order)
             self._equip(part.brief)
             self._begun = False
-        self.clock = self.bytes = self._checks = self._step_began = 0
+        self.clock = self.bytes = self.largest = self._checks = self._step_began = 0
         self.sent = {}
         self._reported = (None, None)
         self._heard = math.inf
@@ -163,7 +163,7 @@ class Host:
 
     def metrics(self) -> Metrics:
         """What this robot has sent and checked so far; `ncccs` is its own clock."""
-        return Metrics(dict(self.sent), self.bytes, self.clock, self.checks)
+        return Metrics(dict(self.sent), self.bytes, self.clock, self.checks, largest=self.largest)
 
     def _equip(self, brief: Brief) -> None:
         """Give the protocol what it cannot have of itself: what was set, and chance."""
@@ -191,6 +191,7 @@ class Host:
         kind = type(message).__name__
         self.sent[kind] = self.sent.get(kind, 0) + 1
         self.bytes += len(content)
+        self.largest = max(self.largest, len(content))
         if self._observer:
             self._observer(
                 Sent(

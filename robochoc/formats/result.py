@@ -22,6 +22,7 @@ class _MetricsForm(msgspec.Struct):
     compile_s: float = 0.0
     memory: int = 0
     simulated_s: float = 0.0
+    largest: int = 0
 
 
 class _EpochForm(msgspec.Struct, omit_defaults=True):
@@ -84,6 +85,7 @@ def result_json(outcome: Outcome) -> bytes:
         compile_s=round(spent.compile_s, 6),
         memory=spent.memory,
         simulated_s=spent.simulated_s,
+        largest=spent.largest,
     )
     form = _Form(
         team=outcome.team,
@@ -170,7 +172,7 @@ def read_result(content: bytes) -> Outcome:
         assignment=form.assignment,
         cost=form.cost,
         withdrawn=tuple(form.withdrawn),
-        metrics=Metrics(messages, *counts),
+        metrics=Metrics(messages, *counts, largest=spent.largest),
         verified=form.verified,
         count=form.count,
         reason=form.reason,

@@ -40,11 +40,11 @@ def metrics_of(events: Iterable[AnyEvent]) -> Metrics:
     """What the events say of messages, bytes, NCCCs and checks. Wall-clock time is not in them: 0."""
     total = Metrics()
     messages: Counter[str] = Counter()
-    size = ncccs = 0
+    size = largest = ncccs = 0
     checks: dict[str, int] = {}
 
     def run() -> Metrics:
-        return Metrics(dict(messages), size, ncccs, sum(checks.values()))
+        return Metrics(dict(messages), size, ncccs, sum(checks.values()), largest=largest)
 
     for event in events:
         match event:
@@ -52,10 +52,11 @@ def metrics_of(events: Iterable[AnyEvent]) -> Metrics:
                 total += run()
                 messages.clear()
                 checks.clear()
-                size = ncccs = 0
+                size = largest = ncccs = 0
             case Sent():
                 messages[event.type] += 1
                 size += event.bytes
+                largest = max(largest, event.bytes)
             case Settled():
                 ncccs = max(ncccs, event.clock)
                 checks[event.robot] = event.checks

@@ -15,11 +15,12 @@ AIJ 107, 1999). Whoever takes a value adds the prices of the constraints that it
 scope know it. So the holder alone knows the bound, and prunes before it sends: no estimate is asked for.
 
 That a message carries many CPAs, all of the same robots, is ours. The first ones go alone, straight down to a first
-solution; then each robot extends twice as many at a time as the time before, up to `batch`, the lowest bounds first.
-The search stays depth first, by bundles: proofs by branch and bound hardly mind, as most of what they visit has to be
-visited in any order, and hundreds of nodes cost one message. One robot acts at a time; with the setting `window` at 2
-or more, robots extend the next CPAs while those below are busy with the last ones, an idea of concurrent search
-(Zivan, Meisels: "Concurrent search for distributed CSPs", AIJ 170, 2006). On two cores it gained nothing.
+solution; then each robot extends twice as many at a time as the time before, up to `batch` and to what may be under way
+(`memory`), the lowest bounds first. The search stays depth first, by bundles: proofs by branch and bound hardly mind,
+as most of what they visit has to be visited in any order, and hundreds of nodes cost one message. One robot acts at a
+time; with the setting `window` at 2 or more, robots extend the next CPAs while those below are busy with the last ones,
+an idea of concurrent search (Zivan, Meisels: "Concurrent search for distributed CSPs", AIJ 170, 2006). On two cores it
+gained nothing.
 
 Complete, for minimisation. First two waves tell all robots each other's values: down the order, and back up, with
 what the values are charged and the most that costs can come to. The last robot turns CPAs into solutions. Each that
@@ -59,6 +60,8 @@ from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.exact import EXACT, refuse_inexact
 
 MIB = 1 << 20
+LARGEST = 4 * MIB
+"""No message of several CPAs has more bytes of them, however much memory there is: runtimes have limits, too."""
 Domain = tuple[Value, ...]
 Charges = tuple[float, ...]
 
@@ -127,7 +130,7 @@ class SFBSettings(Settings, frozen=True):
     `batch`: how many CPAs are extended at once, at most. `window`: how many messages of them each robot may have under
     way, sent and not yet explored. `memory`: bytes that the CPAs in all these messages of all robots may take together.
 
-    Each message has the same share, memory / (robots * window), and is never larger, unless it holds a single CPA. That
+    Each message has the same share, memory / (robots * window) and 4 MiB at most, unless it holds a single CPA. That
     is certain: what does not fit is not extended yet, or waits with the robot that has extended it (no more than a
     share, or what comes of a single CPA). With less memory there are more messages, and the verdict is the same. How
     much is sent in all is not bounded: as much as the search has to visit. Nor are the first waves: their messages grow
@@ -315,7 +318,7 @@ class SFB(Protocol):
         if self.next is None:
             self._complete(batch.take(len(batch.rows), self.least))
             return
-        fit = max(1, self._share // self.bounds.width)
+        fit = max(1, self.share // self.bounds.width)
         if not len(batch.ready):
             many = max(1, fit // len(self.problem.values))
             batch.ready = self.bounds.extended(batch.take(min(self.width, many), self.least), self.least)
@@ -327,9 +330,9 @@ class SFB(Protocol):
             self.send(self.next, CPAs(len(rows), rows.tobytes(), self.least, self.ceiling))
 
     @property
-    def _share(self) -> int:
+    def share(self) -> int:
         """The bytes that one message of CPAs may take."""
-        return self.settings.memory // (len(self.order.names) * self.settings.window)
+        return min(LARGEST, self.settings.memory // (len(self.order.names) * self.settings.window))
 
     def _complete(self, rows: Rows) -> None:
         """The last robot's part: the cheapest of all that these become is a solution, if it is cheap enough."""

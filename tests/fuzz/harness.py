@@ -50,6 +50,11 @@ def assert_clear(text: str) -> None:
     assert text.strip(), "nothing is said"
 
 
+def assert_said(refusal: Exception) -> None:
+    """Raise `AssertionError` where a refusal says nothing, or too much. Whoever shows it makes it clear."""
+    assert 0 < len(str(refusal)) < 1 << 18, repr(refusal)[:300]
+
+
 class Findings:
     """What was found; inputs and tracebacks are kept in `folder`, of each kind the first."""
 

@@ -22,7 +22,23 @@ WORDS = (
     *("", " ", "0", "-1", "1..0", "1..1000000000", "-5..5", "1..3 2..4", "9" * 5000, "1e9", "+1", "٣", "0x10", "1_0"),
     *("infinity", "-infinity", "nan", "solved", "100 cycles", "TKC", "PKC", "DisCSP", "DisWCSP", "soft", "supports"),
     *("MASTER", "*", "a/b", "../a", "/", ".", "..", "@", "$", "x" * 300, "\x1b[2J", "\u202e", "\u2028", "\x00", "\x7f"),
-    *("\ud800", "\ufffe", "é", "a b", "a|b", "1:2 3", "1 2|3 4", "((", "))", '"', "\\", "#9999999\"", "%s", "{}", "late/../x"),
+    *(
+        "\ud800",
+        "\ufffe",
+        "é",
+        "a b",
+        "a|b",
+        "1:2 3",
+        "1 2|3 4",
+        "((",
+        "))",
+        '"',
+        "\\",
+        '#9999999"',
+        "%s",
+        "{}",
+        "late/../x",
+    ),
     *("eq(X,Y)", "pow(2,pow(2,2))", "div(1,0)", "not(" * 60, "add(1,2", "true", "1)", "X", "int X int Y"),
 )
 
@@ -59,7 +75,7 @@ def spoilt_bytes(chance: Random, content: bytes) -> bytes:
 def spoilt_text(chance: Random, content: bytes) -> bytes:
     """`content` with a token of text left out, doubled, moved or replaced."""
     tokens = _tokens(content)
-    if len(tokens) < 2:  # noqa: PLR2004 - nothing to choose from
+    if len(tokens) < 2:
         return spoilt_bytes(chance, content)
     at, other = chance.randrange(len(tokens)), chance.randrange(len(tokens))
     match chance.randrange(5):
@@ -143,11 +159,11 @@ def _word(chance: Random, old: str | None, elements: Sequence[Any]) -> str:
             (chance.choice(elements).text or "")[:200],
         )
     )
-    if not words or chance.random() < 0.4:  # noqa: PLR2004 - now and then all of it
+    if not words or chance.random() < 0.4:
         return fresh
     at = chance.randrange(len(words))
     words[at : at + chance.randrange(2)] = [fresh] * chance.choice((1, 1, 1, 50))
-    return chance.choice((" ", "  ", "\n", "|")).join(words) if chance.random() < 0.2 else " ".join(words)  # noqa: PLR2004
+    return chance.choice((" ", "  ", "\n", "|")).join(words) if chance.random() < 0.2 else " ".join(words)
 
 
 def spoilt_msgpack(chance: Random, content: bytes) -> bytes:

@@ -1,4 +1,4 @@
-"""What comes over the wire: letters and what is in them, requests to the Directory, ACL, questions of who would enrol."""
+"""What comes over the wire: letters and what is in them, requests to the Directory, ACL, questions of newcomers."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from random import Random
 import msgspec
 from complex_problems import random_complex_team
 from cost_problems import random_cost_team
-from fuzz.harness import Target
-from fuzz.mutations import one_of, spoilt_bytes, spoilt_msgpack, spoilt_text
 from problems import random_team
 
+from fuzz.harness import Target, assert_said
+from fuzz.mutations import one_of, spoilt_bytes, spoilt_msgpack, spoilt_text
 from robochoc.authority.certificates import (
     BadCertificate,
     ca_certificate,
@@ -57,7 +57,7 @@ from robochoc.communication.network.profile import (
 )
 from robochoc.communication.network.shared import BadShared, SharedRecord, known_of, record_of
 from robochoc.formats import on_one_line
-from robochoc.observers.events import Decided, Sent
+from robochoc.observers.events import AnyEvent, Decided, Sent
 from robochoc.outcome import Metrics, Place, Verdict
 from robochoc.problem import Robot, Team
 from robochoc.protocols.findings import Findings
@@ -94,11 +94,10 @@ def _packed(value: object) -> bytes:
 @cache
 def letters(receiver: str) -> Sequence[bytes]:
     """Letters to the master, or to a robot, with every word."""
-    robot = _robots()[0]
     metrics = Metrics({"Ok": 3}, 80, 5, 9, 0.25)
     epoch = 1
     findings = Findings(bound=3, place=Place("R", ("S",)))
-    events = [
+    events: list[AnyEvent] = [
         Sent(t=0, sender="A", receiver="B", type="Ok", content={"value": [1]}, bytes=9, clock=3),
         Decided(t=0.5, robot="A", assignment={"V": 1}, clock=4),
     ]
@@ -125,8 +124,16 @@ def letters(receiver: str) -> Sequence[bytes]:
             words.Show(("V", "W")),
             words.Task(
                 epoch,
-                *("abt", ("A", "B"), {"A": ("V",), "B": ("W",)}, {"V": ((1, 3),), "W": ((1, 3),)}),
-                *({"B": ("A",)}, (), 7, {"window": "1"}, None, (b"card",)),
+                protocol="abt",
+                order=("A", "B"),
+                interfaces={"A": ("V",), "B": ("W",)},
+                domains={"V": ((1, 3),), "W": ((1, 3),)},
+                links={"B": ("A",)},
+                secretive=(),
+                seed=7,
+                settings={"window": "1"},
+                aside=None,
+                cards=(b"card",),
             ),
             words.Search(epoch),
             Wave(3),
@@ -189,7 +196,7 @@ def _refused_or(refusal: type[ValueError], act: Callable[[], object]) -> bool:
     try:
         act()
     except refusal as refused:
-        assert str(refused)
+        assert_said(refused)
         return False
     return True
 
@@ -198,7 +205,7 @@ def _introduce(profile: Profile) -> bool:
     try:
         robot = silhouette(profile, {})
     except BadProfile as bad:
-        assert str(bad)
+        assert_said(bad)
         return False
     others = {one.name: profile_of(one) for one in _teams()[0].robots}
     profiles = {**others, profile.name: profile}
@@ -236,7 +243,7 @@ def check_records(content: bytes) -> bool:
         try:
             known = known_of(record)
         except BadShared as bad:
-            assert str(bad)
+            assert_said(bad)
             continue
         accepted = True
         one = known.constraint
@@ -267,13 +274,14 @@ def _requests() -> Sequence[bytes]:
 def check_request(content: bytes) -> bool:
     """The Directory answers whatever it is asked, and what it answers can be read."""
     text_asked = content.decode("utf-8", "replace")
-    directory = Directory()
-    handle(directory, f"R@{PLATFORM}", _requests()[0].decode(), 0)
+    fresh, used = Directory(), Directory()
+    handle(used, f"R@{PLATFORM}", _requests()[0].decode(), 0)
     accepted = False
-    for ask in (handle, subscribe, handle):
-        performative, answer = ask(directory, f"R@{PLATFORM}", text_asked, 1.0)
-        assert len(answer) < 1 << 20, "the answer is long"
-        accepted = accepted or performative in {"inform", "agree"}
+    for directory in (fresh, used):
+        for ask in (handle, subscribe, handle):
+            performative, answer = ask(directory, f"R@{PLATFORM}", text_asked, 1.0)
+            assert len(answer) < 1 << 20, "the answer is long"
+            accepted = accepted or performative in {Performative.INFORM, Performative.AGREE}
     return accepted
 
 
@@ -299,7 +307,7 @@ def check_act(content: bytes) -> bool:
     try:
         message = parse(content.decode("utf-8", "replace"))
     except BadACL as bad:
-        assert str(bad)
+        assert_said(bad)
         return False
     assert parse(text(message)) == message, "another message is read from what was written"
     return True
@@ -331,7 +339,7 @@ def check_question(content: bytes) -> bool:
         try:
             frame = decode(content)
         except BadFrame as bad:
-            assert str(bad)
+            assert_said(bad)
             continue
         accepted = True
         assert decode(_packed(frame)) == frame

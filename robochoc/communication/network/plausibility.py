@@ -144,12 +144,13 @@ def _fault_of_metrics(account: Account, lasted_s: float) -> str:
         is_name(kind) and len(kind) <= LONGEST_NAME for kind in spent.messages
     ):
         return "it has reported messages of kinds that are none"
-    counts = (*spent.messages.values(), spent.bytes, spent.ncccs, spent.checks, spent.memory)
+    counts = (*spent.messages.values(), spent.bytes, spent.largest, spent.ncccs, spent.checks, spent.memory)
     if any(not 0 <= count <= LARGEST_COUNT for count in counts):
         return "it has reported counts that cannot be"
     sent = sum(spent.messages.values())
-    if not sent <= spent.bytes <= sent * LARGEST_LETTER:
-        return f"it has reported {sent:,} messages of {spent.bytes:,} bytes together, which cannot be"
+    if not (sent <= spent.bytes <= sent * LARGEST_LETTER and spent.largest <= spent.bytes <= sent * spent.largest):
+        many = f"{sent:,} messages of {spent.bytes:,} bytes together, the largest of {spent.largest:,}"
+        return f"it has reported {many}, which cannot be"
     if spent.checks > CHECKS_PER_S * (lasted_s + 1):
         return f"it has reported {spent.checks:,} constraint checks in {lasted_s:.1f} s, which cannot be"
     heard = max((one.clock for one in account.exchanged.values()), default=0)

@@ -148,7 +148,8 @@ class Types:
 
     def _time(self, name: str) -> _Kind:
         made = self._store.types[name]
-        low = 0 if self.version == 1 and name.endswith("Time") else -(1 << 31)
+        unsigned = self.version == 1 and name.endswith("Time")
+        low = 0 if unsigned else -(1 << 31)
 
         def make(value: object) -> object:
             whole = _whole(value)
@@ -156,7 +157,11 @@ class Types:
                 raise _Wrong(f"must be a time in nanoseconds that ROS {self.version} has, is {value!r}")
             return made(whole // _SECOND, whole % _SECOND)
 
-        return _Kind(make, lambda time: time.sec * _SECOND + time.nanosec, made(0, 0))
+        def given(time: Any) -> int:  # noqa: ANN401 - rosbags' own type, which reads seconds as ROS 2 has them
+            sec = time.sec % (1 << 32) if unsigned else time.sec
+            return int(sec) * _SECOND + int(time.nanosec)
+
+        return _Kind(make, given, made(0, 0))
 
     def _struct(self, name: str) -> _Kind:
         made = self._store.types[name]
