@@ -323,13 +323,15 @@ def test_it_has_checked_what_cannot_be(lied: Callable[..., Office], change: dict
         (traitors.counting(lambda sent: sent + 1, lambda received: received + 1), "its counters have fallen"),
         (traitors.LIES["costs"], "it has reported 9,007,199,254,740,992 constraint checks in 0.0 s"),
         (traitors.spending(ncccs=2**40), "its clock is at 1,099,511,627,776, and neither its own"),
-        (traitors.spending(bytes=0), "bytes together, which cannot be"),
-        (traitors.spending(bytes=2**50), "bytes together, which cannot be"),
+        (traitors.spending(bytes=0), "bytes together, the largest of"),
+        (traitors.spending(bytes=2**50), "bytes together, the largest of"),
+        (traitors.spending(largest=2**50), "the largest of 1,125,899,906,842,624, which cannot be"),
+        (traitors.spending(largest=-1), "counts that cannot be"),
         (traitors.spending(bytes=-1), "it has reported counts that cannot be"),
         (traitors.spending(memory=2**52), "it has reported costs that are not its own"),
         (traitors.spending(wall_s=1e300), "it has reported costs that are not its own"),
         (traitors.spending(simulated_s=float("nan")), "it has reported costs that are not its own"),
-        (traitors.spending(messages={"Ok": 0}, bytes=0), "are not as many as those"),
+        (traitors.spending(messages={"Ok": 0}, bytes=0, largest=0), "are not as many as those"),
         (traitors.spending(messages={"\x1b[2J": 1}), "it has reported messages of kinds that are none"),
         (traitors.spending(messages={f"K{n}": 0 for n in range(101)} | {"Ok": 1}), "of kinds that are none"),
         (
@@ -404,7 +406,7 @@ def quiet(accounts: dict[str, Account], heard: dict[str, tuple[int, int]], trait
 
 def reported(kind: str = "Ok", checks: int = 0, **exchanged: Exchanged) -> Account:
     sent = sum(one.sent for one in exchanged.values())
-    return Account(1, False, {}, Metrics({kind: sent}, sent, 0, checks), NOTHING, exchanged)
+    return Account(1, False, {}, Metrics({kind: sent}, sent, 0, checks, largest=min(sent, 1)), NOTHING, exchanged)
 
 
 def test_quiet_too_early() -> None:

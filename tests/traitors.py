@@ -15,10 +15,9 @@ from robochoc.communication.control import Conclusion, Counters, Ready
 from robochoc.communication.network.searcher import Searcher, Surroundings
 from robochoc.communication.network.words import Account, Checked, Exchanged, Task, ToMaster
 from robochoc.outcome import Metrics
-from robochoc.problem import Robot
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.domain import CompiledDomain
+from robochoc.solver.compiled_team import CompiledRobot
 
 Lie = Callable[[Searcher, ToMaster], Iterator[ToMaster]]
 changed = msgspec.structs.replace
@@ -156,18 +155,13 @@ def install(lie: Lie, name: str, patch: Callable[[type, str, object], None] = se
     begin = Searcher.__init__
 
     def begin_lying(
-        me: Searcher,
-        robot: Robot,
-        domain: CompiledDomain | None,
-        task: Task,
-        protocol: type[Protocol],
-        around: Surroundings,
+        me: Searcher, own: CompiledRobot, task: Task, protocol: type[Protocol], around: Surroundings
     ) -> None:
         def say(word: ToMaster) -> None:
             for one in lie(me, word):
                 around.say(one)
 
-        begin(me, robot, domain, task, protocol, replace(around, say=say) if robot.name == name else around)
+        begin(me, own, task, protocol, replace(around, say=say) if own.robot.name == name else around)
 
     judge = Searcher.judged
 
