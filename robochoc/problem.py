@@ -193,7 +193,9 @@ class Parent:
 class Child:
     """A neighbour of lower priority: the own variables it must be told, and this robot's part of PKCs.
 
-    `copies` are TKC constraints that the child holds, and this robot's file repeats: for whoever checks an answer.
+    `copies` are TKC constraints that the child holds, and this robot's file repeats. Across machines the robot holds
+    the answer against them too; nobody else asks for them, they are no part of what makes two robots equal, and no
+    file is written with them.
     """
 
     name: str

@@ -401,6 +401,18 @@ OF_OBJECTS: dict[str, Wrong] = {
     "a definition that is a function": wrong(
         constraint("C4", definition=print), ("robot Robot3", "where Relation or Predicate should stand")
     ),
+    "a copy of what the robot is not in": wrong(
+        child("Robot3", "Robot1", copies=(bound("V2", "V3"),)),
+        ("robot Robot1, constraint C (V2 V3)", "the scope 'V2 V3' has no variable of this robot"),
+    ),
+    "a copy that its definition does not fit": wrong(
+        child("Robot3", "Robot1", copies=(bound("V1", "V3", 3),)),
+        ("robot Robot1, constraint C (V1 V3 3)", "ne takes 2 terms"),
+    ),
+    "a copy of another's part": wrong(
+        child("Robot3", "Robot1", copies=(bound("V1", "V3", model=Model.PKC),)),
+        ("robot Robot1, constraint C (V1 V3)", "a copy of a partially known constraint (PKC)"),
+    ),
     "a scenario's unknown robot": wrong(scenario(RemoveAgent("Robot9")), ("event 1", "there is no robot 'Robot9'")),
     "a scenario's value of 19 digits": wrong(scenario(AddValue("V1", 10**18)), ("event 1", "an integer of 19 digits")),
     "a scenario's time before the beginning": wrong(

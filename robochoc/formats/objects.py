@@ -134,6 +134,13 @@ class Objects:
                 else:
                     self._shared(constraint, own, robot.kind, places)
                 yield
+            for copy in child.copies:
+                if copy.model is Model.PKC:
+                    message = f"a copy of a partially known constraint (PKC) of the child '{shortened(child.name)}'"
+                    self._note(places.constraint(copy), message, "nobody knows another's part: leave the copy out")
+                else:
+                    self._shared(copy, own, robot.kind, places)
+                yield
 
     def _private(self, constraint: Constraint, own: Collection[str], kind: Kind, places: ObjectPlaces) -> None:
         with self._at(places.constraint, constraint):
