@@ -7,13 +7,14 @@ from typing import cast
 
 import msgspec
 import pytest
-from lone_robot import LEAVE, UNPROVEN, differ, played, task
+from lone_robot import LEAVE, UNPROVEN, differ, ok, played, task
 from offices import RUN, Scripted
 
 from robochoc.communication.control import Failed, Pause, Ready
 from robochoc.communication.network.inbox import Arrived, Item, Missed
 from robochoc.communication.network.letters import MASTER, Letter, Letters
 from robochoc.communication.network.post import Post
+from robochoc.communication.network.quotas import Kept, Share
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.shared import PredicateRecord, SharedRecord
 from robochoc.communication.network.words import (
@@ -26,7 +27,9 @@ from robochoc.communication.network.words import (
     Joined,
     Judge,
     Leave,
+    Objection,
     Register,
+    Said,
     Search,
     Welcome,
     Word,
@@ -64,6 +67,22 @@ def test_an_unknown_protocol_is_told() -> None:
 def test_lost_letters_are_told() -> None:
     _, failed = failing(Missed(MASTER, 3))
     assert (failed.why, failed.unsupported) == ("3 letters of the master to RB were lost for good", True)
+
+
+def test_who_says_too_much_ahead_of_the_task_takes_nobodys_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.communication.network.robot.Kept", lambda: Kept(Share(2, 1000)))
+
+    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+        if isinstance(word, Joined):
+            yield from (post.letter(Said(1, 0, ok(1)), name) for name in ("RA", "RA", "RA", "RA", "RC"))
+            yield task()
+        elif isinstance(word, Ready):
+            yield Leave("that was it", failed=False)
+
+    _, post = played(script)
+    first, second = post.heard_of(Objection)
+    assert first == Objection("RA", "a letter to RB", "it is more than is kept of RA for epoch 1")
+    assert second == Objection("RA", "a letter to RB", "letter 3 is missing before letter 4")
 
 
 def test_a_gap_is_told_once_a_search_of_each() -> None:

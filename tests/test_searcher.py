@@ -12,6 +12,7 @@ from sparse_teams import profiles_of
 from robochoc.communication.control import Conclusion, Counters, Events, Ready
 from robochoc.communication.host import BadMessage
 from robochoc.communication.network.members import Members
+from robochoc.communication.network.quotas import MIB
 from robochoc.communication.network.searcher import EVENTS_AT_ONCE, Searcher, Surroundings
 from robochoc.communication.network.shared import SharedRecord, record_of
 from robochoc.communication.network.tally import Tally
@@ -173,6 +174,17 @@ def test_what_is_no_message_is_bad() -> None:
     one.search()
     with pytest.raises(BadMessage, match="RA sent RB what is no message"):
         one.take_in([Envelope("RA", "RB", b"\x93", 0)])
+
+
+def test_what_waits_for_the_start_is_bounded_for_each_sender() -> None:
+    one = searcher(Around().surroundings())
+    one.prepare()
+    much = bytes(100 * MIB)
+    for _ in range(2):
+        assert not one.hear(Envelope("RA", "RB", much, 0))
+    with pytest.raises(BadMessage, match="RA says too much before the search has begun"):
+        one.hear(Envelope("RA", "RB", much, 0))
+    assert not one.hear(Envelope("RC", "RB", much, 0))
 
 
 def test_who_never_was_ready_reports_all_the_same() -> None:

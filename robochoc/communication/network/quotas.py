@@ -25,7 +25,7 @@ class Share(NamedTuple):
 
 
 OF_A_NEIGHBOUR = Share(200_000, 256 * MIB)
-"""At a robot: how fast neighbours talk is the protocol's affair; what waits is memory."""
+"""At a robot, wherever letters wait: how fast neighbours talk is the protocol's affair, and what waits is memory."""
 OF_A_ROBOT = Share(50_000, 64 * MIB, 2_000, 16 * MIB)
 """At the master."""
 OF_AN_OBSERVER = Share(1_000, 16 * MIB, 50, MIB)
@@ -78,3 +78,19 @@ class Usage:
         """A letter of `size` bytes waits no more."""
         self._letters -= 1
         self._size -= size
+
+
+class Kept:
+    """What of each sender is kept for later, up to what may wait of it; how fast it comes does not matter."""
+
+    def __init__(self, share: Share = OF_A_NEIGHBOUR) -> None:
+        self._share = share._replace(letters_a_second=NO_LIMIT, size_a_second=NO_LIMIT)
+        self._usage: dict[str, Usage] = {}
+
+    def takes(self, sender: str, size: int) -> bool:
+        """Whether `size` bytes more of `sender` may be kept; if so, they are from now on."""
+        return self._usage.setdefault(sender, Usage(self._share, 0.0)).takes(size, 0.0)
+
+    def clear(self) -> None:
+        """Nothing is kept any more."""
+        self._usage.clear()

@@ -27,6 +27,7 @@ from robochoc.communication.network.letters import MASTER, Letters, Opened, Refu
 from robochoc.communication.network.manner import AS_USUAL, Manner
 from robochoc.communication.network.post import Post
 from robochoc.communication.network.profile import among, profile_of, ranges_of
+from robochoc.communication.network.quotas import Kept
 from robochoc.communication.network.refusals import Refusals
 from robochoc.communication.network.searcher import Searcher, Surroundings
 from robochoc.communication.network.words import (
@@ -62,8 +63,6 @@ IDLE_S = 0.002
 LOOK_UP_S = 0.25
 """How often a robot that waits looks whether the link is still there."""
 REGISTER_AGAIN_S = 1.0
-AHEAD_AT_MOST = 100_000
-"""So many letters of the next epoch wait for the master's word that it has begun."""
 AT_ONCE = 10_000
 """So many letters at most are one packet."""
 _VISIT_BYTES = 8
@@ -113,6 +112,7 @@ class NetworkRobot:
         self._searcher: Searcher | None = None
         self._ahead: list[tuple[str, Opened]] = []
         """What others have said in an epoch that the master has not told this robot of yet."""
+        self._kept = Kept()
         self._registered = 0.0
         self._gaps: set[tuple[int, str]] = set()
         """In which search the master was told that letters of whom are lost: nobody floods it through this robot."""
@@ -235,8 +235,10 @@ class NetworkRobot:
             self._letters.take(sender, opened.number)
             self._obey(word)
         elif word.epoch > epoch:
-            if word.epoch > epoch + 1 or len(self._ahead) > AHEAD_AT_MOST:
+            if word.epoch > epoch + 1:
                 raise Refused(f"it is of epoch {word.epoch}, and this is {epoch}")
+            if not self._kept.takes(sender, len(word.content)):
+                raise Refused(f"it is more than is kept of {sender} for epoch {word.epoch}")
             self._letters.take(sender, opened.number)
             self._ahead.append((sender, opened))
         else:
@@ -356,6 +358,7 @@ class NetworkRobot:
         self._searcher = Searcher(own, task, protocol, around)
         self._searcher.prepare()
         ahead, self._ahead = self._ahead, []
+        self._kept.clear()
         for sender, opened in ahead:
             try:
                 self._use(sender, opened, [])

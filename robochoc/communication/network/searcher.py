@@ -18,6 +18,7 @@ from robochoc.communication.control import Conclusion, Counters, Events, Ready
 from robochoc.communication.host import BadMessage, Host
 from robochoc.communication.network.plausibility import MOST_JUDGED, fault_of_findings
 from robochoc.communication.network.profile import BadProfile, domain_of
+from robochoc.communication.network.quotas import Kept
 from robochoc.communication.network.shared import BadShared, SharedRecord, known_of, record_of
 from robochoc.communication.network.words import (
     LATEST,
@@ -80,6 +81,7 @@ class Searcher:
         self._copies: dict[str, tuple[SharedRecord, ...]] = {}
         self._learnt: dict[str, list[Constraint]] = {}
         self._early: list[Envelope] = []
+        self._kept = Kept()
         self._events: list[AnyEvent] = []
         self._decode = msgspec.msgpack.Decoder(protocol.messages).decode
         self._began = 0.0
@@ -192,6 +194,7 @@ class Searcher:
         self._told = (-1, -1)
         self._send(self._host, self._host.start())
         early, self._early = self._early, []
+        self._kept.clear()
         self.take_in(early)
 
     def check(self, content: bytes) -> None:
@@ -204,11 +207,13 @@ class Searcher:
     def hear(self, envelope: Envelope) -> bool:
         """Whether `envelope` belongs into the packet that is being made up; if not, it waits, or comes too late.
 
-        Raises `BadMessage` for one of somebody who takes no part in this search.
+        Raises `BadMessage` for one of somebody who takes no part in this search, or who says too much before it begins.
         """
         if envelope.sender not in self._task.interfaces:
             raise BadMessage(f"{envelope.sender} takes no part in this search")
         if not self._searching and not self._paused:
+            if not self._kept.takes(envelope.sender, len(envelope.content)):
+                raise BadMessage(f"{envelope.sender} says too much before the search has begun")
             self._early.append(envelope)
         return self._searching
 
