@@ -87,11 +87,14 @@ def test_who_says_too_much_ahead_of_the_task_takes_nobodys_place(monkeypatch: py
 
 def test_a_gap_is_told_once_a_search_of_each() -> None:
     """A neighbour that makes it look as if letters were missing, again and again, is not to flood the master by RB."""
-    gaps = [Missed("RA", 5), Missed("RA", 9), task(), Missed("RA", 2), Missed("RC", 1), Missed("RA", 7)]
+    before: list[Item] = [Missed("RA", 5), Missed("RA", 9)]
+    then: list[Item] = [Missed("RA", 2), Missed("RC", 1), Missed("RA", 7)]
 
     def script(_post: Scripted, word: Word) -> Iterator[Word | Item]:
         if isinstance(word, Joined):
-            yield from gaps
+            yield from before
+            yield task()
+            yield from then
         elif isinstance(word, Ready):
             yield Leave("that was it", failed=False)
 

@@ -48,8 +48,8 @@ from robochoc.authority.registry import (
 )
 from robochoc.authority.token import Token, digest
 from robochoc.files import write_atomically
-from robochoc.formats.constraints import is_name
 from robochoc.formats.diagnostics import on_one_line, shortened, suggestion
+from robochoc.formats.names import is_name
 
 TOKEN_LIFETIME = timedelta(hours=24)
 CERTIFICATE_LIFETIME = timedelta(hours=24)

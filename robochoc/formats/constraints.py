@@ -21,8 +21,6 @@ from robochoc.formats.rules import (
 from robochoc.formats.xml import attribute, line
 from robochoc.problem import INFINITE, Constraint, Kind, Model, Predicate, Relation, Term
 
-__all__ = ["Context", "is_name", "read_private", "read_shared"]
-
 
 @dataclass(frozen=True)
 class Context:

@@ -14,7 +14,7 @@ from dataclasses import replace
 import msgspec
 
 from robochoc.formats import InvalidInput, robot_in, robot_xml
-from robochoc.formats.constraints import is_name
+from robochoc.formats.names import is_name
 from robochoc.observers.events import Given
 from robochoc.problem import INFINITE, Constraint, Domain, Relation, Robot, Team, Variable
 from robochoc.solver.explanation import Void

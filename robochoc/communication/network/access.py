@@ -14,7 +14,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from robochoc.communication.network.letters import MASTER
-from robochoc.formats.constraints import is_name
+from robochoc.formats.names import is_name
 
 ALL = "*"
 """Whoever there is."""

@@ -18,8 +18,8 @@ from robochoc.communication.network.letters import LARGEST_LETTER
 from robochoc.communication.network.profile import LONGEST_NAME, MOST_VARIABLES
 from robochoc.communication.network.words import Account, Checked, Exchanged, Judged
 from robochoc.communication.quiescence import Counts
-from robochoc.formats.constraints import is_name
 from robochoc.formats.diagnostics import shortened
+from robochoc.formats.names import is_name
 from robochoc.outcome import Thoroughness
 from robochoc.problem import INFINITE, Domain
 from robochoc.protocols.findings import Findings

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import msgspec
 
-from robochoc.formats.constraints import is_name
 from robochoc.formats.extension import MAX_VALUES
+from robochoc.formats.names import is_name
 from robochoc.problem import (
     Child,
     Constraint,

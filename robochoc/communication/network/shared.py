@@ -8,8 +8,8 @@ from __future__ import annotations
 import msgspec
 
 from robochoc.expression import Expression, ExpressionError, Type, parse, text
-from robochoc.formats.constraints import is_name
 from robochoc.formats.diagnostics import shortened
+from robochoc.formats.names import is_name
 from robochoc.problem import Constraint, Model, Predicate, Relation, Semantics, Term
 from robochoc.solver.explanation import Known
 
