@@ -59,11 +59,11 @@ class Options:
     two, has the simulator count seconds of computing and radio. `order` is the robots' total priority order, by name
     or as the list of them (None: the files'); `seed` is `Order.RANDOM`'s too. `local` limits the compilation of each
     robot's domain; `cache` says whether solutions of local problems are kept in the user's cache folder. `count` is
-    for the central judge: the number of all solutions. `verify` asks for a second opinion on a `no-solution`.
-    `settings` are the protocol's, as text; its chance is drawn from `seed` too. With `on_loss` set to withdraw, robots
-    whose processes end leave the problem; up to `spares` of them come back. `patience`, in seconds: a robot whose
-    process is stopped (on a network: that is out of reach) for longer is lost; None: stopped ones are waited for.
-    `filters` are the network's: the channel filters that messages go through.
+    for the central judge: the number of all solutions. `verify` asks for a second opinion on a `no-solution`, or on a
+    least cost. `settings` are the protocol's, as text; its chance is drawn from `seed` too. With `on_loss` set to
+    withdraw, robots whose processes end leave the problem; up to `spares` of them come back. `patience`, in seconds: a
+    robot whose process is stopped (on a network: that is out of reach) for longer is lost; None: stopped ones are
+    waited for. `filters` are the network's: the channel filters that messages go through.
     """
 
     protocol: str = SATISFIES
