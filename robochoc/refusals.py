@@ -77,8 +77,8 @@ def _takes(team: Team, options: Options, traits: Traits) -> bool:
 
 def _judge_takes(team: Team, options: Options) -> bool:
     """Whether the central judge would, for sure."""
-    for_robots = (options.order, options.messages, options.channel, options.settings, options.filters, options.verify)
-    if any(for_robots) or options.runtime is not Runtime.PROCESSES or options.on_loss is not OnLoss.FAIL:
+    for_robots = (options.order, options.messages, options.channel, options.settings, options.filters)
+    if any((*for_robots, options.verify, options.patience)) or options.runtime is not Runtime.PROCESSES or options.on_loss is not OnLoss.FAIL:
         return False
     try:
         refuse_central(team, replace(options, protocol=CENTRAL))

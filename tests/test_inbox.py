@@ -29,6 +29,15 @@ def test_what_is_more_than_a_senders_share_is_dropped_and_told_once() -> None:
     assert all_in(inbox) == [Arrived("A", b"again")], "there is room again"
 
 
+def test_news_of_gaps_is_bounded_too() -> None:
+    inbox = Inbox(lambda _sender: Share(2, 100), clock=lambda: 0.0)
+    for _ in range(1000):
+        inbox.put(Missed("A", 5))
+    assert all_in(inbox) == [Missed("A", 5), Missed("A", 5), Missed("A", 998, dropped=True)]
+    inbox.put(Missed("A", 5))
+    assert all_in(inbox) == [Missed("A", 5)]
+
+
 def test_bytes_that_wait_are_bounded() -> None:
     inbox = Inbox(lambda _sender: Share(1000, 100), clock=lambda: 0.0)
     for _ in range(5):

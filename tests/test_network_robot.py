@@ -61,7 +61,7 @@ def test_a_run_from_beginning_to_end() -> None:
 
     ending, post = played(script)
     assert ending == Ending("over", failed=False, assignment={"B": 2})
-    assert post.heard_of(Shown) == [Shown({"B": ((1, 1), (2, 2))})]
+    assert post.heard_of(Shown) == [Shown({"B": ((1, 2),)})]
     (account,) = post.heard_of(Account)
     assert isinstance(account, Account)
     assert (account.assigned, account.assignment) == (True, {"B": 2})

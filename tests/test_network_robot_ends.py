@@ -22,6 +22,7 @@ from robochoc.communication.network.words import (
     Checked,
     Copies,
     Denied,
+    Gap,
     Joined,
     Judge,
     Leave,
@@ -63,6 +64,20 @@ def test_an_unknown_protocol_is_told() -> None:
 def test_lost_letters_are_told() -> None:
     _, failed = failing(Missed(MASTER, 3))
     assert (failed.why, failed.unsupported) == ("3 letters of the master to RB were lost for good", True)
+
+
+def test_a_gap_is_told_once_a_search_of_each() -> None:
+    """A neighbour that makes it look as if letters were missing, again and again, is not to flood the master by RB."""
+    gaps = [Missed("RA", 5), Missed("RA", 9), task(), Missed("RA", 2), Missed("RC", 1), Missed("RA", 7)]
+
+    def script(_post: Scripted, word: Word) -> Iterator[Word | Item]:
+        if isinstance(word, Joined):
+            yield from gaps
+        elif isinstance(word, Ready):
+            yield Leave("that was it", failed=False)
+
+    _, post = played(script)
+    assert post.heard_of(Gap) == [Gap("RA", 5), Gap("RA", 2), Gap("RC", 1)]
 
 
 def copy(scope: tuple[str, ...] = ("B", "C"), body: str = "ne(X, Y)") -> SharedRecord:

@@ -142,10 +142,12 @@ def test_a_second_verdict_that_contradicts_the_first() -> None:
     assert tally.hear("RA", Conclusion(1, "solution")) == "it has concluded solution, and no-solution before"
 
 
-def test_a_verdict_after_all_were_quiet() -> None:
+def test_a_verdict_after_all_were_quiet_blames_nobody_and_changes_nothing() -> None:
+    """Whoever concludes it may have been stirred by another: RA speaks once all are quiet."""
     tally = begun()
     tally.verdict = Verdict.SOLUTION
-    assert tally.hear("RB", Conclusion(1, "no-solution")) == "it has concluded no-solution after all were quiet"
+    assert not tally.hear("RB", Conclusion(1, "no-solution"))
+    assert (tally.verdict, tally.doubts_about_verdict) == (Verdict.SOLUTION, ())
 
 
 # What is said of that
@@ -276,6 +278,18 @@ def test_what_both_ends_check_is_said_to_be_checked(lied: Callable[..., Office])
         assert judged(office) == (True, 0)
         assert office.tally.thoroughness == (2, 0)
         assert not office.tally.doubts_about_verdict
+
+
+def test_how_many_are_checked_by_both_is_what_both_say(lied: Callable[..., Office]) -> None:
+    """RB says that its one constraint with RA is a thousand, or that it knows a thousand of RC's."""
+    many = [
+        lambda one: changed(one, held=1000, shared=tuple(each._replace(constraints=1000) for each in one.shared)),
+        lambda one: changed(one, copies=tuple(each._replace(constraints=1000) for each in one.copies)),
+    ]
+    for change in many:
+        office = lied(traitors.judging(change), team=known_to_both(CHAIN))
+        judged(office)
+        assert office.tally.thoroughness.by_both == 2
 
 
 def test_a_copy_of_what_nobody_holds(lied: Callable[..., Office]) -> None:

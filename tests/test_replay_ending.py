@@ -58,6 +58,7 @@ def test_an_outcome_that_does_not_follow_is_found(four: Journal) -> None:
         ("bytes", replace(outcome, metrics=replace(metrics, bytes=metrics.bytes + 1))),
         ("ncccs", replace(outcome, metrics=replace(metrics, ncccs=metrics.ncccs - 1))),
         ("checks", replace(outcome, metrics=replace(metrics, checks=0))),
+        ("largest", replace(outcome, metrics=replace(metrics, largest=metrics.largest + 1))),
     ):
         found = replay(replace(four, outcome=claimed))
         assert found.difference is None

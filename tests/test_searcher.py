@@ -14,7 +14,17 @@ from robochoc.communication.host import BadMessage
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.searcher import EVENTS_AT_ONCE, Searcher, Surroundings
 from robochoc.communication.network.shared import SharedRecord, record_of
-from robochoc.communication.network.words import Account, Checked, Copies, Judged, Said, Task, ToMaster
+from robochoc.communication.network.tally import Tally
+from robochoc.communication.network.words import (
+    LATEST,
+    Account,
+    Checked,
+    Copies,
+    Judged,
+    Said,
+    Task,
+    ToMaster,
+)
 from robochoc.formats import PREDEFINED
 from robochoc.message import Envelope, encode
 from robochoc.observers.events import Received
@@ -23,6 +33,7 @@ from robochoc.protocols.abt import ABT, Ok
 from robochoc.protocols.awc import AWC
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.syncbb import BestPath, Path, SyncBB
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.explanation import held
 from robochoc.solver.part import NO_BRIEF, Brief
@@ -248,3 +259,51 @@ def test_who_steps_aside_answers_for_nothing() -> None:
     one = searcher(around.surroundings(), brief=Brief(aside=1))
     one.prepare()
     assert one.judged({"A": 1, "C": 1}) == Checked(1, allowed=True, cost=0)
+
+
+# What others tell it must not make it say what cannot be: it would be lost for that
+
+
+def believed(around: Around) -> Account:
+    """Its account, which the master believes."""
+    (account,) = around.heard(Account)
+    assert isinstance(account, Account)
+    assert not Tally(1, ("RA", "RB", "RC")).hear("RB", account)
+    return account
+
+
+def test_a_clock_that_another_has_set_as_late_as_can_be() -> None:
+    around = Around()
+    one = searcher(around.surroundings())
+    one.prepare()
+    one.search()
+    one.take_in([ok(1, clock=LATEST)])
+    last = around.sent[-1][1]
+    assert isinstance(last, Said)
+    assert last.clock == LATEST
+    msgspec.msgpack.decode(msgspec.msgpack.encode(last), type=Said)  # others can read it
+    one.pause()
+    assert believed(around).metrics.ncccs == LATEST
+
+
+def test_costs_that_another_has_made_up_are_not_passed_on() -> None:
+    around = Around()
+    one = searcher(around.surroundings(), SyncBB, team=chain(4))
+    one.prepare()
+    one.search()
+    best = BestPath(-5, ((1,), (2,), (1,)))
+    one.take_in([Envelope("RA", "RB", encode(Path([((1,), 0)], best)), 0)])
+    one.pause()
+    assert believed(around).findings == NOTHING
+
+
+def test_of_copies_it_checks_no_more_than_can_be_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    around = Around()
+    one = searcher(around.surroundings(), AWC)
+    one.prepare()
+    one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held(chain()["RC"])))))
+    one.search()
+    copy = Judged("RC", ("B", "C"), 1, 0)
+    assert one.judged({"A": 2, "C": 2}).copies == (copy,)
+    monkeypatch.setattr("robochoc.communication.network.searcher.MOST_JUDGED", 1)
+    assert one.judged({"A": 2, "C": 2}).copies == ()

@@ -152,14 +152,14 @@ def test_a_verdict_and_its_witness() -> None:
 def test_accounts_make_the_result() -> None:
     tally = Tally(1, ROBOTS)
     tally.verdict = Verdict.SOLUTION
-    tally.hear("R1", account(1, {"X": 1}, ok=3, bytes=10, ncccs=5, checks=6))
-    tally.hear("R2", account(1, {"Y": 2}, ok=4, bytes=20, ncccs=1, checks=9))
+    tally.hear("R1", account(1, {"X": 1}, ok=3, bytes=10, largest=4, ncccs=5, checks=6))
+    tally.hear("R2", account(1, {"Y": 2}, ok=4, bytes=20, largest=8, ncccs=1, checks=9))
     assert list(tally.silent) == ["R3"]
     tally.hear("R3", Account(1, False, {}, Metrics(), Findings(bound=4)))
     assert not list(tally.silent)
     result = tally.result(0)
     assert result.assignments == {"R1": {"X": 1}, "R2": {"Y": 2}, "R3": {}}
-    assert (result.metrics.messages, result.metrics.bytes) == ({"Ok": 7}, 30)
+    assert (result.metrics.messages, result.metrics.bytes, result.metrics.largest) == ({"Ok": 7}, 30, 8)
     assert (result.metrics.ncccs, result.metrics.checks) == (5, 15)
     assert result.findings["R3"] == Findings(bound=4)
     assert tally.assigned == {"R1": True, "R2": True, "R3": False}

@@ -64,7 +64,7 @@ def _place(team: Team, outcome: Outcome) -> str:
             joined = " on a network" * (outcome.runtime == "network")
             return f"{len(team.robots)} process{'es' * (len(team.robots) != 1)}{joined}{seed}"
         case "central":
-            return "ACE on all files merged"
+            return "one model of all files merged"
         case _:
             return f"{outcome.runtime}, seed {outcome.seed}"
 

@@ -133,7 +133,7 @@ def _check_processes(settings: dict[str, Any]) -> None:
 def _check_central(settings: dict[str, Any]) -> None:
     """There are no robots, and no second opinion."""
     if settings["verify"]:
-        raise click.UsageError("--verify asks ACE, which is --protocol central itself")
+        raise click.UsageError("--verify asks the central judge, which is --protocol central itself")
     asked = {name: settings[name] for name in ("messages", "on_loss", "spares", "channel", "filters")}
     asked["order"] = settings["order"] != GIVEN
     asked["set"] = settings["settings_given"]

@@ -236,7 +236,7 @@ class _Lead:
             who = f"{result.witness} says that" if result.witness else "all fell quiet, so that"
             raise Refuted(f"{who} {outcome.protocol} has a solution for {outcome.team}, but {against}")
         reason = outcome.reason or f"{outcome.protocol} has come to its end, and what it came by breaks a constraint"
-        return replace(outcome, verdict=Verdict.UNKNOWN, reason=reason)
+        return claimed(replace(outcome, verdict=Verdict.UNKNOWN, reason=reason))
 
     def _told(self, reported: Mapping[str, dict[str, int]]) -> dict[str, dict[str, int]]:
         """Return what was `reported`. Raises `RobotsLost` for who has values, and does not tell them."""

@@ -17,6 +17,7 @@ from robochoc.communication.run_result import RunResult
 from robochoc.observers.checker import Refuted
 from robochoc.observers.events import AnyEvent, Lost, Received, Sent
 from robochoc.observers.journal import Header, Journal, metrics_of
+from robochoc.observers.journal_entries import STAMPED_LATE
 from robochoc.options import CENTRAL
 from robochoc.outcome import Epoch, Outcome, Verdict
 from robochoc.registry import speaker
@@ -24,7 +25,9 @@ from robochoc.replay.cast import Ensemble
 from robochoc.replay.steps import Run
 from robochoc.solver.domain import TooManySolutions
 
-_COUNTED = ("messages", "bytes", "ncccs", "checks")
+_COUNTED = ("messages", "bytes", "ncccs", "checks", "largest")
+_COUNTED_BEFORE = _COUNTED[:-1]
+"""In the first version of journals."""
 
 
 class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
@@ -66,8 +69,8 @@ def contradictions(journal: Journal, runs: Sequence[Played], *, whole: bool) -> 
     if not whole or lost or not runs or any(one.run.given is None for one in runs):
         return  # who died took its last words with it; across machines robots tell what they like
     if outcome.verdict is not Verdict.UNKNOWN or outcome.runtime == "simulator":
-        counted = metrics_of(journal.events)
-        yield from _differing("the outcome's ", outcome.metrics, counted, _COUNTED)
+        names = _COUNTED_BEFORE if header.version == STAMPED_LATE else _COUNTED
+        yield from _differing("the outcome's ", outcome.metrics, metrics_of(journal.events), names)
     for number, epoch in enumerate(outcome.epochs[: len(runs)]):
         yield from _answers(f"epoch {number}'s ", epoch, runs[number].answer)
     yield from _answers("the outcome's ", outcome, runs[-1].answer)

@@ -63,11 +63,11 @@ class Inbox:
         self._changed = threading.Condition()
 
     def put(self, item: Item) -> None:
-        """Append `item`, or drop a letter that is beyond its sender's share."""
+        """Append `item`, or drop a letter, or news of a gap, that is beyond its sender's share."""
         with self._changed:
-            if isinstance(item, Arrived):
+            if isinstance(item, Arrived | Missed):
                 usage = self._usage_of(item.sender)
-                if not usage.takes(len(item.content), self._clock()):
+                if not usage.takes(_size(item), self._clock()):
                     usage.dropped += 1
                     if usage.dropped > 1:
                         return
@@ -102,12 +102,17 @@ class Inbox:
     def _taken(self) -> Item:
         item = self._items.popleft()
         match item:
-            case Arrived(sender, content):
-                self._usage[sender].release(len(content))
             case Missed(sender, dropped=True):
                 usage = self._usage[sender]
                 letters, usage.dropped = usage.dropped, 0
                 return item._replace(letters=letters)
+            case Arrived() | Missed():
+                self._usage[item.sender].release(_size(item))
             case _:
                 pass
         return item
+
+
+def _size(item: Arrived | Missed) -> int:
+    """Bytes. That letters are missing counts as a letter, an empty one: who makes it look so may do it without end."""
+    return len(item.content) if isinstance(item, Arrived) else 0

@@ -96,7 +96,7 @@ def fault_of_account(name: str, account: Account, declared: Declared, course: Co
         next(_faults_of_values(name, account, declared), "")
         or _fault_of_metrics(account, course.lasted_s)
         or _fault_of_exchange(name, account, course)
-        or _fault_of_findings(account.findings, course.order)
+        or fault_of_findings(account.findings, course.order)
     )
 
 
@@ -162,7 +162,8 @@ def _fault_of_metrics(account: Account, lasted_s: float) -> str:
     return "it has reported costs that are not its own" if any(others) or spent.memory > LARGEST_MEMORY else ""
 
 
-def _fault_of_findings(findings: Findings, order: Collection[str]) -> str:
+def fault_of_findings(findings: Findings, order: Collection[str]) -> str:
+    """Return why nobody among the robots in `order` can know `findings` of the whole; empty if one can."""
     names: list[str] = []
     if findings.place is not None:
         names += [*filter(None, [findings.place.parent]), *findings.place.pseudo_parents]
@@ -249,10 +250,15 @@ def doubts_about_values(accounts: Mapping[str, Account]) -> Iterator[Doubt]:
 
 
 def thoroughness(checks: Mapping[str, Checked]) -> Thoroughness:
-    """Return how many constraints others than those who hold them have checked too, and how many nobody else has."""
+    """Return how many constraints others than those who hold them have checked too, and how many nobody else has.
+
+    Where two say that they are differently many over the same variables, those count that both say there are.
+    """
     held = sum(check.held for check in checks.values())
-    seconded = {_key(one) for check in checks.values() for one in check.copies}
-    both = sum(one.constraints for check in checks.values() for one in check.shared if _key(one) in seconded)
+    seconded: dict[tuple[str, tuple[str, ...]], int] = {}
+    for one in (one for check in checks.values() for one in check.copies):
+        seconded[_key(one)] = max(one.constraints, seconded.get(_key(one), 0))
+    both = sum(min(one.constraints, seconded.get(_key(one), 0)) for check in checks.values() for one in check.shared)
     return Thoroughness(both, held - both)
 
 

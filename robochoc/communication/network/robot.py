@@ -114,6 +114,8 @@ class NetworkRobot:
         self._ahead: list[tuple[str, Opened]] = []
         """What others have said in an epoch that the master has not told this robot of yet."""
         self._registered = 0.0
+        self._gaps: set[tuple[int, str]] = set()
+        """In which search the master was told that letters of whom are lost: nobody floods it through this robot."""
         self._refusals = Refusals(lambda who, what, why: self._say(Objection(who, what, why)))
         self._connected = time.monotonic()
         self._router = post.router
@@ -161,13 +163,20 @@ class NetworkRobot:
                 case Missed(sender, letters) if sender == MASTER:
                     raise Unsupported(f"{letters:,} letters of the master to {self._robot.name} were lost for good")
                 case Missed(sender, letters) if self._welcome:
-                    self._say(Gap(sender, letters))  # the master finds out whether the run can do without them
+                    self._tell_of_gap(sender, letters)
                 case Missed() | Presence() | Woken():
                     pass
         if self._searcher:
             self._searcher.take_in(packet)
         if not items:
             self._idle()
+
+    def _tell_of_gap(self, sender: str, letters: int) -> None:
+        """Tell the master, once a search of each: it finds out whether the run can do without these letters."""
+        gap = (self._searcher.epoch if self._searcher else 0, sender)
+        if gap not in self._gaps:
+            self._gaps.add(gap)
+            self._say(Gap(sender, letters))
 
     def _idle(self) -> None:
         if self._searcher and self._searcher.restless:

@@ -10,20 +10,32 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import msgspec
 
 from robochoc.communication.control import Conclusion, Counters, Events, Ready
 from robochoc.communication.host import BadMessage, Host
+from robochoc.communication.network.plausibility import MOST_JUDGED, fault_of_findings
 from robochoc.communication.network.profile import BadProfile, domain_of
 from robochoc.communication.network.shared import BadShared, SharedRecord, known_of, record_of
-from robochoc.communication.network.words import Account, Checked, Copies, Exchanged, Judged, Said, Task, ToMaster
+from robochoc.communication.network.words import (
+    LATEST,
+    Account,
+    Checked,
+    Copies,
+    Exchanged,
+    Judged,
+    Said,
+    Task,
+    ToMaster,
+)
 from robochoc.communication.system import own_memory
 from robochoc.message import Envelope
 from robochoc.observers.events import AnyEvent
 from robochoc.outcome import Metrics
 from robochoc.problem import INFINITE, Constraint, Kind, Model
-from robochoc.protocols.findings import NOTHING
+from robochoc.protocols.findings import NOTHING, Findings
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.encoding import Unsupported
@@ -213,7 +225,7 @@ class Searcher:
 
     def _send(self, host: Host, envelopes: Sequence[Envelope]) -> None:
         for _, receiver, content, clock in envelopes:
-            self._around.send(receiver, Said(self.epoch, clock, content))
+            self._around.send(receiver, Said(self.epoch, min(clock, LATEST), content))  # another may have set it so
             self._sent_to[receiver] += 1
         self._sent += len(envelopes)
         self._conclude(host)
@@ -245,10 +257,15 @@ class Searcher:
             self._around.say(Account(self.epoch, False, {}, Metrics(), NOTHING))
             return
         protocol, private = self._host.protocol, self._around.private
-        metrics = replace(self._host.metrics(), memory=own_memory())
+        spent = self._host.metrics()
+        metrics = replace(spent, ncccs=min(spent.ncccs, LATEST), memory=own_memory())
         assigned = bool(protocol.assignment)  # who steps aside has a value, and none of its variables has
-        assignment, findings = ({}, NOTHING) if private else (protocol.assignment, protocol.findings)
+        assignment, findings = ({}, NOTHING) if private else (protocol.assignment, self._findings(protocol))
         self._around.say(Account(self.epoch, assigned, assignment, metrics, findings, self._exchanged()))
+
+    def _findings(self, protocol: Protocol) -> Findings:
+        """Return what is known of the whole, partly from others; nothing, if one of them has told what cannot be."""
+        return NOTHING if fault_of_findings(protocol.findings, self._task.order) else protocol.findings
 
     def _exchanged(self) -> dict[str, Exchanged]:
         """The messages with each other robot, by its name."""
@@ -270,13 +287,12 @@ class Searcher:
         own = robot.private if self.assignment else ()
         held = [one for one in (*own, *robot.shared, *parts) if values.keys() >= set(one.variables)]
         cost = sum(constraint.price(values) for constraint in held)
-        shared = _judged(robot.name, [one for one in robot.shared if one.model is not Model.PKC], values)
-        copies = [
-            *(one for child in robot.children for one in _judged(child.name, child.copies, values)),
-            *(one for sender, told_ones in self._learnt.items() for one in _judged(sender, told_ones, values)),
-        ]
+        shared = tuple(_judged(robot.name, [one for one in robot.shared if one.model is not Model.PKC], values))
+        known = [*((child.name, child.copies) for child in robot.children), *self._learnt.items()]
+        judged = (one for holder, theirs in known for one in _judged(holder, theirs, values))
+        copies = tuple(islice(judged, max(0, MOST_JUDGED - len(shared))))  # others may have told any number
         allowed = cost < INFINITE
-        return Checked(self.epoch, allowed, cost if allowed else 0, len(held), tuple(shared), tuple(copies))
+        return Checked(self.epoch, allowed, cost if allowed else 0, len(held), shared, copies)
 
     def _now(self) -> float:
         return time.monotonic() - self._began

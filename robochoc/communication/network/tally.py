@@ -117,8 +117,8 @@ class Tally:
             self.verdict, self._witness = Verdict(verdict), name
         if self.verdict == verdict:
             return ""
-        if self._witness is None:
-            return f"it has concluded {verdict} after all were quiet"
+        if self._witness is None:  # all were quiet, and the answer is checked: another may have stirred it since
+            return ""
         if self._witness == name:
             return f"it has concluded {verdict}, and {self.verdict} before"
         why = f"{self._witness} has concluded {self.verdict}, and {name} {verdict}"
