@@ -26,6 +26,7 @@ import small
 import sniffer
 import solver
 import start
+import start_up
 import sweep
 import transport
 import variants
@@ -36,6 +37,7 @@ from report import Section, machine
 PARTS: dict[str, Callable[[], Section]] = {
     "whole": whole.measured,
     "peers": peers.measured,
+    "startup": start_up.measured,
     "start": start.measured,
     "transport": transport.measured,
     "flagship": flagship.measured,

@@ -77,10 +77,9 @@ def _takes(team: Team, options: Options, traits: Traits) -> bool:
 
 def _judge_takes(team: Team, options: Options) -> bool:
     """Whether the central judge would, for sure."""
-    for_robots = (options.order, options.messages, options.channel, options.settings, options.filters, options.verify)
-    if any(for_robots) or options.patience is not None:
-        return False
-    if options.runtime is not Runtime.PROCESSES or options.on_loss is not OnLoss.FAIL:
+    for_robots = (options.order, options.messages, options.channel, options.settings, options.filters)
+    elsewhere = options.runtime is not Runtime.PROCESSES or options.on_loss is not OnLoss.FAIL
+    if elsewhere or any((*for_robots, options.verify, options.patience)):
         return False
     try:
         refuse_central(team, replace(options, protocol=CENTRAL))

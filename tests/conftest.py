@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from authorities import Clock, Seen
 from desks import Desk, open_files
+from hypothesis import settings
 from machines import Site
 
 from robochoc.authority.authority import Authority
@@ -18,6 +19,10 @@ from robochoc.generators.queens3d import queens3d
 
 if TYPE_CHECKING:
     from sniffed import Served
+
+# How long an example takes says something of the machine, and nothing of what is tested.
+settings.register_profile("robochoc", deadline=None)
+settings.load_profile("robochoc")
 
 
 @pytest.fixture

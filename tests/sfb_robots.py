@@ -32,9 +32,13 @@ def agents(problem: Team, settings: SFBSettings | None = None) -> dict[str, SFB]
     return found
 
 
-def introduced(problem: Team, settings: SFBSettings | None = None) -> tuple[dict[str, SFB], list[CPAs]]:
-    """All robots know each other's values; and what the first one says then."""
+def introduced(
+    problem: Team, settings: SFBSettings | None = None, *, begun: bool = True
+) -> tuple[dict[str, SFB], list[CPAs]]:
+    """All robots know each other's values; and what the first one says then. `begun`: as if a CPA had gone before."""
     robots = agents(problem, settings)
+    for robot in robots.values():
+        robot.first_sent = begun
     said: list[CPAs] = []
     todo = []
     for robot in robots.values():

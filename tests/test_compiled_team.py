@@ -210,6 +210,10 @@ def test_who_plays_machines_again_knows_what_they_showed_and_what_it_cost_to_ste
 
 def test_costs_that_come_later_must_fit_as_well() -> None:
     team = with_costs(team_of({"A": (1, 2), "B": (1, 2)}, [Constraint("C", _UNLIKE, ("A", "B"), ("A", "B"), cost=5)]))
-    dear = AddConstraint("RB", "RA", Constraint("D", _UNLIKE, ("A", "B"), ("A", "B"), cost=2**62))
+    most = 10**18 - 1  # a file has no number of more digits
+    dear = [
+        AddConstraint("RB", "RA", Constraint(f"D{number}", _UNLIKE, ("A", "B"), ("A", "B"), cost=most))
+        for number in range(5)
+    ]
     with pytest.raises(Unsupported, match="scale them down"):
-        solve(replace(team, scenario=(Event((dear,)),)), Options(protocol="dpop", runtime=Runtime.SIMULATOR))
+        solve(replace(team, scenario=(Event(tuple(dear)),)), Options(protocol="dpop", runtime=Runtime.SIMULATOR))

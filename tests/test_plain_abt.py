@@ -30,10 +30,8 @@ def conflicts(team: Team) -> Conflicts:
     ("agents", "values", "density", "tightness", "problems"),
     [
         (10, 6, 0.4, 0.5, 20),
-        pytest.param(20, 10, 0.2, 0.6, 100, marks=pytest.mark.slow),
         pytest.param(20, 10, 0.2, 0.65, 100, marks=pytest.mark.slow),
         pytest.param(20, 10, 0.2, 0.7, 100, marks=pytest.mark.slow),
-        pytest.param(20, 10, 0.25, 0.6, 100, marks=pytest.mark.slow),
         pytest.param(15, 10, 0.4, 0.55, 100, marks=pytest.mark.slow),
     ],
 )

@@ -116,9 +116,17 @@ def test_charges_that_do_not_fit_are_refused(message: Below) -> None:
 
 
 def test_the_first_cpa_goes_alone_and_each_bundle_is_twice_as_large() -> None:
-    robots, _ = introduced(team(CHAIN), SFBSettings(window=9))
+    robots, said_first = introduced(team(CHAIN), SFBSettings(window=9), begun=False)
+    assert [message.count for message in said_first] == [1, 1]
     said = told(robots["RB"], ("RA", cpas(*[row(0)] * 11, ceiling=10)))
-    assert [message.count for _, message in said if isinstance(message, CPAs)] == [2, 4, 8, 8]
+    assert [message.count for _, message in said if isinstance(message, CPAs)] == [1, 1, 4, 8, 8]
+
+
+def test_the_others_of_the_first_robot_s_values_wait_for_what_the_first_comes_to() -> None:
+    robots, said = introduced(team(CHAIN), begun=False)
+    assert [message.count for message in said] == [1]
+    assert told(robots["RA"], ("RB", Solution(1, [1, 0, 0])), ("RB", Explored())) == []
+    assert robots["RA"].findings.bound == 1
 
 
 def test_no_bundle_is_larger_than_the_setting() -> None:

@@ -128,7 +128,7 @@ REAL = {
         "RX02 says: below you there are RX02 (4 values), RX03 (2 values) and RX04 (3 values);"
         " all together they cost at most 13"
     ),
-    ("sfb", "CPAs"): "RX00 says: 4 partial assignments for RX01 to extend; no solution is known yet",
+    ("sfb", "CPAs"): "RX00 says: 1 partial assignment for RX01 to extend; no solution is known yet",
     ("sfb", "Explored"): (
         "RX01 says: nothing is left of the oldest partial assignments that I have had from you and have not answered"
     ),

@@ -183,7 +183,8 @@ class SFB(Protocol):
     """One agent. State: the `batches` that it is to explore, the oldest first, and the `best` solution.
 
     `least` is what that costs; `under_way` are, for each message of CPAs to the next robot that has not been
-    answered, the batch that it is of, and its lowest bound. `width` CPAs are extended next. `bounds` is what this
+    answered, the batch that it is of, and its lowest bound. `width` CPAs are extended next; `first_sent`: the first
+    CPA has gone, alone. `bounds` is what this
     robot adds to CPAs: there once it knows everybody's values, and of use once it knows the `ceiling`.
     """
 
@@ -210,6 +211,7 @@ class SFB(Protocol):
         self.batches: deque[Batch] = deque()
         self.under_way: deque[tuple[Batch, int]] = deque()
         self.width = 1
+        self.first_sent = False
 
     def start(self) -> None:
         """The first robot tells its values; who has none at all ends the search."""
@@ -323,8 +325,9 @@ class SFB(Protocol):
             many = max(1, fit // len(self.problem.values))
             batch.ready = self.bounds.extended(batch.take(min(self.width, many), self.least), self.least)
             self.width = min(2 * self.width, self.settings.batch)
-        rows = batch.part(fit, self.least)
+        rows = batch.part(fit if self.first_sent else 1, self.least)
         if len(rows):
+            self.first_sent = True
             batch.sent += 1
             self.under_way.append((batch, int(rows[:, BOUND].min())))
             self.send(self.next, CPAs(len(rows), rows.tobytes(), self.least, self.ceiling))
