@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from statistics import geometric_mean
+
 import pytest
 from plain_abt import Conflicts, search
 
@@ -13,7 +15,8 @@ from robochoc.problem import Relation, Team
 from robochoc.protocols.abt import ABT
 
 WITHIN = 0.02
-"""The sums may differ by so much: which of two agents that are ready first differs, and so do runs."""
+"""The mean ratio may differ from 1 by so much. Which of two agents that are ready is first differs, and so do runs: a
+single one by up to a fifth, so that in a sum the largest problem would drown all others."""
 
 
 def conflicts(team: Team) -> Conflicts:
@@ -38,15 +41,14 @@ def conflicts(team: Team) -> Conflicts:
 def test_messages_and_ncccs_are_those_of_another_abt(
     agents: int, values: int, density: float, tightness: float, problems: int
 ) -> None:
-    messages = their_messages = ncccs = their_ncccs = 0
+    messages: list[float] = []
+    ncccs: list[float] = []
     for seed in range(problems):
         team = random_csp(agents, values, density, tightness, seed, connected=True)
         ours = Simulation(team, ABT, Concurrent(seed)).search()
         theirs = search(agents, values, conflicts(team), seed)
         assert ours.verdict is (Verdict.SOLUTION if theirs.solvable else Verdict.NO_SOLUTION)
-        messages += sum(ours.metrics.messages.values())
-        ncccs += ours.metrics.ncccs
-        their_messages += theirs.messages
-        their_ncccs += theirs.ncccs
-    assert messages == pytest.approx(their_messages, rel=WITHIN)
-    assert ncccs == pytest.approx(their_ncccs, rel=WITHIN)
+        messages.append(sum(ours.metrics.messages.values()) / theirs.messages)
+        ncccs.append(ours.metrics.ncccs / theirs.ncccs)
+    assert geometric_mean(messages) == pytest.approx(1, abs=WITHIN)
+    assert geometric_mean(ncccs) == pytest.approx(1, abs=WITHIN)
