@@ -88,7 +88,7 @@ class Run:
     def wait_until_listening(self) -> None:
         """Wait until the program, and no longer Python alone, answers signals, or is over already."""
         bit = 1 << (signal.SIGTERM - 1)
-        wait_until(lambda: bool(_caught(self.pid) & bit) or self.is_over, "it never listened to signals")
+        wait_until(lambda: bool(_signals(self.pid, "SigCgt") & bit) or self.is_over, "it never listened to signals")
 
     def strike(self, signum: int, *victims: int, group: bool = False) -> None:
         """Send `signum` to `victims`, to the program itself without any, or to its whole process group."""
@@ -231,13 +231,15 @@ def _read(pid: int, file: str) -> bytes:
         return b""
 
 
-def _caught(pid: int) -> int:
-    """The set of signals that the process has handlers for."""
-    try:
-        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
-    except OSError:
-        return 0
-    return next((int(line.split()[1], 16) for line in lines if line.startswith("SigCgt")), 0)
+def ignores_ctrl_c(pid: int) -> bool:
+    """Whether the process ignores SIGINT."""
+    return bool(_signals(pid, "SigIgn") & 1 << (signal.SIGINT - 1))
+
+
+def _signals(pid: int, kind: str) -> int:
+    """The set of signals that the process has handlers for (`SigCgt`), or ignores (`SigIgn`)."""
+    lines = _read(pid, "status").decode().splitlines()
+    return next((int(line.split()[1], 16) for line in lines if line.startswith(kind)), 0)
 
 
 def _sockets(pid: int) -> Iterator[str]:

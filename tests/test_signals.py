@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import BinaryIO, Self
 
 import pytest
-from faults import PROGRAM, Run, gone_within_s, running, wait_until
+from faults import PROGRAM, Run, gone_within_s, ignores_ctrl_c, running, wait_until
 
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
@@ -34,11 +34,13 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /pro
 
 SEED = int(os.environ.get("ROBOCHOC_SIGNALS", "16"))
 TEAMS: dict[str, tuple[Team, str]] = {
-    "solvable": (random_csp(12, 6, 0.6, 0.38, 5), "solution"),
-    "unsolvable": (random_csp(12, 6, 0.6, 0.38, 1), "no-solution"),
+    "processes-solvable": (random_csp(14, 8, 0.5, 0.42, 0), "solution"),
+    "processes-unsolvable": (random_csp(14, 6, 0.6, 0.35, 0), "no-solution"),
+    "network-solvable": (random_csp(12, 6, 0.6, 0.38, 5), "solution"),
+    "network-unsolvable": (random_csp(12, 6, 0.6, 0.38, 1), "no-solution"),
     "rows": (queens3d(4, robots="rows"), "no-solution"),
 }
-"""Teams, and their verdicts. Robots of the last have private problems, so that a solver compiles them with --ace."""
+"""Teams that search for a second, and their verdicts; --ace has a solver compile the last, of private problems."""
 KILL, STOP, CONT, TERM, INT = signal.SIGKILL, signal.SIGSTOP, signal.SIGCONT, signal.SIGTERM, signal.SIGINT
 FATAL = (KILL, TERM, INT)
 TARGETS = {
@@ -54,13 +56,14 @@ MOMENTS = {
 }
 """When a target can be struck. `there`: it has just been started (parent: the first of the others)."""
 GONE_S = 5.0
-OVER_S = 120.0
+OVER_S = 60.0
 """After so long, on a machine that has time for it, a run hangs."""
 STAYS = "stays until Ctrl-C"
 PATIENCE_S = 2
 STRIKES = 200
 EACH = 4
 LATER_S = 0.3
+STOPPED = ("its process had been stopped", "it has not been there for", "it did not report at the end")
 STOPPED_S = 1.0
 
 
@@ -68,8 +71,8 @@ STOPPED_S = 1.0
 class Strike:
     """One signal to `target`, `later_s` after a moment, and what comes next.
 
-    `team` is a key of `TEAMS`. A whole `group` gets it as from a terminal. Whoever is stopped goes on after a while (`then` is SIGCONT), is given up (None), or
-    stays stopped while the parent gets another signal.
+    `team` is a key of `TEAMS`. A whole `group` gets it as from a terminal. Whoever is stopped goes on after a while
+    (`then` is SIGCONT), is given up (None), or stays stopped while the parent gets another signal.
     """
 
     number: int
@@ -136,7 +139,7 @@ def drawn(seed: int, count: int = STRIKES) -> Iterator[Strike]:
             signum=signum,
             moment=moment,
             later_s=chance.choice([0, chance.uniform(0, LATER_S)]),
-            team="rows" if solving else chance.choice(["solvable", "unsolvable"]),
+            team="rows" if solving else f"{runtime}-{chance.choice(['solvable', 'unsolvable'])}",
             victim=chance.randrange(100),
             watched=target == "viewer" or moment == "staying",
             group=target == "parent" and signum is INT and chance.random() < 0.5,
@@ -170,6 +173,7 @@ class Watched:
         self._file: BinaryIO | None = None
         self._follower: Follower | None = None
         self._kinds: set[type[Line]] = set()
+        self._solvers: set[int] = set()
 
     def __enter__(self) -> Self:
         return self
@@ -185,7 +189,7 @@ class Watched:
             "there": lambda: self.target() is not None,
             "registered": lambda: self.told(Registered),
             "searching": lambda: self.told(Sent),
-            "judging": lambda: self.told(Sent) and self.target() is not None,
+            "judging": self.another_solver,
             "staying": lambda: STAYS in self.run.errors(),
         }
         self.run.wait_until_listening()
@@ -193,6 +197,8 @@ class Watched:
         if self._strike.target == "parent" and moment == "there":
             began = lambda: self.run.program("solver") is not None  # noqa: E731
         wait_until(lambda: began() or self.run.is_over, f"it never came to {moment}", OVER_S)
+        if self._strike.then is KILL:  # nobody wakes who is stopped before it could ask for that
+            wait_until(lambda: self.run.is_over or self.is_ready(), "it never listened", OVER_S)
         time.sleep(self._strike.later_s)
         return None if self.run.is_over else self.target()
 
@@ -203,6 +209,18 @@ class Watched:
         if self._strike.target == "robot":
             return self.run.robot(self._strike.robot)
         return self.run.program(self._strike.target)
+
+    def is_ready(self) -> bool:
+        """Whether the target is past the start of Python: all of them ignore Ctrl-C, but the parent, who hears it."""
+        target = self.target()
+        return target is None or target == self.run.pid or ignores_ctrl_c(target)
+
+    def another_solver(self) -> bool:
+        """Whether there is a solver, and not the one that has compiled."""
+        solver = self.run.program("solver")
+        if solver is not None:
+            self._solvers.add(solver)
+        return len(self._solvers) > 1
 
     def told(self, kind: type[Line]) -> bool:
         """Whether the journal has told of such an event."""
@@ -247,7 +265,7 @@ def struck(strike: Strike, folder: Path, home: Path) -> str:
         wait_until(lambda: not run.left_behind(), f"{ended}: it leaves {run.left_behind()}", gone_within_s(GONE_S))
         assert not run.still_listening(sockets), ended
     _journal_is_right(strike, home, killed=fatal and last is KILL)
-    return f"{status}"
+    return f"{status}" + ("" if target else " (too late)") + f", {took:.1f} s"
 
 
 def _send(strike: Strike, run: Run, target: int) -> None:
@@ -281,7 +299,7 @@ def told(strike: Strike, errors: str) -> bool:
     """Whether the reason why there is no answer is the strike."""
     if strike.given_up:
         whys = {
-            "robot": (f"{strike.robot} was lost: its process had been stopped", "was lost: it has not been there for"),
+            "robot": tuple(f"{strike.robot} was lost: {why}" for why in STOPPED),
             "solver": ("the time (--timeout) was over", "the time was over"),
             "router": ("was lost: it has not been there for", "router"),
         }[strike.target]

@@ -39,6 +39,8 @@ from robochoc.solver.encoding import Unsupported
 from robochoc.solver.part import NO_BRIEF, Brief
 
 LOOPBACK = "127.0.0.1"
+FAREWELL_S = 1.0
+"""How long to tell robots that they may go: whoever does not hear it, because it is stopped, is killed."""
 GRACE_S = 2.0
 """How long robots that were sent home get to end by themselves."""
 _ATTEMPTS = 5
@@ -155,7 +157,7 @@ class LocalNetwork(Session):
             return
         self._sent_home = True
         try:
-            self._master.leave("the run is over")
+            self._master.leave("the run is over", farewell_s=FAREWELL_S)
             wait([process.sentinel for process in self._processes.values()], 0)
         finally:
             with signals_held():
