@@ -64,7 +64,7 @@ STRIKES = 200
 EACH = 4
 LATER_S = 0.3
 STOPPED = ("its process had been stopped", "it has not been there for", "it did not report at the end")
-STOPPED_S = 1.0
+STOPPED_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -80,12 +80,12 @@ class Strike:
     target: str
     signum: signal.Signals
     moment: str
-    later_s: float
     team: str
-    victim: int
-    watched: bool
-    group: bool
     then: signal.Signals | None = None
+    later_s: float = 0
+    victim: int = 0
+    watched: bool = False
+    group: bool = False
 
     def __str__(self) -> str:
         """Its name, from which it can be found again."""
@@ -339,6 +339,14 @@ def _journal_is_right(strike: Strike, home: Path, *, killed: bool) -> None:
 
 
 ALL = tuple(drawn(SEED))
+FEW = (
+    Strike(0, "network", "robot", STOP, "there", "network-solvable", KILL),
+    Strike(1, "network", "router", STOP, "there", "network-solvable", KILL),
+    Strike(2, "processes", "solver", STOP, "there", "rows", KILL),
+    Strike(3, "processes", "parent", STOP, "registered", "processes-solvable", TERM),
+    Strike(4, "processes", "viewer", KILL, "registered", "network-unsolvable", watched=True),
+    Strike(5, "processes", "parent", INT, "staying", "network-solvable", watched=True),
+)
 
 
 def test_each_target_gets_each_signal() -> None:
@@ -347,6 +355,11 @@ def test_each_target_gets_each_signal() -> None:
     assert {(strike.runtime, strike.target, strike.signum) for strike in ALL} == {
         (*pair, signum) for pair, signum in itertools.product(wanted, (KILL, STOP, CONT, TERM, INT))
     }
+
+
+@pytest.mark.parametrize("strike", FEW, ids=str)
+def test_a_signal_of_each_kind(strike: Strike, folder: Path, short_path: Path) -> None:
+    struck(strike, folder, short_path / "run")
 
 
 @pytest.mark.slow
