@@ -380,6 +380,18 @@ def test_a_parent_that_is_struck_at_any_time_leaves_no_process(
         assert not run.ports()
 
 
+def test_a_parent_that_is_killed_while_there_is_no_router(short_path: Path) -> None:
+    """Before it is opened, and after it is closed, the fork server is all there is."""
+    program = (
+        "import os; from robochoc.communication.network.local import _fork_server as begun;"
+        "from robochoc.protocols.abt import ABT; begun(ABT); os.kill(os.getpid(), 9)"
+    )
+    with running([sys.executable, "-c", program], short_path / "run") as run:
+        run.end()
+        assert run.status() == -signal.SIGKILL, run.errors()
+        left_nothing(run)
+
+
 def left_nothing(run: Run) -> None:
     assert "Traceback" not in run.errors(), run.errors()
     wait_until(lambda: not run.left_behind(), f"it leaves {run.left_behind()}")
