@@ -6,8 +6,7 @@ for, so that the command line starts quickly.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+TYPE_CHECKING = False  # that of `typing` takes longer to import than all else before signals are heard (cli/main.py)
 if TYPE_CHECKING:
     from robochoc.api import AgentsContainer, Problem, load
     from robochoc.outcome import Outcome, Verdict

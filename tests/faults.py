@@ -26,6 +26,12 @@ _PATIENCE_S = 30.0
 _MARK = "ROBOCHOC_FAULT_TEST"
 _SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - where shared memory would be left
 _LISTENING = "0A"
+_PROGRAMS = {
+    "solver": b"robochoc.solver.ace_process",
+    "router": b"robochoc.communication.network.router_process",
+    "viewer": b"robochoc.view.sniffer.viewer_process",
+}
+"""Processes of a run that are programs of their own, and no robots."""
 
 
 class Run:
@@ -71,10 +77,18 @@ class Run:
         wait_until(lambda: len(self.robots()) >= count, f"there are no {count} robots: {self.errors()}")
         return self.robots()
 
+    def program(self, role: str) -> int | None:
+        """The id of the `solver`, the `router` or the `viewer`, while there is one."""
+        return next((pid for pid in self.processes() if _PROGRAMS[role] in _read(pid, "cmdline")), None)
+
+    def robot(self, name: str) -> int | None:
+        """The id of the robot's process, in whatever runtime, once it bears its name."""
+        return next((pid for pid in self.processes() if _read(pid, "comm") == f"{name}\n".encode()), None)
+
     def wait_until_listening(self) -> None:
         """Wait until the program, and no longer Python alone, answers signals, or is over already."""
         bit = 1 << (signal.SIGTERM - 1)
-        wait_until(lambda: bool(_caught(self.pid) & bit) or self.is_over, "it never listened to signals")
+        wait_until(lambda: bool(_signals(self.pid, "SigCgt") & bit) or self.is_over, "it never listened to signals")
 
     def strike(self, signum: int, *victims: int, group: bool = False) -> None:
         """Send `signum` to `victims`, to the program itself without any, or to its whole process group."""
@@ -108,7 +122,10 @@ class Run:
 
     def processes(self) -> list[int]:
         """The ids of all processes of this run."""
-        return [pid for pid in _pids() if _alive(pid) and (_session(pid) == self.pid or self._mark in _environ(pid))]
+        return [pid for pid in _pids() if _alive(pid) and self._is_ours(pid)]
+
+    def _is_ours(self, pid: int) -> bool:
+        return _session(pid) == self.pid or self._mark in _read(pid, "environ")
 
     def status(self) -> int:
         """The exit status; negative: killed by that signal."""
@@ -129,8 +146,17 @@ class Run:
 
     def ports(self) -> set[int]:
         """TCP ports at which processes of this run listen."""
+        return {port for port, _ in self.listening()}
+
+    def listening(self) -> set[tuple[int, str]]:
+        """Port and inode of the TCP sockets at which processes of this run listen."""
         inodes = {inode for pid in self.processes() for inode in _sockets(pid)}
-        return {port for port, inode in _listening() if inode in inodes}
+        return {(port, inode) for port, inode in _listening() if inode in inodes}
+
+    @staticmethod
+    def still_listening(sockets: set[tuple[int, str]]) -> set[tuple[int, str]]:
+        """Those of `sockets` that anybody still listens at."""
+        return sockets & set(_listening())
 
     def put_out(self) -> None:
         """Kill whatever is left, so that a test that fails leaves nothing either."""
@@ -160,9 +186,9 @@ def wait_until(condition: Callable[[], bool], otherwise: str, within_s: float = 
         time.sleep(POLL_S / 10)
 
 
-def gone_within_s() -> float:
-    """`GONE_WITHIN_S`, times as many as want each processor now: here other tests run beside it."""
-    return GONE_WITHIN_S * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
+def gone_within_s(promised_s: float = GONE_WITHIN_S) -> float:
+    """`promised_s`, times as many as want each processor now: here other tests run beside it."""
+    return promised_s * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
 
 
 def open_descriptors() -> int:
@@ -197,20 +223,23 @@ def _session(pid: int) -> int:
     return int(fields[3]) if fields else 0
 
 
-def _environ(pid: int) -> bytes:
+def _read(pid: int, file: str) -> bytes:
+    """The content of /proc/PID/`file`; nothing when the process has ended."""
     try:
-        return Path(f"/proc/{pid}/environ").read_bytes()
+        return Path(f"/proc/{pid}/{file}").read_bytes()
     except OSError:
         return b""
 
 
-def _caught(pid: int) -> int:
-    """The set of signals that the process has handlers for."""
-    try:
-        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
-    except OSError:
-        return 0
-    return next((int(line.split()[1], 16) for line in lines if line.startswith("SigCgt")), 0)
+def ignores_ctrl_c(pid: int) -> bool:
+    """Whether the process ignores SIGINT."""
+    return bool(_signals(pid, "SigIgn") & 1 << (signal.SIGINT - 1))
+
+
+def _signals(pid: int, kind: str) -> int:
+    """The set of signals that the process has handlers for (`SigCgt`), or ignores (`SigIgn`)."""
+    lines = _read(pid, "status").decode().splitlines()
+    return next((int(line.split()[1], 16) for line in lines if line.startswith(kind)), 0)
 
 
 def _sockets(pid: int) -> Iterator[str]:

@@ -292,11 +292,18 @@ def test_a_robot_ended_by_another_signal(signum: int, team: Path, tmp_path: Path
 
 
 def test_a_stopped_robot_does_not_outlive_the_time_limit(team: Path, tmp_path: Path) -> None:
-    with running(solving(team, timeout_s=2), tmp_path / "run") as run:
-        run.strike(signal.SIGSTOP, run.wait_for_robots(len(NAMES))[30])
-        assert run.end() < 2 + processes.LATE_WORDS_S + crew.FAREWELL_S + gone_within_s()
-        assert run.status() in {3, 4}
-        nothing_is_left(run)
+    for limit_s in (2, 10, 60):
+        with running(solving(team, timeout_s=limit_s), tmp_path / str(limit_s)) as run:
+            wait_until(lambda run=run: run.is_over or len(run.robots()) == len(NAMES), "it hangs", within_s=100)  # type: ignore[misc]
+            robots = run.robots()
+            if len(robots) < len(NAMES):
+                continue  # the machine is so busy that the time was over before all had started
+            run.strike(signal.SIGSTOP, robots[30])
+            assert run.end(100) < limit_s + processes.LATE_WORDS_S + crew.FAREWELL_S + gone_within_s()
+            assert run.status() in {3, 4}
+            nothing_is_left(run)
+            return
+    pytest.fail("64 robots do not start within a minute")
 
 
 def test_a_stopped_robot_does_not_outlive_ctrl_c(team: Path, tmp_path: Path) -> None:

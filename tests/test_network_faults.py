@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import socket
@@ -39,6 +40,8 @@ from robochoc.solver.part import Brief
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 
 GONE_WITHIN_S = 10.0
+WHILE_A_MASTER_STARTS_S = 60.0
+"""However busy the machine is; nobody waits for it to be over."""
 
 
 # Processes that die or stop
@@ -276,23 +279,33 @@ class Elsewhere:
             process.kill()
             process.communicate()
 
-    def start(self) -> None:
+    def start(self, patience_s: float) -> None:
         for name in CHAIN.order:
-            thread = threading.Thread(target=self._take_part, args=[name])
+            thread = threading.Thread(target=self._take_part, args=[name, patience_s])
             thread.start()
             self.threads.append(thread)
+
+    def wait_until_free(self) -> None:
+        """Wait until nobody listens at the endpoint any more."""
+        host, _, port = self.endpoint.rpartition(":")
+
+        def is_free() -> bool:
+            with socket.socket() as trial:
+                return trial.connect_ex((host, int(port))) == errno.ECONNREFUSED
+
+        wait_until(is_free, "the router does not end")
 
     def wait(self) -> set[str]:
         """Why the robots have ended, as soon as they have."""
         for thread in self.threads:
-            thread.join(60)
+            thread.join(2 * WHILE_A_MASTER_STARTS_S)
         assert all(self.endings[name].failed for name in CHAIN.order)
         return {ending.why for ending in self.endings.values()}
 
-    def _take_part(self, name: str) -> None:
+    def _take_part(self, name: str, patience_s: float) -> None:
         identity = self.identities[name]
         with Post(self.endpoint, identity, watch=(), patience_s=30) as post:
-            robot = NetworkRobot(CompiledRobot(CHAIN[name]), identity, post, lambda _: Held, Manner(4))
+            robot = NetworkRobot(CompiledRobot(CHAIN[name]), identity, post, lambda _: Held, Manner(patience_s))
             self.endings[name] = robot.run()
 
 
@@ -305,7 +318,7 @@ def test_a_master_that_is_killed(tmp_path: Path) -> None:
     """Its router ends with it, and the robots by themselves."""
     robots = Elsewhere(tmp_path)
     with robots.master() as master:
-        robots.start()
+        robots.start(patience_s=4)
         assert searching(master)
         master.kill()
         assert robots.wait() == {"the master is gone: no link to it for 4 s"}
@@ -317,9 +330,10 @@ def test_a_master_that_is_killed(tmp_path: Path) -> None:
 def test_a_master_that_is_started_anew(tmp_path: Path) -> None:
     robots = Elsewhere(tmp_path)
     with robots.master() as master:
-        robots.start()
+        robots.start(WHILE_A_MASTER_STARTS_S)
         assert searching(master)
         master.kill()
+    robots.wait_until_free()
     with robots.master():
         assert robots.wait() == {"the master was started anew; start this robot anew as well"}
 
@@ -364,6 +378,18 @@ def test_a_parent_that_is_struck_at_any_time_leaves_no_process(
         run.strike(signum)
         run.end()
         assert not run.ports()
+
+
+def test_a_parent_that_is_killed_while_there_is_no_router(short_path: Path) -> None:
+    """Before it is opened, and after it is closed, the fork server is all there is."""
+    program = (
+        "import os; from robochoc.communication.network.local import _fork_server as begun;"
+        "from robochoc.protocols.abt import ABT; begun(ABT); os.kill(os.getpid(), 9)"
+    )
+    with running([sys.executable, "-c", program], short_path / "run") as run:
+        run.end()
+        assert run.status() == -signal.SIGKILL, run.errors()
+        left_nothing(run)
 
 
 def left_nothing(run: Run) -> None:

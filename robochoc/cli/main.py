@@ -10,8 +10,11 @@ import os
 import signal
 import sys
 import time
-from types import FrameType
-from typing import NoReturn
+
+TYPE_CHECKING = False  # see robochoc/__init__.py
+if TYPE_CHECKING:
+    from types import FrameType
+    from typing import NoReturn
 
 PATIENCE_S = 1.0
 """So long after the first signal others mean the same one (two Ctrl-C, `timeout` and a shell); later, force."""

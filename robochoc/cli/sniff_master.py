@@ -204,6 +204,6 @@ class _Showing:
         """Keep the page until Ctrl-C, or until its process has ended."""
         if self._viewer is None:
             return
-        click.echo(f"{self._viewer.url} stays until Ctrl-C", err=True)
-        with suppress(KeyboardInterrupt):
+        with suppress(KeyboardInterrupt):  # which may come as soon as it is asked for
+            click.echo(f"{self._viewer.url} stays until Ctrl-C", err=True)
             self._viewer.wait()

@@ -98,9 +98,9 @@ class Watch:
         if viewer.is_gone:
             click.echo("the page is gone: its process ended during the run, which went on without it", err=True)
             return
-        viewer.finish()
-        click.echo(f"{viewer.url} stays until Ctrl-C", err=True)
-        with suppress(KeyboardInterrupt):
+        with suppress(KeyboardInterrupt):  # which may come as soon as it is asked for
+            viewer.finish()
+            click.echo(f"{viewer.url} stays until Ctrl-C", err=True)
             viewer.wait()
             click.echo("the page is gone: its process has ended", err=True)
 

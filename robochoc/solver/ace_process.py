@@ -27,6 +27,7 @@ from typing import Any
 
 import msgspec
 
+from robochoc.orphans import signal_when_orphaned
 from robochoc.solver.ace_words import (
     BEST,
     LENGTH,
@@ -71,6 +72,7 @@ MINIMISE = ("-os=DECREASING",)
 
 def main() -> None:
     """Serve the parent's tasks until it hangs up."""
+    signal_when_orphaned(signal.SIGCONT)  # stopped, it would not see the end of the lifeline
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = socket.socket(fileno=int(sys.argv[1]))
     folder = Path(sys.argv[3])

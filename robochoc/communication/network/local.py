@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import multiprocessing
 import multiprocessing.forkserver
+import os
 import socket
 import threading
 import time
@@ -21,6 +22,7 @@ from typing import cast
 
 from robochoc.authority.admission import Household
 from robochoc.change import still_showing
+from robochoc.communication.network import fork_server
 from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members, reach
@@ -39,12 +41,14 @@ from robochoc.solver.encoding import Unsupported
 from robochoc.solver.part import NO_BRIEF, Brief
 
 LOOPBACK = "127.0.0.1"
+FAREWELL_S = 1.0
+"""How long to tell robots that they may go: whoever does not hear it, because it is stopped, is killed."""
 GRACE_S = 2.0
 """How long robots that were sent home get to end by themselves."""
 _ATTEMPTS = 5
 _DESCRIPTORS, _DESCRIPTORS_PER_ROBOT = 32, 2
 """Open files: of the master's session, the router's pipes and the fork server, and of each robot's process."""
-_PRELOAD = ("__main__", "robochoc.communication.network.robot_process")
+_PRELOAD = (fork_server.__name__, "__main__", "robochoc.communication.network.robot_process")
 """What the fork server imports once for all robots; without the program's own file each of them would."""
 _OURS = "robochoc."
 """Modules that are sure to be importable there."""
@@ -155,7 +159,7 @@ class LocalNetwork(Session):
             return
         self._sent_home = True
         try:
-            self._master.leave("the run is over")
+            self._master.leave("the run is over", farewell_s=FAREWELL_S)
             wait([process.sentinel for process in self._processes.values()], 0)
         finally:
             with signals_held():
@@ -209,7 +213,11 @@ def _fork_server(protocol: type[Protocol]) -> ForkServerContext:
     context.set_forkserver_preload([*_PRELOAD, *own])
     try:
         with signals_held():
-            multiprocessing.forkserver.ensure_running()
+            os.environ[fork_server.SCRATCH] = get_temp_dir()
+            try:
+                multiprocessing.forkserver.ensure_running()
+            finally:
+                del os.environ[fork_server.SCRATCH]
     except OSError as error:  # such as a temporary folder whose path is too long for a socket
         raise Unsupported(f"robots' processes cannot be started: {error} (see TMPDIR)") from error
     return context

@@ -195,9 +195,9 @@ class Master:
             raise RobotsLost(tally.lost or {MASTER: "robots have not checked their constraints in time"})
         return tally.held, tally.cost
 
-    def leave(self, why: str, *, failed: bool = False) -> None:
+    def leave(self, why: str, *, failed: bool = False, farewell_s: float = FAREWELL_S) -> None:
         """Tell all that the run is over, until they have heard it: some may have joined, or come back, just now."""
-        leave, until = Leave(why, failed), time.monotonic() + FAREWELL_S
+        leave, until = Leave(why, failed), time.monotonic() + farewell_s
         staying = partial(self.members.staying, FAREWELL_S, besides=self.tally.lost)
         with suppress(RobotsLost, Unsupported):
             self._tell_all(leave)

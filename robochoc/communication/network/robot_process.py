@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import multiprocessing
+import multiprocessing.forkserver
 import os
 import signal
 import sys
@@ -15,6 +16,7 @@ from robochoc.authority.identity import Identity, IdentityTexts
 from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.post import CannotConnect, Post
 from robochoc.communication.network.robot import NetworkRobot
+from robochoc.orphans import signal_when_orphaned
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
 
@@ -40,6 +42,7 @@ def robot_process(given: Given) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    _end_with_the_fork_server()
     if sys.platform == "linux":
         libc = ctypes.CDLL(None)
         libc.prctl(_PR_SET_NAME, given.own.robot.name.encode())
@@ -59,8 +62,22 @@ def robot_process(given: Given) -> None:
         sys.exit(str(error))
 
 
+def _end_with_the_fork_server() -> None:
+    """Have the kernel kill this process when the fork server ends, which does so when the parent is gone.
+
+    It would wait for its children, which all hold an end of the pipe that tells it so, and never use it; and one that
+    is stopped (SIGSTOP) does not see that the parent is gone.
+    """
+    signal_when_orphaned(signal.SIGKILL)
+    alive = getattr(multiprocessing.forkserver, "_forkserver", None)
+    descriptor = getattr(alive, "_forkserver_alive_fd", None)
+    if descriptor is not None:
+        os.close(descriptor)
+        setattr(alive, "_forkserver_alive_fd", None)  # noqa: B010 - it is not ours, and types do not know it
+
+
 def _end_with_the_parent() -> None:
-    """Not by the system's means: those would wait for the fork server, and that waits for its last child."""
+    """End even while the fork server does not: it may be elsewhere held up."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])

@@ -15,12 +15,14 @@ import sys
 import zenoh
 
 from robochoc.communication.network.zenoh_config import config
+from robochoc.orphans import signal_when_orphaned
 
 READY = "listening"
 
 
 def main() -> None:
     """Be the router until standard input ends."""
+    signal_when_orphaned(signal.SIGCONT)  # stopped, it would not see the end of standard input
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     zenoh.init_log_from_env_or("error")
     scratch, settings = json.loads(sys.stdin.readline()), json.loads(sys.stdin.readline())

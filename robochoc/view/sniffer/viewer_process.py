@@ -8,7 +8,6 @@ asks, it costs no more than Python does.
 from __future__ import annotations
 
 import asyncio
-import ctypes
 import json
 import os
 import select
@@ -21,7 +20,7 @@ from contextlib import suppress
 from functools import partial
 from typing import NamedTuple
 
-_PR_SET_PDEATHSIG = 1
+from robochoc.orphans import signal_when_orphaned
 
 
 class _Parent(NamedTuple):
@@ -48,11 +47,10 @@ class _Parent(NamedTuple):
 
 def main() -> None:
     """Serve until the parent is gone."""
+    signal_when_orphaned(signal.SIGKILL)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group, and is left to the parent
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     parent = _parent()
     line = parent.line()
     if not line:
