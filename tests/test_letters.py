@@ -15,9 +15,12 @@ from robochoc.communication.network.letters import LARGEST_LETTER, MASTER, Lette
 from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.words import (
     LATEST,
+    Account,
     Ask,
     Copies,
     Denied,
+    Exchanged,
+    Gap,
     Joined,
     Judge,
     Leave,
@@ -34,7 +37,9 @@ from robochoc.communication.network.words import (
     Word,
 )
 from robochoc.observers.events import Received
+from robochoc.outcome import Metrics, Place
 from robochoc.problem import Kind
+from robochoc.protocols.findings import Best, Findings, Trail
 
 PROFILE = Profile("R1", Kind.DISCSP, ("R0",), (), {"X": ((1, 3), (5, 5))}, {}, 1, 0, ("/R1/goal",))
 OUTSIDE = (Register, Welcome, Denied, Joined, Ask, Told, Sniff, Sniffable)
@@ -54,6 +59,16 @@ NUMBERS = st.integers(-(2**63), 2**64 - 1)
 SEVERAL = st.lists(TEXTS, max_size=3).map(tuple)
 DOMAINS = st.dictionaries(TEXTS, st.lists(st.tuples(NUMBERS, NUMBERS), max_size=2).map(tuple), max_size=2)
 SPECIAL: dict[type[Word], st.SearchStrategy[Word]] = {
+    Account: st.builds(
+        Account,
+        NUMBERS,
+        st.booleans(),
+        st.dictionaries(TEXTS, NUMBERS, max_size=2),
+        st.builds(Metrics, st.dictionaries(TEXTS, NUMBERS, max_size=2), NUMBERS, NUMBERS, NUMBERS),
+        st.just(Findings(best=Best(3, {"R1": (1, None)}), place=Place("R0", ("R2",)), trail=Trail([(0, 1)], 4))),
+        st.dictionaries(TEXTS, st.builds(Exchanged, NUMBERS, NUMBERS, NUMBERS), max_size=2),
+    ),
+    Gap: st.builds(Gap, TEXTS, st.integers(1, 2**53)),
     Register: st.builds(Register, st.just(PROFILE), TEXTS),
     Events: st.just(Events([Received(t=1.5, sender="R1", receiver="R2", type="Ok", clock=3)])),
     Judge: st.builds(Judge, NUMBERS, st.dictionaries(TEXTS, NUMBERS)),
@@ -85,7 +100,7 @@ def _travels(word: Word) -> bool:
     """Not NaN, which is not equal to itself, nor integers of more than 64 bits."""
     try:
         return msgspec.msgpack.decode(msgspec.msgpack.encode(word), type=type(word)) == word
-    except (OverflowError, UnicodeEncodeError):
+    except (OverflowError, UnicodeEncodeError, msgspec.ValidationError):
         return False
 
 
