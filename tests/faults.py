@@ -79,11 +79,14 @@ class Run:
 
     def program(self, role: str) -> int | None:
         """The id of the `solver`, the `router` or the `viewer`, while there is one."""
-        return next((pid for pid in self.processes() if _PROGRAMS[role] in _read(pid, "cmdline")), None)
+        return self._first(lambda pid: _PROGRAMS[role] in _read(pid, "cmdline"))
 
     def robot(self, name: str) -> int | None:
         """The id of the robot's process, in whatever runtime, once it bears its name."""
-        return next((pid for pid in self.processes() if _read(pid, "comm") == f"{name}\n".encode()), None)
+        return self._first(lambda pid: _read(pid, "comm") == f"{name}\n".encode())
+
+    def _first(self, fits: Callable[[int], bool]) -> int | None:
+        return next((pid for pid in _pids() if fits(pid) and _alive(pid) and self._is_ours(pid)), None)
 
     def wait_until_listening(self) -> None:
         """Wait until the program, and no longer Python alone, answers signals, or is over already."""

@@ -39,8 +39,9 @@ TEAMS: dict[str, tuple[Team, str]] = {
     "network-solvable": (random_csp(12, 6, 0.6, 0.38, 5), "solution"),
     "network-unsolvable": (random_csp(12, 6, 0.6, 0.38, 1), "no-solution"),
     "rows": (queens3d(4, robots="rows"), "no-solution"),
+    "small": (queens3d(2), "no-solution"),
 }
-"""Teams that search for a second, and their verdicts; --ace has a solver compile the last, of private problems."""
+"""Teams, and their verdicts: those of a runtime search for a second, a solver (--ace) compiles `rows`."""
 KILL, STOP, CONT, TERM, INT = signal.SIGKILL, signal.SIGSTOP, signal.SIGCONT, signal.SIGTERM, signal.SIGINT
 FATAL = (KILL, TERM, INT)
 TARGETS = {
@@ -343,9 +344,9 @@ FEW = (
     Strike(0, "network", "robot", STOP, "there", "network-solvable", KILL),
     Strike(1, "network", "router", STOP, "there", "network-solvable", KILL),
     Strike(2, "processes", "solver", STOP, "there", "rows", KILL),
-    Strike(3, "processes", "parent", STOP, "registered", "processes-solvable", TERM),
-    Strike(4, "processes", "viewer", KILL, "registered", "network-unsolvable", watched=True),
-    Strike(5, "processes", "parent", INT, "staying", "network-solvable", watched=True),
+    Strike(3, "processes", "parent", STOP, "listening", "small", TERM),
+    Strike(4, "processes", "viewer", KILL, "registered", "small", watched=True),
+    Strike(5, "processes", "parent", INT, "staying", "small", watched=True),
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ HEAVY = {
     "robochoc.communication.network", "robochoc.view", "robochoc.ros", "robochoc.replay",
 }  # fmt: skip
 """What a run of ABT in a pipe has no use for."""
+HERE = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
 
 
 def imported(*words: str) -> set[str]:
@@ -47,3 +49,10 @@ def test_help_imports_no_command() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert set(done.stderr.split()) == {"robochoc.cli", "robochoc.cli.main", "robochoc.cli.commands"}
+
+
+def test_nothing_slow_is_imported_before_signals_are_heard() -> None:
+    """Until then Python answers Ctrl-C, with a traceback."""
+    code = "import sys; before = {*sys.modules}; import robochoc.cli.main; print(*{*sys.modules} - before)"
+    done = subprocess.run([sys.executable, "-S", "-c", code], capture_output=True, text=True, check=True, env=HERE)
+    assert not {"typing", "contextlib", "re", "pathlib", "click"} & set(done.stdout.split())

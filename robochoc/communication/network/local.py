@@ -177,8 +177,9 @@ class LocalNetwork(Session):
             limits = (self._conditions.patience_s, self._conditions.lease_ms)
             given = Given(own, texts, self._master.endpoint, self._protocol, *limits)
             process = self._context.Process(target=robot_process, name=name, args=(given,), daemon=True)
-            process.start()
-            self._processes[name] = process
+            with signals_held():  # half begun, it would wait for the rest for ever, and the end of the program for it
+                process.start()
+                self._processes[name] = process
         threading.Thread(target=self._watch, args=[dict(self._processes)], daemon=True).start()
 
     def _watch(self, processes: dict[str, BaseProcess]) -> None:
