@@ -18,18 +18,8 @@ from enum import StrEnum
 from random import Random
 from typing import assert_never
 
-from robochoc.problem import (
-    Child,
-    Constraint,
-    Model,
-    Parent,
-    Predicate,
-    Relation,
-    Robot,
-    Team,
-    natural,
-    priority_order,
-)
+from robochoc.priorities import natural, priority_order
+from robochoc.problem import Child, Constraint, Model, Parent, Predicate, Relation, Robot, Team
 
 Graph = Mapping[str, frozenset[str]]
 """The neighbours of each robot."""

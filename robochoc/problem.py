@@ -9,10 +9,8 @@ Values are integers. Costs are integers or :data:`INFINITE`; a broken hard const
 
 from __future__ import annotations
 
-import heapq
 import math
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -354,52 +352,3 @@ class Team:
             yield from robot.shared
             for child in robot.children:
                 yield from child.constraints
-
-
-class CycleError(ValueError):
-    """The relation *parent of* has a cycle; `cycle` lists its robots, each the parent of the next."""
-
-    def __init__(self, cycle: Sequence[str]) -> None:
-        super().__init__(" -> ".join((*cycle, cycle[0])))
-        self.cycle = tuple(cycle)
-
-
-def natural(name: str) -> tuple[tuple[int, str], ...]:
-    """A key for natural order: `Robot2.1` before `Robot10.1`. Numbers compare by length first, however long."""
-    parts = re.split(r"0*([0-9]+)", name)
-    return tuple((len(part) if place % 2 else 0, part) for place, part in enumerate(parts))
-
-
-def priority_order(parents: Mapping[str, Iterable[str]]) -> tuple[str, ...]:
-    """The total order of the robots in `parents`: topological, ties broken by natural name order.
-
-    Parents that are not themselves keys are ignored. Raises `CycleError` when there is no such order.
-    """
-    waiting = {name: {parent for parent in above if parent in parents} for name, above in parents.items()}
-    children: dict[str, list[str]] = {name: [] for name in parents}
-    for name, above in waiting.items():
-        for parent in above:
-            children[parent].append(name)
-    ready = [(natural(name), name) for name, above in waiting.items() if not above]
-    heapq.heapify(ready)
-    order: list[str] = []
-    while ready:
-        _, name = heapq.heappop(ready)
-        order.append(name)
-        for child in children[name]:
-            waiting[child].discard(name)
-            if not waiting[child]:
-                heapq.heappush(ready, (natural(child), child))
-    if len(order) < len(waiting):
-        raise CycleError(_a_cycle({name: above for name, above in waiting.items() if above}))
-    return tuple(order)
-
-
-def _a_cycle(waiting: Mapping[str, set[str]]) -> list[str]:
-    """Walk up through robots that wait for a parent; where the walk meets itself is a cycle."""
-    walk = [min(waiting, key=natural)]
-    while True:
-        above = min(waiting[walk[-1]] & waiting.keys(), key=natural)
-        if above in walk:
-            return walk[walk.index(above) :][::-1]
-        walk.append(above)

@@ -11,7 +11,7 @@ from rich.tree import Tree
 
 from robochoc.formats import on_one_line
 from robochoc.outcome import Outcome, Place
-from robochoc.problem import natural
+from robochoc.priorities import natural
 
 UNBROKEN = 1000
 

@@ -9,7 +9,8 @@ from robochoc.change import changed_by
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
 from robochoc.outcome import ALL_ROBOTS, Metrics, Outcome, Verdict
-from robochoc.problem import Kind, Team, natural
+from robochoc.priorities import natural
+from robochoc.problem import Kind, Team
 
 WIDTH = 100
 _LARGE = 1 << 16

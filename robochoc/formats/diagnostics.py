@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from robochoc.plain_text import on_one_line as on_one_line  # noqa: PLC0414 - from here, too
-from robochoc.problem import natural
+from robochoc.priorities import natural
 
 MAX_PER_FILE = 100
 """So many mistakes of one file are told; who makes more needs no longer list."""

@@ -31,7 +31,8 @@ from robochoc.formats.places import ObjectPlaces, Place
 from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
 from robochoc.formats.scopes import misplaced, misplaced_parts, untold
 from robochoc.formats.shapes import AS_BUILT, ShapeError, check_shape
-from robochoc.problem import AddAgent, AddConstraint, AddValue, Change, Event, RemoveValue, Robot, Team, priority_order
+from robochoc.priorities import priority_order
+from robochoc.problem import AddAgent, AddConstraint, AddValue, Change, Event, RemoveValue, Robot, Team
 
 MAX_BETWEEN = 1000
 """So many mistakes between the robots of one team are told."""

@@ -22,7 +22,8 @@ from robochoc.observers.journal_columns import columns_of
 from robochoc.observers.journal_entries import Ended, Header, Line
 from robochoc.observers.objective import Objective
 from robochoc.outcome import Outcome
-from robochoc.problem import INFINITE, natural
+from robochoc.priorities import natural
+from robochoc.problem import INFINITE
 
 MOST_IN_A_BLOCK = 8192
 """Entries; with four times as many ABT's messages are packed 5 to 12 % better, but a crash takes more with it."""

@@ -11,7 +11,8 @@ from itertools import islice
 from typing import Any
 
 from robochoc.message import Message, Value
-from robochoc.problem import INFINITE, natural
+from robochoc.priorities import natural
+from robochoc.problem import INFINITE
 from robochoc.protocols.afc import AFC
 from robochoc.protocols.awc import AWC, NogoodList
 from robochoc.protocols.bounding import BoundingProtocol

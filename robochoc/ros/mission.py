@@ -11,7 +11,8 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from robochoc.outcome import Epoch, Outcome, Verdict
-from robochoc.problem import AddAgent, Assignment, Robot, Team, Topic, natural
+from robochoc.priorities import natural
+from robochoc.problem import AddAgent, Assignment, Robot, Team, Topic
 from robochoc.ros.crew import Craft, crafts_of, lone_craft, numbers, possible_crafts
 from robochoc.ros.layout import Axis, Field, Point, field_of
 

@@ -251,9 +251,9 @@ class Master:
             raise RobotsLost({MASTER: "the router's process has ended"})
         while self._dead:
             self._lose(*self._dead.popitem(), for_good=True)
-        for name, member in list(self.members.robots.items()):
-            if member.is_away(self._conditions.patience_s) and not member.left:
-                self._lose(name, f"it has not been there for {self._conditions.patience_s:g} s")
+        away_s = self._conditions.patience_s
+        for name in [n for n, member in self.members.robots.items() if member.is_away(away_s) and not member.left]:
+            self._lose(name, f"it has not been there for {away_s:g} s")
         if now - self._read_registry >= REGISTRY_S:
             self._read_registry = now
             for name, visit in self.members.to_welcome().items():
@@ -265,19 +265,17 @@ class Master:
 
     def _ask_around(self, tally: Tally, now: float) -> None:
         """Begin a wave when it could show that all is quiet, or when somebody waits for news."""
-        counters = tally.counters
-        if missing := tally.missing(now, self._conditions.patience_s):
-            if not self._gaps.explain_missing():
-                tally.stuck = f"{missing:,} messages between robots were lost for good"
+        counters, missing = tally.counters, tally.missing(now, self._conditions.patience_s)
+        wanted = tally.wave_due
+        if self._progress and now - self._shown >= TICK_S:
+            self._shown, wanted = now, wanted or not counters.waving
+            self._progress(Progress(counters.sent, time.monotonic() - self._began))
+        if missing and not self._gaps.explain_missing():
+            tally.stuck = f"{missing:,} messages between robots were lost for good"
         elif counters.quiescent:
             tally.verdict = tally.verdict or Verdict.SOLUTION
-        elif tally.wave_due:
+        elif wanted:
             self._tell_all(Wave(counters.begin_wave()))
-        elif self._progress and now - self._shown >= TICK_S:
-            self._shown = now
-            self._progress(Progress(counters.sent, time.monotonic() - self._began))
-            if not counters.waving:
-                self._tell_all(Wave(counters.begin_wave()))
 
     def _collect(self, tally: Tally) -> None:
         """Say that the search is over, and collect everybody's account. Raises `RobotsLost` when it was stuck."""

@@ -20,7 +20,7 @@ from robochoc.communication.acl import text
 from robochoc.communication.performatives import act_of
 from robochoc.formats.result import result_json
 from robochoc.outcome import Epoch, Outcome, Verdict
-from robochoc.problem import natural
+from robochoc.priorities import natural
 from robochoc.view.sniffer.columns import packed
 from robochoc.view.sniffer.names import Names
 from robochoc.view.sniffer.rows import Note, Run

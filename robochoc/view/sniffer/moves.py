@@ -15,7 +15,8 @@ from typing import Any
 import msgspec
 
 from robochoc.formats import InvalidInput, robot_in
-from robochoc.problem import Assignment, Robot, natural
+from robochoc.priorities import natural
+from robochoc.problem import Assignment, Robot
 from robochoc.ros.crew import Craft, crafts_of, lone_craft, possible_crafts
 from robochoc.ros.layout import Field, Point, field_of
 from robochoc.view.scene import Drone, Scene
