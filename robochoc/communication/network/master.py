@@ -100,13 +100,12 @@ class Master:
         self._letters = Letters(MASTER, self.run)
         self._facilitator = DirectoryFacilitator(endpoint, conditions.protocol)
         self.chronicle = Chronicle(observer)
-        self._refuse = self.chronicle.refuse
         told, listen = self._note_refusal if observer else None, conditions.listen or endpoint
         self._gate = Gate(admission, identity, listen, told, conditions.lease_ms, members.ways, conditions.scratch)
         self._desk = PublicationDesk(self.run, self._gate.may_sniff, self.chronicle)
-        self._requests = Requests(self._desk, self._facilitator, self._tell, self._refuse)
+        self._requests = Requests(self._desk, self._facilitator, self._tell, self.chronicle.refuse)
         self._dead: dict[str, str] = {}
-        self._gaps = Gaps(members, self._refuse, self._lose)
+        self._gaps = Gaps(members, self.chronicle.refuse, self._lose)
 
     def __enter__(self) -> Self:
         """Listen. Raises `RouterFailed` and `CannotConnect`."""
@@ -300,7 +299,7 @@ class Master:
         try:
             opened = self._letters.read(sender, content)
         except Refused as refused:
-            self._refuse(sender, TO_MASTER, str(refused))
+            self.chronicle.refuse(sender, TO_MASTER, str(refused))
             return
         self._letters.take(sender, opened.number)
         member = self.members.robots.get(sender)
@@ -310,7 +309,7 @@ class Master:
             case Ask() | Sniff():
                 self._requests.answer(sender, opened.word)
             case _ if member is None:
-                self._refuse(sender, TO_MASTER, "it is not registered")
+                self.chronicle.refuse(sender, TO_MASTER, "it is not registered")
             case word:
                 self._hear(sender, member, word)
 
@@ -327,7 +326,7 @@ class Master:
             case Failed(why, unsupported, elsewhere):
                 self._note_failure(name, why, (TooMuch if elsewhere else Unsupported) if unsupported else None)
             case Objection(who, what, why):
-                self._refuse(who, what, f"{why} ({name} says so)")
+                self.chronicle.refuse(who, what, f"{why} ({name} says so)")
             case Gap():
                 self._gaps.between(name, word)
             case Bye():
@@ -350,13 +349,13 @@ class Master:
         try:
             member = self.members.register(name, profile, visit, admitted=self._gate.is_robot(name))
         except NotTaken as refusal:
-            self._refuse(name, "register", str(refusal))
+            self.chronicle.refuse(name, "register", str(refusal))
             self._tell(name, Denied(visit, str(refusal)))
             return
         if member is not known:
             self._letters.forget(name)
             if unfit := self._facilitator.enter(profile):
-                self._refuse(name, "be in the directory", unfit)
+                self.chronicle.refuse(name, "be in the directory", unfit)
             self.chronicle.registered(name)
             if self._progress:
                 elapsed_s, number = time.monotonic() - self._began, len(self.members.robots)
@@ -374,7 +373,7 @@ class Master:
         """Let in who was enrolled since, and throw out who was revoked; that needs a router with other rules."""
         for name in self._gate.revoked(self.members.robots):
             if name not in self.tally.lost:
-                self._refuse(name, "take part", "its certificate was revoked")
+                self.chronicle.refuse(name, "take part", "its certificate was revoked")
                 self._tell_all(Revoked(name))
                 self._gate.follow()
                 self._lose(name, "its certificate was revoked")
@@ -398,4 +397,4 @@ class Master:
     def _note_refusal(self, refusal: Refusal) -> None:
         """What the router tells; not of those who were enrolled a moment ago, and are let in when they try again."""
         if refusal.what != "connect" or not self._gate.admits(refusal.who):
-            self._refuse(*refusal)
+            self.chronicle.refuse(*refusal)
