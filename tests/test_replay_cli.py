@@ -25,8 +25,8 @@ THE_SAME = """\
 queens3d-2: abt, runtime simulator, seed 0
   runs                 2
   robots               4
-  steps               32
-  messages            43
+  steps               33
+  messages            45
   the same
 """
 
