@@ -52,6 +52,8 @@ TICK_S = 0.2
 """Between two looks at the counters for those who watch the progress, and at who is dying."""
 LAST_WORDS_S = 5.0
 """How long the parent waits for reports after it has said that an epoch is over."""
+BUSY_WORDS_S = 60.0
+"""The same for robots that compute, or wait for their turn of a busy machine, when there is a verdict."""
 LATE_WORDS_S = 0.5
 """The same when the time was over: who still computes then is left out of the metrics."""
 
@@ -333,8 +335,9 @@ class ProcessesRun(Session):
     def _await_reports(self, *, late: bool) -> None:
         """Who computes while there is no verdict is only busy: it is waited for, until the time is over.
 
-        So is who is stopped, until patience is.
+        So is who is stopped, until patience is. With a verdict nobody is waited for longer than `BUSY_WORDS_S`.
         """
+        began = time.monotonic()
         while True:
             now = time.monotonic()
             patience = now + (LATE_WORDS_S if late else LAST_WORDS_S)
@@ -346,7 +349,8 @@ class ProcessesRun(Session):
                 return
             if any(robot.condition() is Condition.STOPPED for robot in silent):
                 continue
-            if self._verdict is not None or not any(robot.is_computing for robot in silent):
+            enough = self._verdict is not None and time.monotonic() - began > BUSY_WORDS_S
+            if enough or not any(robot.is_computing for robot in silent):
                 return
 
     def _silent(self) -> list[str]:
