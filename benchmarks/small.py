@@ -94,6 +94,6 @@ def _cold_s(network: Network) -> float:
 
 
 def _cpu_s(pid: int | None) -> float:
-    """What process `pid` has used of the processor until now."""
+    """Return the CPU seconds that process `pid` has used until now."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

@@ -22,7 +22,7 @@ COMMANDS: dict[str, float | None] = {
     "solve instances/queens3d-4": 5,
     "solve instances/queens3d-4 --runtime simulator": None,
 }
-"""What is timed, and how many times the base it may take."""
+"""The commands that are timed, each with the multiple of the base that is aimed at (None: no aim)."""
 
 
 def measured() -> Section:

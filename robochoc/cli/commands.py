@@ -40,7 +40,7 @@ COMMANDS = {
     "solve": ("solve", "Solve teams, each robot in its own process."),
     "validate": ("validate", "Check teams, and tell every mistake with file and line."),
 }
-"""What each command is called in the module of its name, and its line in `robochoc --help`, which imports none."""
+"""Of each command its function in the module of its name, and its line in `robochoc --help`, which imports none."""
 
 
 class Commands(click.Group):

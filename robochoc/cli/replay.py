@@ -82,7 +82,7 @@ def replay(
 
 
 def _altered(journal: Journal) -> bool:
-    """Whether a part of it is not as it was written."""
+    """Return whether a part of the journal was altered."""
     return journal.damage is not None and not journal.truncated
 
 

@@ -111,7 +111,7 @@ def _shown(difference: Difference) -> Iterator[str]:
 
 
 def _contradicted(found: Sequence[Contradiction]) -> Iterator[str]:
-    """What the journal claims that its steps do not bear out."""
+    """Yield lines for each claim of the journal that its steps contradict: what, recorded, replayed."""
     for one in found:
         yield f"    {one.what}"
         yield f"      recorded  {_cut(msgspec.json.encode(one.recorded).decode())}"

@@ -97,7 +97,7 @@ def _verdict(team: Team, outcome: Outcome) -> str:
 
 
 def _checked(outcome: Outcome) -> str:
-    """Who has held the answer against the constraints: across machines it may be their owners alone."""
+    """Return who checked the constraints, in words. Across machines that may be their owners alone."""
     if not outcome.verified:
         return f"not checked: {outcome.reason}"
     if outcome.checked is None or not outcome.checked.by_owner:
@@ -107,7 +107,7 @@ def _checked(outcome: Outcome) -> str:
 
 
 def _trusted(outcome: Outcome) -> str:
-    """What rests on the word of all robots, as nobody could check it."""
+    """Return, in words, which claim rests on all robots' word because nobody could check it."""
     if outcome.claimed_by != ALL_ROBOTS or not outcome.verified or outcome.confirmed:
         return ""
     what = "that no fewer could step aside" if outcome.aside else "that nothing costs less"

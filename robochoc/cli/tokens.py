@@ -71,7 +71,7 @@ def _from_standard_input() -> str:
 
 
 def _from_file(path: str) -> str:
-    """What stands in the file; as ssh does with keys, not if others may read it."""
+    """Return the token in the file. Refuse a file that others may read, as ssh does with keys."""
     try:
         with open(path, "rb") as file:  # noqa: PTH123 - one file is looked at, and read, whatever its name becomes
             status = os.fstat(file.fileno())
