@@ -14,15 +14,15 @@ from measure import Failed, say
 from report import Row, Section
 from rows import written_rows
 
-from robochoc.communication.channel import CHANNELS
-from robochoc.communication.simulator import Simulation
-from robochoc.communication.timed import Timed
+from robochoc.communication.simulator.channel import CHANNELS
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.communication.simulator.timed import Timed
 from robochoc.generators.random_csp import random_csp
-from robochoc.observers.checker import cost
-from robochoc.orders import Order, in_order
-from robochoc.outcome import Verdict
-from robochoc.problem import Team
-from robochoc.registry import protocol_named
+from robochoc.model.orders import Order, in_order
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Team
+from robochoc.run.registry import protocol_named
+from robochoc.verification.checker import cost
 
 DATA = Path(__file__).with_name("data") / "channels.csv"
 READING = Path(__file__).with_name("channels.md")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 
 from robochoc.formats import PREDEFINED
-from robochoc.problem import Child, Constraint, Domain, Parent, Robot, Team, Variable
+from robochoc.model.problem import Child, Constraint, Domain, Parent, Robot, Team, Variable
 
 AGENTS = 20
 EDGES = 40

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from random import Random
 
-from robochoc.problem import Child, Constraint, Domain, Parent, Relation, Robot, Semantics, Team, Variable
+from robochoc.model.problem import Child, Constraint, Domain, Parent, Relation, Robot, Semantics, Team, Variable
 
 ROBOTS = 16
 VARIABLES = 5

@@ -19,11 +19,11 @@ from measure import ROOT, Failed, say
 from report import Row, Section, draw
 from rows import append_row, read_rows, written_rows
 
-from robochoc.change import changed
 from robochoc.generators.random_csp import random_csp
-from robochoc.orders import Order
-from robochoc.outcome import Epoch, Verdict
-from robochoc.problem import (
+from robochoc.model.change import changed
+from robochoc.model.orders import Order
+from robochoc.model.outcome import Epoch, Verdict
+from robochoc.model.problem import (
     AddConstraint,
     Change,
     Constraint,
@@ -34,7 +34,7 @@ from robochoc.problem import (
     Semantics,
     Team,
 )
-from robochoc.run import Options, Runtime, solve
+from robochoc.run.orchestrator import Options, Runtime, solve
 
 RAW = ROOT / "out" / "bench" / "dynamic.csv"
 DATA = Path(__file__).with_name("data") / "dynamic.csv"

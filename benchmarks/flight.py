@@ -7,11 +7,11 @@ import statistics
 from measure import RUNS, say, spread
 from report import Row, Section
 
+from robochoc.flight.flight import Conditions, Flown, fly
+from robochoc.flight.mission import Mission, mission_of
+from robochoc.flight.quadrotor.simulation import DT
 from robochoc.generators.queens3d import queens3d
-from robochoc.outcome import Outcome, Verdict
-from robochoc.ros.flight import Conditions, Flown, fly
-from robochoc.ros.mission import Mission, mission_of
-from robochoc.ros.quadrotor.simulation import DT
+from robochoc.model.outcome import Outcome, Verdict
 
 SIZES = (4, 7, 11)
 WIND = Conditions(wind=(3.0, 4.0, 0.0), gusts=1.0)

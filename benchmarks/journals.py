@@ -15,9 +15,9 @@ from report import Row, Section
 
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import AnyEvent, Sent
-from robochoc.observers.journal import Header, JournalFile, Recorder, lines_of, read_journal
-from robochoc.run import Options, Runtime, solve
+from robochoc.journal.events import AnyEvent, Sent
+from robochoc.journal.journal import Header, JournalFile, Recorder, lines_of, read_journal
+from robochoc.run.orchestrator import Options, Runtime, solve
 
 MESSAGES = 1_000_000
 PAIRS = 2 * RUNS

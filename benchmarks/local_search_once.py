@@ -11,13 +11,13 @@ import sys
 import time
 from random import Random
 
-from robochoc.anytime import course
-from robochoc.communication.schedule import Concurrent
-from robochoc.communication.simulator import Simulation
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats import PREDEFINED
-from robochoc.problem import Child, Constraint, Domain, Kind, Parent, Robot, Team, Variable
-from robochoc.registry import protocol_named
-from robochoc.solver.part import Brief
+from robochoc.model.problem import Child, Constraint, Domain, Kind, Parent, Robot, Team, Variable
+from robochoc.run.incumbent import course
+from robochoc.run.registry import protocol_named
+from robochoc.solver.agent_problem import Brief
 
 COLOURS = Domain("Colours", (range(3),))
 

@@ -26,17 +26,17 @@ from rally import End, LongRally, ManyBalls, Rally, ShortRally, pair, play, retu
 
 from robochoc.authority.admission import Household
 from robochoc.authority.identity import Identity, IdentityTexts
-from robochoc.communication.network.conditions import LEASE_MS, Conditions
 from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.local import LOOPBACK, LocalNetwork
-from robochoc.communication.network.post import Post
 from robochoc.communication.network.router import RefusalObserver, Router
+from robochoc.communication.network.settings import LEASE_MS, Conditions
+from robochoc.communication.network.transport import Post
 from robochoc.communication.network.zenoh_config import config
-from robochoc.communication.processes import ProcessesRun
-from robochoc.communication.queues import QueueReader, QueueWriter
+from robochoc.communication.processes.processes import ProcessesRun
+from robochoc.communication.processes.queues import QueueReader, QueueWriter
 from robochoc.communication.session import Session
 from robochoc.generators.queens3d import queens3d
-from robochoc.registry import protocol_named
+from robochoc.run.registry import protocol_named
 
 ENDS = ("A", "B")
 Opens = Callable[[], "ZenohEnd | PostEnd"]

@@ -16,16 +16,16 @@ from measure import Failed, say
 from report import Row, Section, draw
 from rows import written_rows
 
-from robochoc.communication.processes import ProcessesRun
+from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.run_result import RunResult
-from robochoc.communication.schedule import Concurrent
-from robochoc.communication.simulator import Simulation
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
-from robochoc.observers.checker import cost
-from robochoc.orders import Order, in_order
-from robochoc.outcome import Verdict
-from robochoc.problem import Team
-from robochoc.registry import protocol_named
+from robochoc.model.orders import Order, in_order
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Team
+from robochoc.run.registry import protocol_named
+from robochoc.verification.checker import cost
 
 DATA = Path(__file__).with_name("data") / "optimum.csv"
 READING = Path(__file__).with_name("optimum.md")

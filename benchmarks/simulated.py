@@ -6,9 +6,9 @@ from measure import RUNS, say, spread
 from report import Row, Section
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.outcome import Metrics
-from robochoc.problem import Team
-from robochoc.run import Options, Runtime, solve
+from robochoc.model.outcome import Metrics
+from robochoc.model.problem import Team
+from robochoc.run.orchestrator import Options, Runtime, solve
 
 SEEDS = range(10)
 KINDS = ("Ok", "Nogood", "AddLink")

@@ -19,8 +19,8 @@ import msgspec
 from tornado.httpclient import AsyncHTTPClient
 from tornado.websocket import websocket_connect
 
-from robochoc.observers.events import Began, Received, Sent, Settled
-from robochoc.observers.journal import Header, JournalFile, Recorder
+from robochoc.journal.events import Began, Received, Sent, Settled
+from robochoc.journal.journal import Header, JournalFile, Recorder
 
 STOPPED = "stopped.pid"
 """In the folder for temporary files: who has stopped, and is to be put out."""

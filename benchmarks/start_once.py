@@ -10,11 +10,11 @@ import sys
 import time
 from typing import cast
 
-from robochoc.communication.crew import StartMethod
-from robochoc.communication.processes import ProcessesRun
+from robochoc.communication.processes.pool import StartMethod
+from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.generators.queens3d import queens3d
-from robochoc.message import Message
-from robochoc.observers.events import AnyEvent, Registered
+from robochoc.journal.events import AnyEvent, Registered
+from robochoc.model.message import Message
 from robochoc.protocols.protocol import Protocol
 
 
@@ -44,7 +44,8 @@ def main() -> None:
             ready_s = event.t
 
     if sys.argv[3:] == ["preload"]:
-        multiprocessing.set_forkserver_preload(["robochoc.communication.processes", "robochoc.generators.queens3d"])
+        rooms = ["robochoc.communication.processes.processes", "robochoc.generators.queens3d"]
+        multiprocessing.set_forkserver_preload(rooms)
     team = queens3d(int(sys.argv[1]))
     run = ProcessesRun(team, Silent, observer=observe, start_method=cast("StartMethod", sys.argv[2]))
     began = time.perf_counter()

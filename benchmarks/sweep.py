@@ -18,15 +18,15 @@ from measure import ROOT, Failed, say
 from report import Row, Section, draw
 from rows import written_rows
 
-from robochoc.communication.schedule import Concurrent
-from robochoc.communication.simulator import Simulation
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
-from robochoc.observers.checker import objections
-from robochoc.orders import Order, in_order
-from robochoc.outcome import Verdict
-from robochoc.problem import Team
+from robochoc.model.orders import Order, in_order
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.registry import protocol_named
+from robochoc.run.registry import protocol_named
+from robochoc.verification.checker import objections
 
 RAW = ROOT / "out" / "bench" / "sweep.csv"
 DATA = Path(__file__).with_name("data") / "sweep.csv"

@@ -11,7 +11,7 @@ from measure import RUNS, Failed, Sample, say, spread, timed_call
 from report import Row, Section
 from ring import OFFSETS, messages, ring_protocol, ring_team
 
-from robochoc.communication.processes import ProcessesRun
+from robochoc.communication.processes.processes import ProcessesRun
 
 AGENTS = (16, 121)
 MESSAGES = 100_000

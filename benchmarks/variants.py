@@ -15,12 +15,12 @@ from report import Row, Section
 from rows import append_row, read_rows
 from sweep import LIMIT, LIMIT_SLOW, solved
 
-from robochoc.communication.schedule import Concurrent
+from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.generators.random_csp import random_csp
-from robochoc.message import Envelope, Value
-from robochoc.orders import Order, in_order
-from robochoc.outcome import Verdict
-from robochoc.problem import Team
+from robochoc.model.message import Envelope, Value
+from robochoc.model.orders import Order, in_order
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Team
 from robochoc.protocols.abt import ABT, Nogood
 from robochoc.protocols.abt_do import ABTDORetro
 from robochoc.protocols.afc import AFC

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robochoc.cli.main import main
-from robochoc.communication import robot_process
+from robochoc.communication.processes import robot_process
 
 
 def _take_no_place(name: str, order: Sequence[str]) -> None:

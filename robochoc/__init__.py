@@ -9,7 +9,7 @@ from __future__ import annotations
 TYPE_CHECKING = False  # that of `typing` takes longer to import than all else before signals are heard (cli/main.py)
 if TYPE_CHECKING:
     from robochoc.api import AgentsContainer, Problem, load
-    from robochoc.outcome import Outcome, Verdict
+    from robochoc.model.outcome import Outcome, Verdict
 
 __all__ = ["AgentsContainer", "Outcome", "Problem", "Verdict", "__version__", "load"]
 
@@ -22,7 +22,7 @@ def __getattr__(name: str) -> object:
 
         return getattr(api, name)
     if name in {"Outcome", "Verdict"}:
-        from robochoc import outcome  # noqa: PLC0415 - see above
+        from robochoc.model import outcome  # noqa: PLC0415 - see above
 
         return getattr(outcome, name)
     raise AttributeError(f"module 'robochoc' has no attribute {name!r}")

@@ -15,20 +15,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robochoc.defaults import suits
-from robochoc.epochs import Field
 from robochoc.formats import check_team, read_robot, read_team
-from robochoc.observers.events import Observer
-from robochoc.options import Options, Runtime, Withdrawal
-from robochoc.orders import Order
-from robochoc.outcome import Outcome
-from robochoc.problem import Team
-from robochoc.registry import UnknownProtocol, offers
-from robochoc.run import solve
+from robochoc.journal.events import Observer
+from robochoc.model.orders import Order
+from robochoc.model.outcome import Outcome
+from robochoc.model.problem import Team
+from robochoc.run.defaults import suits
+from robochoc.run.options import Options, Runtime, Withdrawal
+from robochoc.run.orchestrator import solve
+from robochoc.run.registry import UnknownProtocol, offers
+from robochoc.run.scenario import Field
 
 if TYPE_CHECKING:
     from robochoc.communication.network.robot import Ending
-    from robochoc.machines.place import Place
+    from robochoc.run.networked.address import Place
 
 _MASTER, _AGENT = "Master", "Agent"
 
@@ -54,10 +54,10 @@ class Problem:
         field: Field | None = None,
         **options: Any,  # noqa: ANN401 - the other fields of `Options`, by their names
     ) -> Outcome:
-        """Let the robots solve it together; see `robochoc.options.Options` for what else can be said.
+        """Let the robots solve it together; see `robochoc.run.options.Options` for what else can be said.
 
         Without a `protocol`, the one that suits the team. A `field` is told of each answer, and says what changes
-        next (`robochoc.epochs.Field`). Raises what `robochoc.run.solve` raises, and `ValueError` or
+        next (`robochoc.run.scenario.Field`). Raises what `robochoc.run.orchestrator.solve` raises, and `ValueError` or
         `TypeError` where an option is none. A program that starts processes is to do so below
         `if __name__ == "__main__":`.
         """
@@ -124,13 +124,13 @@ class AgentsContainer:
 
     def set_main_container(self, place: str) -> None:
         """Where the master listens: `HOST` or `HOST:PORT`. Raises `BadPlace`."""
-        from robochoc.machines.place import Place  # noqa: PLC0415 - an extra
+        from robochoc.run.networked.address import Place  # noqa: PLC0415 - an extra
 
         self._main = Place.parse(place)
 
     def set_listen(self, place: str) -> None:
         """The master: listen here, instead of on loopback. Raises `BadPlace`."""
-        from robochoc.machines.place import Place  # noqa: PLC0415 - an extra
+        from robochoc.run.networked.address import Place  # noqa: PLC0415 - an extra
 
         self._listen = Place.parse(place)
 
@@ -143,7 +143,7 @@ class AgentsContainer:
         self._identities[name] = (None if folder is None else Path(folder), token)
 
     def run(self, observer: Observer | None = None, **plan: Any) -> Outcome | dict[str, Ending]:  # noqa: ANN401
-        """Be the master, or the robots, of one run. `plan` holds further fields of `robochoc.machines.lead.Plan`.
+        """Be the master, or the robots, of one run. `plan` holds further fields of `robochoc.run.networked.lead.Plan`.
 
         Raises what `lead` and `join` raise.
         """
@@ -155,7 +155,7 @@ class AgentsContainer:
 
     def _lead(self, observer: Observer | None, plan: Mapping[str, Any]) -> Outcome:
         from robochoc.authority.authority import default_folder  # noqa: PLC0415 - an extra
-        from robochoc.machines.lead import HERE, Plan, lead  # noqa: PLC0415 - the same
+        from robochoc.run.networked.lead import HERE, Plan, lead  # noqa: PLC0415 - the same
 
         protocol = protocol_called(self._type.removeprefix(_MASTER))
         folder = self._authority or default_folder()
@@ -174,7 +174,7 @@ class AgentsContainer:
 
     def _robot(self, name: str, main: Place) -> Ending:
         from robochoc.communication.network.manner import Manner  # noqa: PLC0415 - an extra
-        from robochoc.machines.join import PATIENCE_S, identity_of, join  # noqa: PLC0415 - the same
+        from robochoc.run.networked.join import PATIENCE_S, identity_of, join  # noqa: PLC0415 - the same
         from robochoc.solver.compile import Compiler  # noqa: PLC0415 - the same
 
         file, sniff = self._agents[name]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robochoc.message import Message, Value
+from robochoc.model.message import Message, Value
 from robochoc.protocols.protocol import Protocol
 
 

@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
-from robochoc.expression import Apply, Constant, Expression, Name
 from robochoc.formats import PREDEFINED
-from robochoc.problem import (
+from robochoc.model.expression import Apply, Constant, Expression, Name
+from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,

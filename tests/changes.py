@@ -8,8 +8,8 @@ from random import Random
 
 from problems import random_constraint, random_team
 
-from robochoc.change import changed
-from robochoc.problem import (
+from robochoc.model.change import changed
+from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,

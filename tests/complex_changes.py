@@ -9,7 +9,7 @@ from random import Random
 from changes import Author, domains
 from complex_problems import complex_team, random_complex_team, random_constraint
 
-from robochoc.problem import (
+from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     Change,

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from random import Random
 
-from robochoc.expression import Type, parse
-from robochoc.problem import (
+from robochoc.model.expression import Type, parse
+from robochoc.model.problem import (
     Child,
     Constraint,
     Domain,

@@ -83,7 +83,7 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
 def without_the_scenes_viewer() -> Iterator[None]:
     """A megabyte that each page would take its time to read, and nobody there looks at."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("robochoc.view.sniffer.page.viewer_script", lambda: "")
+        patch.setattr("robochoc.sniffer.page.viewer_script", lambda: "")
         yield
 
 
@@ -102,7 +102,7 @@ def server(without_the_scenes_viewer: None, tmp_path_factory: pytest.TempPathFac
     from sniffed import served  # noqa: PLC0415 - see above
     from sniffer_pages import WHOLE  # noqa: PLC0415 - see above
 
-    from robochoc.view.sniffer.session import Session  # noqa: PLC0415 - see above
+    from robochoc.sniffer.session import Session  # noqa: PLC0415 - see above
 
     del without_the_scenes_viewer  # it only has to be there before the page is made
     file = tmp_path_factory.mktemp("sniffed") / "run.journal"

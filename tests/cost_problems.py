@@ -10,7 +10,7 @@ from random import Random
 from complex_problems import random_complex_team
 from problems import PREDICATES, random_team, team_of
 
-from robochoc.problem import INFINITE, Assignment, Constraint, Kind, Predicate, Relation, Robot, Semantics, Team
+from robochoc.model.problem import INFINITE, Assignment, Constraint, Kind, Predicate, Relation, Robot, Semantics, Team
 
 DEAREST = 9
 

@@ -8,15 +8,15 @@ from random import Random
 from typing import TypeVar
 
 from robochoc.communication.run_result import RunResult
-from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
-from robochoc.communication.simulator import Simulation
-from robochoc.message import Message
-from robochoc.outcome import Verdict
-from robochoc.problem import INFINITE, Assignment, Team
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Assignment, Team
 from robochoc.protocols.cycles import CycleProtocol
 from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.agent_problem import Brief, parts
 from robochoc.solver.compiled import Burden, LocalProblem
-from robochoc.solver.part import Brief, parts
 
 P = TypeVar("P", bound=CycleProtocol)
 

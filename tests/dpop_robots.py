@@ -10,7 +10,7 @@ from cost_problems import with_costs
 from problems import team_of
 from trees import placed
 
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.dpop import DPOP, Dimensions, Domain, Need
 
 PRODUCT = Relation("R", 2, Semantics.SOFT, tuple(itertools.product((1, 2, 3), repeat=2)), (1, 2, 3, 2, 4, 6, 3, 6, 9))

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from robochoc.observers.journal import lines_of, read_journal
+from robochoc.journal.journal import lines_of, read_journal
 
 
 def entries_of(file: Path) -> list[dict[str, Any]]:

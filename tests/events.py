@@ -6,10 +6,10 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from robochoc.observers import events
-from robochoc.observers.events import AnyEvent
-from robochoc.observers.journal import Header
-from robochoc.outcome import Epoch, Metrics, Outcome, Place, Verdict
+from robochoc.journal import events
+from robochoc.journal.events import AnyEvent
+from robochoc.journal.journal import Header
+from robochoc.model.outcome import Epoch, Metrics, Outcome, Place, Verdict
 
 names = st.sampled_from(["Robot1.1", "Robot1.2", "Robot2.1", "R", "Ω"]) | st.text(max_size=8)
 numbers = st.integers(-(2**62), 2**62)

@@ -29,7 +29,7 @@ _LISTENING = "0A"
 _PROGRAMS = {
     "solver": b"robochoc.solver.ace_process",
     "router": b"robochoc.communication.network.router_process",
-    "viewer": b"robochoc.view.sniffer.viewer_process",
+    "viewer": b"robochoc.sniffer.viewer_process",
 }
 """Processes of a run that are programs of their own, and no robots."""
 

@@ -11,9 +11,9 @@ import sys
 import time
 from typing import cast
 
-from robochoc.communication.processes import ProcessesRun
+from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.generators.queens3d import queens3d
-from robochoc.message import Message
+from robochoc.model.message import Message
 from robochoc.protocols.protocol import Protocol
 
 TEAM = queens3d(2)

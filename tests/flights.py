@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from robochoc.outcome import Epoch, Outcome, Verdict
-from robochoc.problem import Domain, Robot, Team, Variable
-from robochoc.ros.layout import Point
-from robochoc.ros.mission import Mission
-from robochoc.ros.quadrotor.flown import Flown, Happening, Stage
-from robochoc.ros.quadrotor.nearest import Nearest
+from robochoc.flight.layout import Point
+from robochoc.flight.mission import Mission
+from robochoc.flight.quadrotor.flown import Flown, Happening, Stage
+from robochoc.flight.quadrotor.nearest import Nearest
+from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.model.problem import Domain, Robot, Team, Variable
 
 FPS = 30
 LEG_S = 2

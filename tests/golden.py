@@ -9,11 +9,11 @@ from problems import team_of
 
 from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import Given
-from robochoc.observers.journal import Header, Recorder, lines_of, read_journal
-from robochoc.problem import Constraint, Kind, Relation, Semantics, Team
-from robochoc.registry import protocol_named, protocol_names
-from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
+from robochoc.journal.events import Given
+from robochoc.journal.journal import Header, Recorder, lines_of, read_journal
+from robochoc.model.problem import Constraint, Kind, Relation, Semantics, Team
+from robochoc.run.orchestrator import Options, Runtime, ScheduleName, Withdrawal, solve
+from robochoc.run.registry import protocol_named, protocol_names
 
 FOLDER = Path(__file__).parent / "golden"
 PATROL = Path(__file__).parents[1] / "docs" / "examples" / "patrol"

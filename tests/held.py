@@ -10,8 +10,8 @@ from pathlib import Path
 
 from problems import PREDICATES, team_of
 
-from robochoc.message import Message
-from robochoc.problem import Constraint
+from robochoc.model.message import Message
+from robochoc.model.problem import Constraint
 from robochoc.protocols.abt import ABT, AddLink, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Settings

@@ -9,26 +9,26 @@ from offices import RUN, Scripted
 from problems import team_of
 
 from robochoc.authority.identity import Identity
-from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
-from robochoc.communication.network.manner import Manner
-from robochoc.communication.network.members import Members
-from robochoc.communication.network.post import Post
-from robochoc.communication.network.profile import profile_of
-from robochoc.communication.network.robot import Ending, NetworkRobot
-from robochoc.communication.network.words import (
+from robochoc.communication.network.control_messages import (
     Leave,
     Register,
     Task,
     Welcome,
     Word,
 )
+from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
+from robochoc.communication.network.manner import Manner
+from robochoc.communication.network.members import Members
+from robochoc.communication.network.profile import profile_of
+from robochoc.communication.network.robot import Ending, NetworkRobot
+from robochoc.communication.network.transport import Post
 from robochoc.formats import PREDEFINED
-from robochoc.message import encode
-from robochoc.problem import Constraint, Team
+from robochoc.model.message import encode
+from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.abt import ABT, Ok
 from robochoc.protocols.protocol import Protocol
+from robochoc.solver.agent_problem import NO_BRIEF
 from robochoc.solver.compiled_team import CompiledRobot
-from robochoc.solver.part import NO_BRIEF
 
 UNPROVEN = cast("Identity", None)
 PATIENCE_S = 5.0

@@ -17,10 +17,9 @@ from pkc_problems import random_pkc_team
 from problems import random_team, solutions
 
 from robochoc.formats import PREDEFINED
-from robochoc.options import Options
-from robochoc.orders import CannotTurn, Order, in_order
-from robochoc.outcome import Outcome, Verdict
-from robochoc.problem import (
+from robochoc.model.orders import CannotTurn, Order, in_order
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.problem import (
     INFINITE,
     Child,
     Constraint,
@@ -31,8 +30,9 @@ from robochoc.problem import (
     Team,
     Variable,
 )
-from robochoc.registry import protocol_named
-from robochoc.run import solve
+from robochoc.run.options import Options
+from robochoc.run.orchestrator import solve
+from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
 
 PAIR = 2

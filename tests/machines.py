@@ -18,9 +18,9 @@ from click.testing import CliRunner
 from problems import PREDICATES, team_of
 from program import ROOT
 
-from robochoc.cli.commands import cli
+from robochoc.cli.group import cli
 from robochoc.formats import write_team
-from robochoc.problem import Constraint, Team
+from robochoc.model.problem import Constraint, Team
 
 LOOPBACK = "127.0.0.1"
 LONG_S = 90.0

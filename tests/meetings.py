@@ -12,7 +12,7 @@ from random import Random
 from complex_problems import complex_team
 
 from robochoc.formats import PREDEFINED
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
 
 
 def meetings(chance: Random, *, agents: int = 8, slots: int = 8) -> Team:

@@ -14,7 +14,7 @@ from robochoc.communication.network.local import LOOPBACK
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
 from robochoc.communication.run_result import Progress
-from robochoc.solver.part import Brief
+from robochoc.solver.agent_problem import Brief
 
 
 def main(folder: str, endpoint: str, file: str) -> None:

@@ -9,7 +9,7 @@ from held import CHAIN, Held
 
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.run_result import Progress
-from robochoc.solver.part import Brief
+from robochoc.solver.agent_problem import Brief
 
 
 def main() -> None:

@@ -17,21 +17,21 @@ from faults import wait_until
 from held import CHAIN, Held
 
 from robochoc.authority.admission import Household
-from robochoc.communication.network.conditions import Conditions
-from robochoc.communication.network.letters import Letters
+from robochoc.communication.network.control_messages import Word
+from robochoc.communication.network.framing import Letters
+from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.local import LOOPBACK
 from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
-from robochoc.communication.network.post import Post
-from robochoc.communication.network.publication import Publication
 from robochoc.communication.network.robot import Ending, NetworkRobot
-from robochoc.communication.network.words import Word
+from robochoc.communication.network.settings import Conditions
+from robochoc.communication.network.transport import Post
 from robochoc.communication.run_result import RunResult
-from robochoc.observers.events import AnyEvent, Lost, Received, Refused
-from robochoc.problem import Team
+from robochoc.journal.events import AnyEvent, Lost, Received, Refused
+from robochoc.model.problem import Team
+from robochoc.solver.agent_problem import Brief
 from robochoc.solver.compiled_team import CompiledRobot
-from robochoc.solver.part import Brief
 
 WITHIN_S = 30.0
 SLICE_S = 0.2

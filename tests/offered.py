@@ -14,4 +14,6 @@ def offered(monkeypatch: pytest.MonkeyPatch, group: str, **places: str | list[st
         for name, some in places.items()
         for place in ([some] if isinstance(some, str) else some)
     ]
-    monkeypatch.setattr("robochoc.installed.entries", lambda asked: [entry for entry in found if entry.group == asked])
+    monkeypatch.setattr(
+        "robochoc.system.installed.entries", lambda asked: [entry for entry in found if entry.group == asked]
+    )

@@ -8,13 +8,7 @@ from typing import cast
 
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Failed, OfEpoch, Pause, Wave
-from robochoc.communication.network.inbox import Arrived, Item
-from robochoc.communication.network.letters import MASTER, Letters
-from robochoc.communication.network.members import Members
-from robochoc.communication.network.post import Post
-from robochoc.communication.network.robot import Ending, NetworkRobot
-from robochoc.communication.network.tally import Tally
-from robochoc.communication.network.words import (
+from robochoc.communication.network.control_messages import (
     Joined,
     Judge,
     Leave,
@@ -27,12 +21,18 @@ from robochoc.communication.network.words import (
     Welcome,
     Word,
 )
+from robochoc.communication.network.framing import MASTER, Letters
+from robochoc.communication.network.inbox import Arrived, Item
+from robochoc.communication.network.members import Members
+from robochoc.communication.network.robot import Ending, NetworkRobot
+from robochoc.communication.network.search_state import Tally
+from robochoc.communication.network.transport import Post
 from robochoc.communication.run_result import RunResult
-from robochoc.outcome import Verdict
-from robochoc.problem import Robot, Team
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Robot, Team
 from robochoc.protocols.protocol import Protocol
+from robochoc.solver.agent_problem import NO_BRIEF, Brief
 from robochoc.solver.compiled_team import CompiledRobot
-from robochoc.solver.part import NO_BRIEF, Brief
 
 RUN = "run"
 

@@ -13,11 +13,11 @@ import pytest
 from pkc_problems import allowed, as_predicate, as_table, pkc_parts, rows, with_constraints
 
 from robochoc.communication.run_result import RunResult
-from robochoc.communication.schedule import RandomChannels
-from robochoc.communication.simulator import Simulation
-from robochoc.message import Envelope, encode
-from robochoc.observers.events import AnyEvent, Decided
-from robochoc.problem import Constraint, Domain, Model, Relation, Robot, Semantics, Team
+from robochoc.communication.simulator.schedule import RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.journal.events import AnyEvent, Decided
+from robochoc.model.message import Envelope, encode
+from robochoc.model.problem import Constraint, Domain, Model, Relation, Robot, Semantics, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.shared import Others, SharedConstraint

@@ -9,8 +9,8 @@ from random import Random
 
 from problems import PREDICATES, team_of
 
-from robochoc.expression import Type, parse
-from robochoc.problem import Child, Constraint, Model, Parent, Predicate, Relation, Robot, Semantics, Team
+from robochoc.model.expression import Type, parse
+from robochoc.model.problem import Child, Constraint, Model, Parent, Predicate, Relation, Robot, Semantics, Team
 
 Row = tuple[int, ...]
 """Values of a constraint's variables, in the order of its `variables`."""

@@ -9,9 +9,8 @@ from random import Random
 
 from hypothesis import strategies as st
 
-from robochoc.expression import Type, parse
-from robochoc.options import Runtime
-from robochoc.problem import (
+from robochoc.model.expression import Type, parse
+from robochoc.model.problem import (
     Child,
     Constraint,
     Domain,
@@ -23,6 +22,7 @@ from robochoc.problem import (
     Team,
     Variable,
 )
+from robochoc.run.options import Runtime
 
 ON_ONE_MACHINE = (Runtime.PROCESSES, Runtime.SIMULATOR)
 """The runtimes that need no network; that one has tests of its own, as it takes a second to start."""

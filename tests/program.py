@@ -11,7 +11,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from unittest.mock import patch
 
-from robochoc.cli.commands import run
+from robochoc.cli.group import run
 
 PROGRAM = str(Path(sys.executable).parent / "robochoc")
 ROOT = Path(__file__).parents[1]

@@ -8,12 +8,12 @@ from random import Random
 from cost_problems import random_cost_team
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.journal import Header, Journal, Recorder, read_journal
-from robochoc.problem import Team
-from robochoc.registry import protocol_named
-from robochoc.run import Options, Runtime, ScheduleName, solve
-from robochoc.view.sniffer.feed import Feed
-from robochoc.view.sniffer.trace import Trace
+from robochoc.journal.journal import Header, Journal, Recorder, read_journal
+from robochoc.model.problem import Team
+from robochoc.run.orchestrator import Options, Runtime, ScheduleName, solve
+from robochoc.run.registry import protocol_named
+from robochoc.sniffer.feed import Feed
+from robochoc.sniffer.trace import Trace
 
 
 def record(team: Team, options: Options) -> Journal:

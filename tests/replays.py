@@ -15,12 +15,12 @@ from pkc_problems import random_pkc_team
 from problems import random_team
 from test_conformance import random_schedule
 
-from robochoc.observers.events import AnyEvent, Began
-from robochoc.observers.journal import Header, Journal, Recorder, read_journal
-from robochoc.orders import Order
-from robochoc.problem import Kind, Model, Team
-from robochoc.registry import protocol_named
-from robochoc.run import Options, Withdrawal, solve
+from robochoc.journal.events import AnyEvent, Began
+from robochoc.journal.journal import Header, Journal, Recorder, read_journal
+from robochoc.model.orders import Order
+from robochoc.model.problem import Kind, Model, Team
+from robochoc.run.orchestrator import Options, Withdrawal, solve
+from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
 
 ENOUGH = 1500

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from agents import told
 from trees import Costs, priced
 
-from robochoc.message import Message
-from robochoc.problem import Team
+from robochoc.model.message import Message
+from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.sfb import SFB, CPAs, SFBSettings
+from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.part import parts
 
 CHAIN: Costs = {"AB": (3, 1, 0, 2), "BC": (0, 4, 2, 1), "A": (0, 1)}
 """RA and RB, RB and RC; the cheapest is RA 2, RB 1, RC 1, for 1."""

@@ -13,14 +13,14 @@ from urllib.request import Request, urlopen
 import msgspec
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import AnyEvent
-from robochoc.observers.journal import Header, Recorder
-from robochoc.options import Options, Runtime, Withdrawal
-from robochoc.outcome import Outcome
-from robochoc.run import solve
+from robochoc.journal.events import AnyEvent
+from robochoc.journal.journal import Header, Recorder
+from robochoc.model.outcome import Outcome
+from robochoc.run.options import Options, Runtime, Withdrawal
+from robochoc.run.orchestrator import solve
+from robochoc.sniffer.server import Server
+from robochoc.sniffer.session import Session
 from robochoc.view.address import listening, url_of
-from robochoc.view.sniffer.server import Server
-from robochoc.view.sniffer.session import Session
 
 TOKEN = "a-path-that-nobody-guesses"  # noqa: S105 - it is for tests
 

@@ -16,12 +16,12 @@ from PIL import Image
 from sniffed import journal_of
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import AnyEvent
-from robochoc.observers.journal import read_journal
-from robochoc.options import Options, Runtime
-from robochoc.run import solve
-from robochoc.view.sniffer.feed import Feed
-from robochoc.view.sniffer.trace import Trace
+from robochoc.journal.events import AnyEvent
+from robochoc.journal.journal import read_journal
+from robochoc.run.options import Options, Runtime
+from robochoc.run.orchestrator import solve
+from robochoc.sniffer.feed import Feed
+from robochoc.sniffer.trace import Trace
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 REFUSED = "ERR_CONNECTION_REFUSED"

@@ -8,7 +8,7 @@ from random import Random
 from problems import random_constraint, team_of
 
 from robochoc.communication.network.profile import Profile, profile_of
-from robochoc.problem import Team
+from robochoc.model.problem import Team
 
 
 def sparse_team(seed: int, size: int = 9) -> Team:

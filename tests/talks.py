@@ -7,13 +7,13 @@ from typing import get_args
 import pytest
 import sexpdata
 
-from robochoc.communication.acl import ACLMessage, parse, text
-from robochoc.communication.conversation import Conversation
-from robochoc.message import Envelope, Message, encode
+from robochoc.model.message import Envelope, Message, encode
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.protocol import Protocol
-from robochoc.registry import protocol_named, protocol_names
+from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.services.identifier import AgentIdentifier
+from robochoc.sniffer.acl import ACLMessage, parse, text
+from robochoc.sniffer.conversation import Conversation
 
 PLATFORM = "192.168.1.14:7447/robochoc"
 OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]

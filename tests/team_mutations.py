@@ -8,7 +8,7 @@ from random import Random
 from typing import TypeVar
 
 from robochoc.formats import PREDEFINED
-from robochoc.problem import INFINITE, Constraint, Domain, Kind, Robot, Team, Term
+from robochoc.model.problem import INFINITE, Constraint, Domain, Kind, Robot, Team, Term
 
 Mutation = Callable[[Robot, Team, Random], Robot]
 _Item = TypeVar("_Item")

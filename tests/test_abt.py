@@ -8,12 +8,12 @@ from agents import told, value
 from problems import team_of
 
 import robochoc.protocols.abt
-from robochoc.outcome import Verdict
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.abt import ABT, AddLink, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.part import parts
 
 DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
 

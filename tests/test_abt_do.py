@@ -9,16 +9,16 @@ import pytest
 from agents import told, value
 from problems import random_team, team_of
 
-from robochoc.communication.schedule import Concurrent, RandomChannels
-from robochoc.communication.simulator import Simulation
-from robochoc.message import Message
-from robochoc.observers.events import Event, Sent
-from robochoc.outcome import Verdict
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.journal.events import Event, Sent
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.abt_do import ABTDORetro, AddLink, Counters, CurrentOrder, Nogood, Ok, Order
 from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.part import parts
 
 DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
 

@@ -14,10 +14,10 @@ from problems import random_team
 from sparse_teams import profiles_of, sparse_team
 
 from robochoc.communication.network.access import ALL, access_control, journal_key, letter_key, life_key, name_in
-from robochoc.communication.network.letters import MASTER
+from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.profile import acquaintances
-from robochoc.problem import Team
+from robochoc.model.problem import Team
 
 NAMES = ("R1", "R1.1", "R2", "R21", "r2")
 EVERYBODY = (*NAMES, MASTER)

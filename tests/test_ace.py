@@ -25,9 +25,9 @@ from program import PROGRAM, robochoc
 from robochoc.formats import PREDEFINED, write_team
 from robochoc.formats.xcsp3 import xcsp3
 from robochoc.generators.queens3d import QueensModel, QueensRobots, queens3d
-from robochoc.outcome import Verdict
-from robochoc.problem import Constraint, Relation, Semantics
-from robochoc.run import Options, solve
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics
+from robochoc.run.orchestrator import Options, solve
 from robochoc.solver import ace as front
 from robochoc.solver import propagation
 from robochoc.solver.ace import AceProcess

@@ -18,10 +18,8 @@ from talks import (
     types_of,
 )
 
-import robochoc.communication.acl
-from robochoc.communication.acl import ACLMessage, BadACL, parse, text
-from robochoc.communication.performatives import ACTS, OTHERWISE, act_of
-from robochoc.registry import protocol_named
+import robochoc.sniffer.acl
+from robochoc.run.registry import protocol_named
 from robochoc.services.communicative_acts import Performative
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
 from robochoc.services.directory import Directory
@@ -29,6 +27,8 @@ from robochoc.services.facilitator import handle
 from robochoc.services.identifier import AgentIdentifier
 from robochoc.services.sl import REQUEST_CAPS, Function, df_on, request
 from robochoc.services.symbolic import Expression, read
+from robochoc.sniffer.acl import ACLMessage, BadACL, parse, text
+from robochoc.sniffer.performatives import ACTS, OTHERWISE, act_of
 
 DOCS = (Path(__file__).parents[1] / "docs" / "acl.md").read_text()
 
@@ -184,4 +184,4 @@ def test_the_documented_words_with_the_directory_are_ours() -> None:
 
 
 def test_the_example_runs() -> None:
-    assert doctest.testmod(robochoc.communication.acl).failed == 0
+    assert doctest.testmod(robochoc.sniffer.acl).failed == 0

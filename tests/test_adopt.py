@@ -8,8 +8,8 @@ from agents import told, value
 from trees import context, placed, priced, root, to
 
 import robochoc.protocols.adopt
-from robochoc.outcome import Verdict
-from robochoc.problem import INFINITE
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
 from robochoc.protocols.adopt import ADOPT, Cost, Threshold, Value
 from robochoc.protocols.bounding import Terminate
 

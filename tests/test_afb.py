@@ -10,15 +10,15 @@ from agents import told, value
 from problems import team_of
 
 import robochoc.protocols.afb
-from robochoc.message import Value
-from robochoc.outcome import Verdict
-from robochoc.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.model.message import Value
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.afb import AFB, CPA, FBCPA, FBEstimate, NewSolution, Terminate
 from robochoc.protocols.afb_bounds import Cost
 from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.agent_problem import NO_BRIEF, Brief, parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.part import NO_BRIEF, Brief, parts
 
 
 def priced(scope: str, costs: Mapping[tuple[int, ...], float], default: float = 0) -> Constraint:

@@ -10,10 +10,10 @@ from random import Random
 import pytest
 from cost_problems import cost_of, least_cost, random_cost_team
 
-from robochoc.communication.schedule import Concurrent, RandomChannels
-from robochoc.communication.simulator import Simulation
-from robochoc.message import Message, Value
-from robochoc.problem import INFINITE, Team
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Message, Value
+from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.afb import AFB, CPA, FBEstimate
 
 

@@ -7,16 +7,16 @@ from random import Random
 import pytest
 from problems import random_team, solutions, team_of
 
-from robochoc.communication.schedule import Concurrent, RandomChannels
-from robochoc.communication.simulator import Simulation
-from robochoc.message import Message
-from robochoc.outcome import Verdict
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.afc import AFC, CPA, Assignments, BacktrackCPA, FcCPA, FilteredDomain, NotOk
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.sbt import SBT
+from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.part import parts
 
 DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
 

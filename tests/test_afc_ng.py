@@ -11,15 +11,15 @@ from complex_problems import complex_team
 from problems import random_team, team_of
 
 import robochoc.protocols.afc_ng
-from robochoc.communication.schedule import RandomChannels
-from robochoc.communication.simulator import Simulation
-from robochoc.message import Message, Value
-from robochoc.outcome import Verdict
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.communication.simulator.schedule import RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.afc_ng import CPA, AFCng, Nogood, Solved
 from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.part import parts
 
 DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
 

@@ -11,18 +11,18 @@ import pytest
 from cost_problems import cost_of, random_complex_cost_team, random_cost_team, with_costs
 from problems import team_of
 
-from robochoc.anytime import best_of, bound_of, course, tree_of
-from robochoc.cli.explain import explained
-from robochoc.cli.report import report
+from robochoc.cli.reports.outcome import report
+from robochoc.cli.reports.pseudo_tree import explained
 from robochoc.communication.run_result import RunResult
-from robochoc.expression import Type, parse
-from robochoc.observers.events import AnyEvent, Decided, Heard, Improved
-from robochoc.observers.journal import improvements
-from robochoc.observers.objective import Objective, aside_cost
-from robochoc.outcome import Metrics, Outcome, Place, Verdict
-from robochoc.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
+from robochoc.journal.events import AnyEvent, Decided, Heard, Improved
+from robochoc.journal.journal import improvements
+from robochoc.model.expression import Type, parse
+from robochoc.model.outcome import Metrics, Outcome, Place, Verdict
+from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
 from robochoc.protocols.findings import Best, Findings, Trail
+from robochoc.run.incumbent import best_of, bound_of, course, tree_of
 from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.verification.objective import Objective, aside_cost
 
 PRICES = Relation("price", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1)), (4, 3, INFINITE), 7)
 PAIR = with_costs(team_of({"A": (1, 2), "B": (1, 2)}, [Constraint("C", PRICES, ("A", "B"), ("A", "B"))]))

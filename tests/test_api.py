@@ -16,10 +16,10 @@ from test_epochs import differ
 import robochoc
 from robochoc.api import protocol_called
 from robochoc.formats import InvalidInput, write_team
-from robochoc.machines.place import BadPlace
-from robochoc.observers.events import AnyEvent, Concluded
-from robochoc.outcome import Outcome, Verdict
-from robochoc.registry import UnknownProtocol, offers
+from robochoc.journal.events import AnyEvent, Concluded
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.run.networked.address import BadPlace
+from robochoc.run.registry import UnknownProtocol, offers
 from robochoc.solver.encoding import Unsupported
 
 FOUR = ROOT / "instances" / "queens3d-4"

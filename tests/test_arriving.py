@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.communication.network.publication import PIECE_BYTES, Piece
-from robochoc.machines.place import Place
-from robochoc.machines.sniff import Arriving, Followed, WholeBlocks
-from robochoc.observers.journal_blocks import BEGINNING, PREAMBLE, Damaged, framed
-from robochoc.observers.journal_entries import BadJournal
+from robochoc.communication.network.journal_server import PIECE_BYTES, Piece
+from robochoc.journal.blocks import BEGINNING, PREAMBLE, Damaged, framed
+from robochoc.journal.entries import BadJournal
+from robochoc.run.networked.address import Place
+from robochoc.sniffer.remote import Arriving, Followed, WholeBlocks
 
 RUN = "run"
 

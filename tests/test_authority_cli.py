@@ -15,7 +15,7 @@ from program import ROOT
 from robochoc.authority.authority import Authority
 from robochoc.authority.certificates import fingerprint, new_key, signing_request
 from robochoc.authority.token import Token
-from robochoc.cli.commands import cli
+from robochoc.cli.group import cli
 
 
 def say(folder: Path, *words: object) -> Result:

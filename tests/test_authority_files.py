@@ -16,7 +16,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from program import ROOT
 
-from robochoc import files
 from robochoc.authority.authority import Authority, NotGranted
 from robochoc.authority.certificates import (
     fingerprint,
@@ -27,6 +26,7 @@ from robochoc.authority.certificates import (
 from robochoc.authority.identity import BadIdentity, Identity, save
 from robochoc.authority.registry import BadAuthority
 from robochoc.authority.token import BadToken, Token
+from robochoc.system import files
 
 ENROLLER = """
 import sys

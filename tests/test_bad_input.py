@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from robochoc.formats import InvalidInput, find_teams, read_robot, read_team
-from robochoc.problem import Robot, Team
+from robochoc.model.problem import Robot, Team
 
 FUZZ = settings(
     max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]

@@ -13,15 +13,15 @@ from problems import random_team
 from sparse_teams import profiles_of, sparse_team
 
 from robochoc.communication.network.profile import acquaintances
-from robochoc.communication.schedule import RandomChannels
-from robochoc.communication.simulator import Simulation
-from robochoc.observers.events import AnyEvent, Sent
-from robochoc.observers.objective import aside_cost
-from robochoc.problem import Team
+from robochoc.communication.simulator.schedule import RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.journal.events import AnyEvent, Sent
+from robochoc.model.problem import Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
-from robochoc.registry import protocol_named, protocol_names
-from robochoc.solver.part import NO_BRIEF, Brief
+from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.solver.agent_problem import NO_BRIEF, Brief
+from robochoc.verification.objective import aside_cost
 
 OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
 WITHIN: list[type[Protocol]] = [

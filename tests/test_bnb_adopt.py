@@ -8,9 +8,9 @@ from agents import told, value
 from trees import context, placed, priced, root, to
 
 import robochoc.protocols.bnb_adopt
-from robochoc.message import Message
-from robochoc.outcome import Verdict
-from robochoc.problem import INFINITE
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
 from robochoc.protocols.bnb_adopt import BnBADOPT, Cost, Value
 from robochoc.protocols.bounding import Terminate
 

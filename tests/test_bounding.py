@@ -10,13 +10,13 @@ from agents import told
 from cost_problems import least_cost, random_cost_team
 from trees import context, placed, priced, root, to, unplaced
 
-from robochoc.anytime import bound_of
-from robochoc.communication.schedule import Concurrent, RandomChannels
-from robochoc.communication.simulator import Simulation
-from robochoc.outcome import Place, Verdict
-from robochoc.problem import INFINITE
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.outcome import Place, Verdict
+from robochoc.model.problem import INFINITE
 from robochoc.protocols import adopt, bnb_adopt
 from robochoc.protocols.bounding import BoundingProtocol, Terminate
+from robochoc.run.incumbent import bound_of
 
 
 class Family(NamedTuple):

@@ -17,7 +17,7 @@ from program import robochoc
 
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import QueensModel, QueensRobots, queens3d
-from robochoc.problem import Robot
+from robochoc.model.problem import Robot
 from robochoc.solver import cache as cache_module
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.cache import SolutionCache

@@ -17,13 +17,13 @@ from lxml import etree
 from problems import solutions
 from test_complex_teams import by_hand
 
-from robochoc.expression import Type, parse
 from robochoc.formats import PREDEFINED
 from robochoc.formats.xcsp3 import xcsp3
 from robochoc.generators.queens3d import queens3d
-from robochoc.outcome import Verdict
-from robochoc.problem import Constraint, Predicate, Relation, Semantics, Team
-from robochoc.run import Options, Refuted, Runtime, solve
+from robochoc.model.expression import Type, parse
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Predicate, Relation, Semantics, Team
+from robochoc.run.orchestrator import Options, Refuted, Runtime, solve
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_words import Solved
 from robochoc.solver.central import Judge, Judgement

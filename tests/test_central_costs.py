@@ -23,24 +23,24 @@ from pkc_problems import random_pkc_team, with_constraints
 from problems import random_team, team_of
 from program import robochoc
 
-from robochoc.anytime import absent
 from robochoc.formats import PREDEFINED, write_team
 from robochoc.generators.coloring import coloring
 from robochoc.generators.queens3d import queens3d
-from robochoc.message import Message
-from robochoc.observers.checker import objections
-from robochoc.observers.objective import aside_cost
-from robochoc.opinion import contradiction
-from robochoc.outcome import Outcome, Verdict
-from robochoc.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
+from robochoc.model.message import Message
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
-from robochoc.run import Options, Refuted, Runtime, Withdrawal, solve
+from robochoc.run.incumbent import absent
+from robochoc.run.orchestrator import Options, Refuted, Runtime, Withdrawal, solve
+from robochoc.run.second_opinion import contradiction
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_words import Solved
 from robochoc.solver.central import Judge, Judgement
 from robochoc.solver.encoding import Unsupported
 from robochoc.solver.failures import SolverLost
+from robochoc.verification.checker import objections
+from robochoc.verification.objective import aside_cost
 
 CENTRAL = Options(protocol="central")
 FEWEST = replace(CENTRAL, withdraw=Withdrawal.FEWEST)
@@ -259,7 +259,7 @@ class OnlyTheFirst(Silent):
 def claimed(
     protocol: type[Protocol], team: Team, patch: pytest.MonkeyPatch, withdraw: Withdrawal | None = None
 ) -> Outcome:
-    patch.setattr("robochoc.run.protocol_named", lambda _: protocol)
+    patch.setattr("robochoc.run.orchestrator.protocol_named", lambda _: protocol)
     return solve(team, Options(runtime=Runtime.SIMULATOR, verify=True, withdraw=withdraw))
 
 

@@ -11,20 +11,20 @@ from clocks import once, waiting
 from cost_problems import with_costs
 from problems import team_of
 
-from robochoc.anytime import absent
 from robochoc.formats import PREDEFINED
 from robochoc.generators.coloring import coloring
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
-from robochoc.observers.checker import cost, objections
-from robochoc.outcome import Outcome, Verdict
-from robochoc.problem import Constraint, Relation, Semantics
-from robochoc.run import Options, solve
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics
+from robochoc.run.incumbent import absent
+from robochoc.run.orchestrator import Options, solve
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import Judge, Judgement
 from robochoc.solver.encoding import Codes, Network, Table
 from robochoc.solver.failures import SolverTimeout
-from robochoc.solver.priced import priced
+from robochoc.solver.weighted import priced
+from robochoc.verification.checker import cost, objections
 
 CENTRAL = Options(protocol="central")
 HARD = random_csp(30, 8, 0.3, 0, 1, max_cost=100)

@@ -9,9 +9,9 @@ import pytest
 from problems import team_of
 from test_abt import differ, triangle
 
-from robochoc.change import BadChange, changed, changed_by, rejoined, without
 from robochoc.formats import PREDEFINED
-from robochoc.problem import (
+from robochoc.model.change import BadChange, changed, changed_by, rejoined, without
+from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,

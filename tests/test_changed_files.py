@@ -14,9 +14,9 @@ from complex_changes import random_complex_journey
 from problems import solutions
 from test_abt import triangle
 
-from robochoc.change import BadChange, rejoined, without
 from robochoc.formats import read_robot, read_team, write_team
-from robochoc.problem import Constraint, Domain, Robot, Team
+from robochoc.model.change import BadChange, rejoined, without
+from robochoc.model.problem import Constraint, Domain, Robot, Team
 
 
 def writable(team: Team) -> Team:

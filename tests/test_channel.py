@@ -14,18 +14,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from problems import random_team, solutions, teams
 
-from robochoc.communication.channel import CHANNELS, ChannelModel
-from robochoc.communication.schedule import Concurrent
-from robochoc.communication.timed import Timed
+from robochoc.communication.simulator.channel import CHANNELS, ChannelModel
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.timed import Timed
 from robochoc.formats import read_team
 from robochoc.formats.result import read_result, result_json
 from robochoc.generators.queens3d import queens3d
-from robochoc.message import Envelope
-from robochoc.observers.events import Sent, Settled
-from robochoc.observers.journal import Header, Recorder, lines_of, metrics_of, read_journal
-from robochoc.outcome import Verdict
-from robochoc.problem import Team
-from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
+from robochoc.journal.events import Sent, Settled
+from robochoc.journal.journal import Header, Recorder, lines_of, metrics_of, read_journal
+from robochoc.model.message import Envelope
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Team
+from robochoc.run.orchestrator import Options, Runtime, ScheduleName, Withdrawal, solve
 from robochoc.solver.encoding import Unsupported
 
 ROOT = Path(__file__).parents[1]

@@ -11,7 +11,7 @@ import pytest
 from entries import entries_of
 from program import robochoc
 
-from robochoc.communication.channel import CHANNELS, LARGEST_FILE, ChannelModel, read_channel
+from robochoc.communication.simulator.channel import CHANNELS, LARGEST_FILE, ChannelModel, read_channel
 from robochoc.formats import InvalidInput
 
 ROOT = Path(__file__).parents[1]

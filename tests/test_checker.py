@@ -9,15 +9,15 @@ import pytest
 from hypothesis import given, settings
 from problems import ON_ONE_MACHINE, team_of, teams
 
-import robochoc.run
-from robochoc.expression import Type, parse
+import robochoc.run.orchestrator
 from robochoc.generators.queens3d import queens3d
-from robochoc.message import Message
-from robochoc.observers.checker import cost, could_join, objections, price
-from robochoc.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
+from robochoc.model.expression import Type, parse
+from robochoc.model.message import Message
+from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.protocol import Protocol
-from robochoc.run import Options, Refuted, Runtime, solve
+from robochoc.run.orchestrator import Options, Refuted, Runtime, solve
+from robochoc.verification.checker import cost, could_join, objections, price
 
 
 def some_assignments(team: Team) -> Iterator[dict[str, int]]:
@@ -100,6 +100,6 @@ class Liar(Protocol):
 
 @pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_a_protocol_that_lies_is_refuted(monkeypatch: pytest.MonkeyPatch, runtime: Runtime) -> None:
-    monkeypatch.setattr(robochoc.run, "protocol_named", lambda _name: Liar)
+    monkeypatch.setattr(robochoc.run.orchestrator, "protocol_named", lambda _name: Liar)
     with pytest.raises(Refuted, match=r"broken by V1\.1 = 1, V1\.2 = 1"):
         solve(queens3d(3), Options(runtime=runtime))

@@ -7,14 +7,16 @@ from types import SimpleNamespace
 
 import pytest
 
-from robochoc.communication.network.chronicle import Chronicle
+from robochoc.communication.network.master_events import Chronicle
 from robochoc.communication.network.quotas import BURST_S, EVENTS_A_SECOND
-from robochoc.observers.events import AnyEvent, Decided, Granted, Lost, Refused, Registered
+from robochoc.journal.events import AnyEvent, Decided, Granted, Lost, Refused, Registered
 
 
 def test_times_are_since_the_search_began(monkeypatch: pytest.MonkeyPatch) -> None:
     now = itertools.count(1000)
-    monkeypatch.setattr("robochoc.communication.network.chronicle.time", SimpleNamespace(monotonic=lambda: next(now)))
+    monkeypatch.setattr(
+        "robochoc.communication.network.master_events.time", SimpleNamespace(monotonic=lambda: next(now))
+    )
     told: list[AnyEvent] = []
     chronicle = Chronicle(told.append)
     chronicle.registered("A")
@@ -46,7 +48,7 @@ def test_where_nobody_observes_nothing_is_told() -> None:
 
 
 def test_who_tells_more_than_robots_have_to_tell_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robochoc.communication.network.chronicle.time", SimpleNamespace(monotonic=lambda: 0.0))
+    monkeypatch.setattr("robochoc.communication.network.master_events.time", SimpleNamespace(monotonic=lambda: 0.0))
     told: list[AnyEvent] = []
     chronicle = Chronicle(told.append)
     flood = [Decided(t=3.0, robot="A", assignment={}, clock=1)] * EVENTS_A_SECOND

@@ -17,10 +17,10 @@ from click import Context
 from problems import team_of
 from program import ROOT, on_a_terminal, robochoc, robochoc_within
 
-from robochoc.cli.commands import COMMANDS, cli
+from robochoc.cli.group import COMMANDS, cli
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.problem import Constraint, Model, Relation, Robot, Semantics
+from robochoc.model.problem import Constraint, Model, Relation, Robot, Semantics
 
 RESULT_KEYS = {
     "team", "protocol", "runtime", "seed", "verdict", "assignment", "cost", "withdrawn", "epochs", "metrics",
@@ -311,7 +311,7 @@ def test_every_command_has_help_and_is_in_the_readme() -> None:
 
 def test_the_help_of_commands_imports_nothing_heavy() -> None:
     code = (
-        "import sys; from click import Context; from robochoc.cli.commands import COMMANDS, cli\n"
+        "import sys; from click import Context; from robochoc.cli.group import COMMANDS, cli\n"
         "for name in COMMANDS: cli.get_command(Context(cli), name).get_help(Context(cli))\n"
         "print(*sys.modules)"
     )

@@ -14,7 +14,7 @@ from program import PROGRAM, ROOT, robochoc, robochoc_within
 
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.journal import read_journal
+from robochoc.journal.journal import read_journal
 
 
 def test_a_journal_and_a_result_give_the_page_that_solve_gives(four: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from program import robochoc_within
 
-from robochoc.files import Growing, Unfinished, resolved, write_atomically
+from robochoc.system.files import Growing, Unfinished, resolved, write_atomically
 
 RESULT = {
     "team": "queens3d-4",

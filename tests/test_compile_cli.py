@@ -15,8 +15,8 @@ from lxml import etree
 from program import ROOT, robochoc
 
 from robochoc.formats import PREDEFINED, read_team, write_team
-from robochoc.observers.checker import objections
-from robochoc.problem import Constraint
+from robochoc.model.problem import Constraint
+from robochoc.verification.checker import objections
 
 SMALL_QUEENS = ROOT / "instances" / "queens3d-4"
 QUEENS = ROOT / "instances" / "queens3d-7"

@@ -11,27 +11,27 @@ from cost_problems import with_costs
 from loose_problems import every_order, loose_team, turned_interface, untold_interface
 from problems import team_of
 
-from robochoc.change import still_showing, without
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.profile import among, profile_of, ranges_of
-from robochoc.communication.schedule import Concurrent
-from robochoc.communication.simulator import Simulation
-from robochoc.epochs import Journey
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats import PREDEFINED
-from robochoc.observers.events import Began, Decided, Improved, Lost
-from robochoc.observers.journal import Header, Recorder, read_journal
-from robochoc.observers.objective import Objective
-from robochoc.orders import favourable, reordered
-from robochoc.problem import AddConstraint, Child, Constraint, Event, Parent, Robot, Team
+from robochoc.journal.events import Began, Decided, Improved, Lost
+from robochoc.journal.journal import Header, Recorder, read_journal
+from robochoc.model.change import still_showing, without
+from robochoc.model.orders import favourable, reordered
+from robochoc.model.problem import AddConstraint, Child, Constraint, Event, Parent, Robot, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.traits import Traits
-from robochoc.replay.cast import Cast, Means
+from robochoc.replay.rebuild import Cast, Means
 from robochoc.replay.steps import Run
-from robochoc.run import Options, Runtime, solve
+from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run.scenario import Journey
+from robochoc.solver.agent_problem import NO_BRIEF, parts
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, as_compiled
 from robochoc.solver.domain import CompiledDomain, compiled_domain
 from robochoc.solver.encoding import Unsupported
-from robochoc.solver.part import NO_BRIEF, parts
+from robochoc.verification.objective import Objective
 
 _UNLIKE = PREDEFINED["ne"]
 SCHEDULE = Concurrent(0)

@@ -14,14 +14,13 @@ from loose_problems import any_order, loosened
 from problems import solutions
 from test_conformance import random_schedule
 
-from robochoc.communication.schedule import Concurrent, RandomChannels
-from robochoc.communication.simulator import Simulation
-from robochoc.observers.checker import objections
-from robochoc.orders import in_order
-from robochoc.outcome import Verdict
-from robochoc.problem import Robot, Team
-from robochoc.registry import protocol_named
-from robochoc.run import Options, Runtime, Withdrawal, solve
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.orders import in_order
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Robot, Team
+from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run.registry import protocol_named
 from robochoc.solver import compiled
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import Judge
@@ -29,6 +28,7 @@ from robochoc.solver.compile import Compiler
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain, compiled_domain
 from robochoc.solver.encoding import Codes, Network
+from robochoc.verification.checker import objections
 
 
 def by_hand(network: Network) -> Iterator[Codes]:

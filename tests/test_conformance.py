@@ -12,11 +12,11 @@ from loose_problems import any_order, least, loosened
 from problems import ON_ONE_MACHINE, random_team, solutions
 
 from robochoc.communication.run_result import RunResult
-from robochoc.observers.checker import objections
-from robochoc.outcome import Outcome, Verdict
-from robochoc.problem import INFINITE, Team
-from robochoc.registry import protocol_named, protocol_names
-from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.problem import INFINITE, Team
+from robochoc.run.orchestrator import Options, Runtime, ScheduleName, Withdrawal, solve
+from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.verification.checker import objections
 
 PER_BATCH, FIRST_BATCH = 300, 90
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 10))]
@@ -147,7 +147,7 @@ def test_withdrawing_is_not_asked_of_a_team_that_has_a_solution() -> None:
 
 
 def test_a_result_joins_clocks_by_the_largest() -> None:
-    from robochoc.outcome import Metrics  # noqa: PLC0415
+    from robochoc.model.outcome import Metrics  # noqa: PLC0415
 
     parts = [Metrics({"Ok": 2}, 10, 5, 7), Metrics({"Ok": 1, "Nogood": 1}, 20, 3, 4)]
     joined = RunResult.of(Verdict.SOLUTION, None, {}, parts, 1.5).metrics

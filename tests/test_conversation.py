@@ -27,17 +27,17 @@ from talks import (
     types_of,
 )
 
-from robochoc.communication.acl import ACLMessage, BadACL
-from robochoc.communication.conversation import MAX_JSON, Conversation
-from robochoc.communication.performatives import ACTS
-from robochoc.communication.schedule import RandomChannels
-from robochoc.communication.simulator import Simulation
-from robochoc.message import Envelope, Message, encode
+from robochoc.communication.simulator.schedule import RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Envelope, Message, encode
 from robochoc.protocols.abt import ABT, Nogood, Ok
 from robochoc.protocols.first_fit import FirstFit
-from robochoc.registry import protocol_named
+from robochoc.run.registry import protocol_named
 from robochoc.services.communicative_acts import Performative
 from robochoc.services.identifier import AgentIdentifier
+from robochoc.sniffer.acl import ACLMessage, BadACL
+from robochoc.sniffer.conversation import MAX_JSON, Conversation
+from robochoc.sniffer.performatives import ACTS
 
 # Every message of every protocol
 

@@ -12,10 +12,10 @@ from loose_problems import any_order, least, loosened
 from problems import ON_ONE_MACHINE, random_team
 from test_conformance import ENOUGH, any_way
 
-from robochoc.outcome import Outcome, Verdict
-from robochoc.problem import INFINITE, Constraint, Relation, Semantics, Team
-from robochoc.registry import protocol_named, protocol_names
-from robochoc.run import Options, Runtime, Withdrawal, solve
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import Unsupported
 

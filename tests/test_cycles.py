@@ -11,24 +11,24 @@ from cost_problems import random_cost_team, random_hard_team
 from courses import any_schedule, course_of, domains_of, played, robot_of, started
 from problems import team_of
 
-from robochoc.anytime import best_of
 from robochoc.communication.host import BadSettings, settings_of
-from robochoc.communication.schedule import Concurrent
-from robochoc.communication.simulator import Simulation
-from robochoc.observers.checker import objections
-from robochoc.observers.objective import aside_cost
-from robochoc.outcome import Verdict
-from robochoc.problem import Assignment, Constraint, Relation, Semantics, Team
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Assignment, Constraint, Relation, Semantics, Team
 from robochoc.protocols.cycles import CycleProtocol, Value
 from robochoc.protocols.dsa import DSA
 from robochoc.protocols.findings import Trail
 from robochoc.protocols.maxsum import MaxSum
 from robochoc.protocols.mgm import MGM
 from robochoc.protocols.mgm2 import MGM2
-from robochoc.registry import protocol_named
-from robochoc.run import Options, Runtime, Withdrawal, solve
+from robochoc.run.incumbent import best_of
+from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run.registry import protocol_named
+from robochoc.solver.agent_problem import Brief
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.part import Brief
+from robochoc.verification.checker import objections
+from robochoc.verification.objective import aside_cost
 
 ALL = pytest.mark.parametrize("protocol", [DSA, MGM, MGM2, MaxSum])
 DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))

@@ -14,18 +14,18 @@ from hypothesis import strategies as st
 from problems import team_of
 
 from robochoc.communication.run_result import RunResult
-from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
-from robochoc.communication.simulator import Simulation
-from robochoc.message import Message
-from robochoc.outcome import Place, Verdict
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Message
+from robochoc.model.outcome import Place, Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.dfs import Back, Token, TreeMessage, TreeProtocol, Wave
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import Traits
-from robochoc.run import Options, Runtime, solve
+from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.part import parts
 
 
 class Hello(Message, frozen=True):

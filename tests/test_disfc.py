@@ -17,21 +17,21 @@ from problems import random_team, team_of
 from test_pkc import SECRETS, agrees, pair_team, part
 
 import robochoc.protocols.disfc
-from robochoc.communication.processes import ProcessesRun
-from robochoc.communication.schedule import Concurrent
-from robochoc.communication.simulator import Simulation
+from robochoc.communication.processes.processes import ProcessesRun
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats.team import read_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.message import Message
-from robochoc.outcome import Verdict
-from robochoc.problem import Constraint, Model, Team
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Model, Team
 from robochoc.protocols.disfc import AddLink, DisFC, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver import filters
+from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import Unsupported
 from robochoc.solver.filters import allows
-from robochoc.solver.part import parts
 
 EVERYTHING = b"\x07"
 """A filter of three values that lets all of them through."""

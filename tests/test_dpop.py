@@ -13,14 +13,14 @@ from problems import team_of
 from trees import placed
 
 import robochoc.protocols.dpop
-from robochoc.communication.schedule import RandomChannels
-from robochoc.communication.simulator import Simulation
-from robochoc.expression import Type, parse
-from robochoc.message import Message
-from robochoc.outcome import Verdict
-from robochoc.problem import INFINITE, Constraint, Predicate, Relation, Semantics
+from robochoc.communication.simulator.schedule import RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.expression import Type, parse
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics
 from robochoc.protocols.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
-from robochoc.run import Options, Runtime, solve
+from robochoc.run.orchestrator import Options, Runtime, solve
 
 
 def kinds(said: Sequence[tuple[str, Message]]) -> list[tuple[str, str]]:

@@ -13,15 +13,15 @@ from cost_problems import with_costs
 from dpop_robots import PRODUCT, begun, dimensions, domain, leaf, products
 from problems import ON_ONE_MACHINE, team_of
 
-from robochoc.communication.schedule import RandomChannels
-from robochoc.communication.simulator import Simulation
-from robochoc.message import Message, encode
-from robochoc.problem import Constraint, Relation, Semantics
+from robochoc.communication.simulator.schedule import RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Message, encode
+from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.protocols.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
-from robochoc.run import Options, Runtime, Withdrawal, solve
+from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.solver.agent_problem import Brief
 from robochoc.solver.encoding import TooMuch, Unsupported
 from robochoc.solver.exact import EXACT
-from robochoc.solver.part import Brief
 
 
 def test_over_the_limit_the_root_says_who_needs_how_much_before_any_table_is_made() -> None:

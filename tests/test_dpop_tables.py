@@ -13,14 +13,14 @@ import pytest
 from cost_problems import with_costs
 from problems import ON_ONE_MACHINE, team_of
 
-from robochoc.communication import queues, robot_process
-from robochoc.expression import Type, parse
-from robochoc.observers.events import AnyEvent, Sent
-from robochoc.problem import Constraint, Predicate, Team
+from robochoc.communication.processes import queues, robot_process
+from robochoc.journal.events import AnyEvent, Sent
+from robochoc.model.expression import Type, parse
+from robochoc.model.problem import Constraint, Predicate, Team
 from robochoc.protocols import dpop_tables
 from robochoc.protocols.dpop_tables import Arriving, Extent, Table, aligned, bytes_of, is_hopeless, packed, project
 from robochoc.protocols.dpop_tables import width_of as width_for
-from robochoc.run import Options, Runtime, solve
+from robochoc.run.orchestrator import Options, Runtime, solve
 
 SMALL = ((1, 1), (4, 2), (12, 1), (40, 3), (1 << 17, 16))
 """Blocks of a few cells, so that there are many of them; and how many of them may be one."""

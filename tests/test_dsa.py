@@ -13,9 +13,9 @@ from problems import team_of
 
 import robochoc.protocols.dsa
 from robochoc.communication.host import BadSettings, settings_of
-from robochoc.communication.schedule import Concurrent
-from robochoc.outcome import Verdict
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.cycles import Value
 from robochoc.protocols.dsa import DSA, DSASettings
 

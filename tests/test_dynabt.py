@@ -8,11 +8,11 @@ from agents import told, value
 from problems import team_of
 from test_abt import DIFFERENT, differ, triangle
 
-from robochoc.change import changed
 from robochoc.formats import PREDEFINED
-from robochoc.message import Message
-from robochoc.outcome import Verdict
-from robochoc.problem import (
+from robochoc.model.change import changed
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
@@ -32,9 +32,9 @@ from robochoc.problem import (
 from robochoc.protocols.abt import AddLink, Ok
 from robochoc.protocols.dynabt import DynABT, Nogood
 from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Void, void
-from robochoc.solver.part import parts
 
 
 def agent(team: Team, name: str) -> DynABT:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from agents import told, value
 from test_dynabt import after, agent, named
 
-from robochoc.change import changed
-from robochoc.problem import AddAgent, AddConstraint, Child, Domain, Parent, RemoveAgent, Robot, Team, Variable
+from robochoc.model.change import changed
+from robochoc.model.problem import AddAgent, AddConstraint, Child, Domain, Parent, RemoveAgent, Robot, Team, Variable
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.dynabt import Nogood
 from robochoc.solver.explanation import void

@@ -12,16 +12,16 @@ from problems import solutions
 from test_complex_teams import compiled_by_hand
 
 from robochoc.communication.run_result import RunResult
-from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.session import Epoch
-from robochoc.communication.simulator import Simulation
-from robochoc.epochs import Journey
-from robochoc.observers.checker import objections
-from robochoc.outcome import Verdict
-from robochoc.problem import AddAgent, Team
-from robochoc.registry import protocol_named
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import AddAgent, Team
+from robochoc.run.registry import protocol_named
+from robochoc.run.scenario import Journey
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import Void, void
+from robochoc.verification.checker import objections
 
 
 def random_schedule(chance: Random) -> Schedule:

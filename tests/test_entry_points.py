@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.entry_points import EntryPoint, entry_points
+from robochoc.system.entry_points import EntryPoint, entry_points
 
 ENTRIES = """
 # a comment
@@ -78,7 +78,7 @@ def test_loading_gives_the_attribute() -> None:
 
 def test_a_run_imports_neither_importlib_metadata_nor_what_it_brings() -> None:
     code = (
-        "import sys; from robochoc.registry import protocol_named; protocol_named('abt');"
+        "import sys; from robochoc.run.registry import protocol_named; protocol_named('abt');"
         "print(*sorted({'importlib.metadata', 'email', 'csv', 'zipfile'} & sys.modules.keys()))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

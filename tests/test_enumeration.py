@@ -18,9 +18,9 @@ from program import robochoc
 from test_ace import queens, random_network, tried
 
 from robochoc.formats import PREDEFINED, write_team
-from robochoc.outcome import Verdict
-from robochoc.problem import Constraint, Team
-from robochoc.run import Options, Runtime, solve
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Team
+from robochoc.run.orchestrator import Options, Runtime, solve
 from robochoc.solver import ace as front
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.cache import SolutionCache
@@ -29,9 +29,9 @@ from robochoc.solver.compile import Compiler, Limits, Source
 from robochoc.solver.domain import TooManySolutions
 from robochoc.solver.encoding import Codes, Network, Table
 from robochoc.solver.enumeration import STEPS_BEFORE_ACE, STEPS_EACH, Budget, OutOfSteps, cheapest, enumerated
-from robochoc.solver.priced import Priced, priced
 from robochoc.solver.propagation import propagated
 from robochoc.solver.question import Means
+from robochoc.solver.weighted import Priced, priced
 
 ENOUGH = 10**9
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 11))]

@@ -11,10 +11,10 @@ from loose_problems import loosened
 from problems import ON_ONE_MACHINE, random_team, solutions, team_of
 from test_conformance import random_schedule
 
-from robochoc.observers.journal import Header, Recorder, metrics_of, read_journal
-from robochoc.orders import Order
-from robochoc.outcome import Metrics, Outcome, Verdict
-from robochoc.problem import (
+from robochoc.journal.journal import Header, Recorder, metrics_of, read_journal
+from robochoc.model.orders import Order
+from robochoc.model.outcome import Metrics, Outcome, Verdict
+from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
@@ -31,8 +31,8 @@ from robochoc.problem import (
     Team,
     Variable,
 )
-from robochoc.registry import protocol_named, protocol_names
-from robochoc.run import Options, Runtime, solve
+from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run.registry import protocol_named, protocol_names
 
 DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
 SIMULATED = Options(runtime=Runtime.SIMULATOR, protocol="dynabt")

@@ -9,9 +9,9 @@ from problems import team_of
 from test_abt import differ, triangle
 from test_change import named, newcomer
 
-from robochoc.change import changed, without
 from robochoc.formats import PREDEFINED
-from robochoc.problem import (
+from robochoc.model.change import changed, without
+from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,

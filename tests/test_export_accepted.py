@@ -15,7 +15,7 @@ from warm_ace import ace_said
 
 from robochoc.formats import PREDEFINED, write_team
 from robochoc.formats.xcsp3 import xcsp3
-from robochoc.problem import INFINITE, Constraint, Kind, Relation, Semantics, Team
+from robochoc.model.problem import INFINITE, Constraint, Kind, Relation, Semantics, Team
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import Unsupported
 

@@ -19,7 +19,7 @@ from test_central import bundled, java, span
 from robochoc.formats import PREDEFINED, write_team
 from robochoc.formats.xcsp3 import xcsp3
 from robochoc.generators.coloring import coloring
-from robochoc.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.solver.encoding import Unsupported
 
 

@@ -11,7 +11,7 @@ from clocks import working
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robochoc.expression import (
+from robochoc.model.expression import (
     ALIASES,
     OPERATORS,
     Apply,

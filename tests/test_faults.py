@@ -22,11 +22,12 @@ from faulty_protocols import (
     TEAM,
 )
 
-from robochoc.communication import crew, processes
+from robochoc.communication.processes import pool as crew
+from robochoc.communication.processes import processes
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import Lost, Sent
-from robochoc.observers.journal import Ended, Follower, Header, in_order, read_journal
+from robochoc.journal.events import Lost, Sent
+from robochoc.journal.journal import Ended, Follower, Header, in_order, read_journal
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 

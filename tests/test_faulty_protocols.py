@@ -23,10 +23,10 @@ from faulty_protocols import (
     TalksNonsense,
 )
 
-from robochoc.communication.processes import ProcessesRun
-from robochoc.communication.robot_link import RobotsLost
-from robochoc.observers.events import AnyEvent, Lost
-from robochoc.outcome import Verdict
+from robochoc.communication.processes.processes import ProcessesRun
+from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.journal.events import AnyEvent, Lost
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.protocol import Protocol
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")

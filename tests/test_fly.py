@@ -14,11 +14,11 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from program import ROOT, on_a_terminal, robochoc
 
-from robochoc.cli.commands import cli
+from robochoc.cli.group import cli
 from robochoc.formats import write_team
 from robochoc.formats.result import result_json
 from robochoc.generators.queens3d import queens3d
-from robochoc.outcome import Epoch, Outcome, Verdict
+from robochoc.model.outcome import Epoch, Outcome, Verdict
 
 HANGAR = ROOT / "docs" / "examples" / "hangar"
 RESCUE = ROOT / "docs" / "examples" / "rescue"

@@ -10,13 +10,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sniffed import header, journal_of, told
 
-from robochoc.observers.events import AnyEvent, Began, Event
-from robochoc.observers.journal import BadJournal, read_journal
-from robochoc.view.sniffer import following
-from robochoc.view.sniffer.cache import Cache
-from robochoc.view.sniffer.following import Following, by_time
-from robochoc.view.sniffer.trace import Trace
-from robochoc.view.sniffer.window import NoFile, Window
+from robochoc.journal.events import AnyEvent, Began, Event
+from robochoc.journal.journal import BadJournal, read_journal
+from robochoc.sniffer import following
+from robochoc.sniffer.cache import Cache
+from robochoc.sniffer.following import Following, by_time
+from robochoc.sniffer.trace import Trace
+from robochoc.sniffer.window import NoFile, Window
 
 EVENTS, OUTCOME = told()
 QUICK = settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -15,7 +15,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lxml import etree
 
-from robochoc.expression import Apply, Constant, Expression, Name, text
 from robochoc.formats import (
     PREDEFINED,
     Diagnostic,
@@ -26,7 +25,8 @@ from robochoc.formats import (
     robot_xml,
     write_atomically,
 )
-from robochoc.problem import (
+from robochoc.model.expression import Apply, Constant, Expression, Name, text
+from robochoc.model.problem import (
     INFINITE,
     Child,
     Constraint,

@@ -12,7 +12,7 @@ from authorities import Clock, identity_of
 from robochoc.authority.authority import Authority
 from robochoc.authority.certificates import new_key, signing_request
 from robochoc.authority.registry import Right, Role
-from robochoc.communication.network.gate import Gate
+from robochoc.communication.network.connection_policy import Gate
 from robochoc.communication.network.router import Router
 
 Rules = tuple[dict[str, tuple[str, ...]], Collection[str] | None]

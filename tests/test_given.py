@@ -14,14 +14,14 @@ from cost_problems import random_complex_cost_team, random_cost_team
 from pkc_problems import random_pkc_team
 from problems import random_team, team_of
 
-from robochoc.change import without
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import AnyEvent, Given
-from robochoc.observers.given import BadGiven, TeamReader, TeamWriter, brief_of, void_of
-from robochoc.orders import CannotTurn, Order, in_order
-from robochoc.problem import Constraint, Domain, Kind, Relation, Robot, Semantics, Team, Variable
+from robochoc.journal.events import AnyEvent, Given
+from robochoc.journal.given import BadGiven, TeamReader, TeamWriter, brief_of, void_of
+from robochoc.model.change import without
+from robochoc.model.orders import CannotTurn, Order, in_order
+from robochoc.model.problem import Constraint, Domain, Kind, Relation, Robot, Semantics, Team, Variable
+from robochoc.solver.agent_problem import Brief
 from robochoc.solver.explanation import void
-from robochoc.solver.part import Brief
 
 FAMILIES = (
     random_team,

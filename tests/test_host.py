@@ -6,14 +6,14 @@ import pytest
 from problems import team_of
 
 from robochoc.communication.host import BadMessage, Host
-from robochoc.message import Envelope, Message, encode
-from robochoc.observers.events import AnyEvent, Concluded, Decided, Received, Sent, Settled
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.journal.events import AnyEvent, Concluded, Decided, Received, Sent, Settled
+from robochoc.model.message import Envelope, Message, encode
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.abt import ABT, AddLink, Nogood, Ok
 from robochoc.protocols.first_fit import Placed
 from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.part import parts
 
 DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2)))
 

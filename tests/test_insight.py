@@ -15,17 +15,17 @@ from problems import random_team, team_of
 from replays import in_text, random_run, recorded, with_events
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import Concluded, Sent, Settled, actor
-from robochoc.problem import Constraint, Team
+from robochoc.journal.events import Concluded, Sent, Settled, actor
+from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.findings import Best
-from robochoc.registry import protocol_named, protocol_names
 from robochoc.replay import CannotReplay, Means, State, states_of
 from robochoc.replay.glance import LONGEST, glance
-from robochoc.replay.look import MOST_VALUES
+from robochoc.replay.inspection import MOST_VALUES
 from robochoc.replay.phrases import Phrases
 from robochoc.replay.reasons import MOST_BACKTRACKS, MOST_REASONS
-from robochoc.run import Options, Runtime
+from robochoc.run.orchestrator import Options, Runtime
+from robochoc.run.registry import protocol_named, protocol_names
 
 SIMULATED = Options(protocol="abt", runtime=Runtime.SIMULATOR)
 

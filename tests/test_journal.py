@@ -19,8 +19,9 @@ from hypothesis import strategies as st
 from problems import team_of
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import AnyEvent, Began, Decided, Given, Heard, Improved, Received, Refused, Sent, Settled
-from robochoc.observers.journal import (
+from robochoc.journal.blocks import LARGEST_BLOCK
+from robochoc.journal.events import AnyEvent, Began, Decided, Given, Heard, Improved, Received, Refused, Sent, Settled
+from robochoc.journal.journal import (
     BadJournal,
     Follower,
     Header,
@@ -33,11 +34,10 @@ from robochoc.observers.journal import (
     metrics_of,
     read_journal,
 )
-from robochoc.observers.journal_blocks import LARGEST_BLOCK
-from robochoc.observers.objective import Objective
-from robochoc.outcome import Outcome, Verdict
-from robochoc.problem import Constraint, Relation, Semantics
-from robochoc.run import Options, Runtime, solve
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics
+from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.verification.objective import Objective
 
 HEADER = Header(team="four", protocol="abt", runtime="simulator", seed=0)
 OUTCOME = Outcome("four", "abt", "simulator", 0, Verdict.SOLUTION)

@@ -16,16 +16,16 @@ import sexpdata
 from click.testing import CliRunner, Result
 from recorded import recorded
 
-from robochoc.cli.commands import cli
-from robochoc.cli.failure import INVALID, USAGE
-from robochoc.communication.acl import parse
-from robochoc.observers.events import AnyEvent, Began, Decided, Received, Sent, Settled
-from robochoc.observers.journal import Header, Journal, Recorder, read_journal
-from robochoc.view.sniffer.columns import NOT_YET
-from robochoc.view.sniffer.export import MOST_ARROWS, drawable, mermaid
-from robochoc.view.sniffer.feed import Feed
-from robochoc.view.sniffer.patterns import matching, patterns_in
-from robochoc.view.sniffer.trace import Trace
+from robochoc.cli.group import cli
+from robochoc.cli.reports.failures import INVALID, USAGE
+from robochoc.journal.events import AnyEvent, Began, Decided, Received, Sent, Settled
+from robochoc.journal.journal import Header, Journal, Recorder, read_journal
+from robochoc.sniffer.acl import parse
+from robochoc.sniffer.columns import NOT_YET
+from robochoc.sniffer.export import MOST_ARROWS, drawable, mermaid
+from robochoc.sniffer.feed import Feed
+from robochoc.sniffer.patterns import matching, patterns_in
+from robochoc.sniffer.trace import Trace
 
 NAME = "R;#1\nend"
 
@@ -232,7 +232,7 @@ def test_with_the_refusal_comes_a_command_that_works(chosen: tuple[str, ...], tm
 
 def test_a_diagram_of_long_names_is_cut_until_it_can_be_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     feed = Feed(Trace.of(recorded("mgm")))
-    monkeypatch.setattr("robochoc.view.sniffer.export.MOST_CHARACTERS", 3_000)
+    monkeypatch.setattr("robochoc.sniffer.export.MOST_CHARACTERS", 3_000)
     part = drawable(feed, range(len(feed.trace.messages.t)))
     assert 20 < len(part) <= MOST_ARROWS / 4
     assert part[0] == 0
@@ -263,7 +263,7 @@ def test_a_page_holds_the_whole_run_and_shows_some_robots_at_first(file: Path) -
 
 
 def test_a_page_that_no_browser_could_open_is_refused(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robochoc.cli.journal.MOST_IN_PAGE", 10)
+    monkeypatch.setattr("robochoc.cli.commands.journal.MOST_IN_PAGE", 10)
     result = journal("export", file, "--format", "html")
     assert result.exit_code == USAGE
     assert "too many for one page: at most 10 (look at them" in result.output

@@ -17,12 +17,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robochoc.observers.events import AnyEvent, Began, Decided, Lost, Received, Sent, Settled
-from robochoc.observers.journal import BadJournal, Follower, Header, Line, Recorder, lines_of, read_journal
-from robochoc.observers.journal_blocks import BEGINNING, LARGEST_BLOCK, PREAMBLE, framed
-from robochoc.observers.journal_columns import BadBlock, columns_of, entries_of
-from robochoc.observers.journal_entries import Ended
-from robochoc.outcome import Outcome, Verdict
+from robochoc.journal.blocks import BEGINNING, LARGEST_BLOCK, PREAMBLE, framed
+from robochoc.journal.columns import BadBlock, columns_of, entries_of
+from robochoc.journal.entries import Ended
+from robochoc.journal.events import AnyEvent, Began, Decided, Lost, Received, Sent, Settled
+from robochoc.journal.journal import BadJournal, Follower, Header, Line, Recorder, lines_of, read_journal
+from robochoc.model.outcome import Outcome, Verdict
 
 HEADER = Header(team="four", protocol="abt", runtime="simulator", seed=0)
 CORRUPTIONS = 10_000

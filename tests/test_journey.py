@@ -9,15 +9,14 @@ from pathlib import Path
 from problems import team_of
 from test_epochs import differ
 
-from robochoc.change import changed
 from robochoc.communication.run_result import RunResult
-from robochoc.communication.schedule import Concurrent
 from robochoc.communication.session import Epoch, Session
-from robochoc.communication.simulator import Simulation
-from robochoc.epochs import Journey, Played
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats import read_team, write_team
-from robochoc.outcome import Metrics, Verdict
-from robochoc.problem import (
+from robochoc.model.change import changed
+from robochoc.model.outcome import Metrics, Verdict
+from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
@@ -36,7 +35,8 @@ from robochoc.problem import (
     Variable,
 )
 from robochoc.protocols.dynabt import DynABT
-from robochoc.run import Options, Runtime, solve
+from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run.scenario import Journey, Played
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import void
 

@@ -8,14 +8,14 @@ from dataclasses import replace
 import pytest
 from problems import ON_ONE_MACHINE
 
-from robochoc.cli.report import report
+from robochoc.cli.reports.outcome import report
 from robochoc.formats.result import read_result, result_json
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import AnyEvent, Sent
-from robochoc.observers.journal import metrics_of
-from robochoc.options import Options, Runtime, Withdrawal
-from robochoc.outcome import Metrics
-from robochoc.run import solve
+from robochoc.journal.events import AnyEvent, Sent
+from robochoc.journal.journal import metrics_of
+from robochoc.model.outcome import Metrics
+from robochoc.run.options import Options, Runtime, Withdrawal
+from robochoc.run.orchestrator import solve
 
 
 @pytest.mark.parametrize("runtime", ON_ONE_MACHINE)

@@ -11,9 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robochoc.communication.control import Counters, Events, Failed, Ready, Wave
-from robochoc.communication.network.letters import LARGEST_LETTER, MASTER, Letter, Letters, Opened, Refused, TooLarge
-from robochoc.communication.network.profile import Profile
-from robochoc.communication.network.words import (
+from robochoc.communication.network.control_messages import (
     LATEST,
     Account,
     Ask,
@@ -36,9 +34,11 @@ from robochoc.communication.network.words import (
     Welcome,
     Word,
 )
-from robochoc.observers.events import Received
-from robochoc.outcome import Metrics, Place
-from robochoc.problem import Kind
+from robochoc.communication.network.framing import LARGEST_LETTER, MASTER, Letter, Letters, Opened, Refused, TooLarge
+from robochoc.communication.network.profile import Profile
+from robochoc.journal.events import Received
+from robochoc.model.outcome import Metrics, Place
+from robochoc.model.problem import Kind
 from robochoc.protocols.findings import Best, Findings, Trail
 
 PROFILE = Profile("R1", Kind.DISCSP, ("R0",), (), {"X": ((1, 3), (5, 5))}, {}, 1, 0, ("/R1/goal",))

@@ -11,13 +11,13 @@ from complex_problems import random_complex_team
 from cost_problems import random_complex_cost_team, random_cost_team
 from problems import random_team, team_of
 
-from robochoc.message import Value
-from robochoc.problem import INFINITE, Constraint, Relation, Robot, Semantics, Team
+from robochoc.model.message import Value
+from robochoc.model.problem import INFINITE, Constraint, Relation, Robot, Semantics, Team
 from robochoc.solver import compiled
+from robochoc.solver.agent_problem import Brief, Part, parts
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain
-from robochoc.solver.part import Brief, Part, parts
 
 EQUAL = Relation("R", 2, Semantics.SUPPORTS, ((1, 1), (2, 2)))
 ONE = Relation("R", 2, Semantics.SUPPORTS, ((1, 1),))

@@ -10,10 +10,10 @@ import pytest
 from loose_problems import agrees, every_order, loose_team, turned_interface
 from test_conformance import random_schedule
 
-from robochoc.orders import Order
-from robochoc.outcome import Verdict
-from robochoc.registry import protocol_named, protocol_names
-from robochoc.run import Options, Runtime
+from robochoc.model.orders import Order
+from robochoc.model.outcome import Verdict
+from robochoc.run.orchestrator import Options, Runtime
+from robochoc.run.registry import protocol_named, protocol_names
 
 EVERY_PROTOCOL = pytest.mark.parametrize("protocol", protocol_names())
 FIRST, MANY = 3, 2000

@@ -13,12 +13,12 @@ import msgspec
 import pytest
 from faults import PROGRAM, Run, running
 
-from robochoc.change import without
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.outcome import Outcome, Verdict
-from robochoc.problem import Team
-from robochoc.run import Options, Runtime, solve
+from robochoc.model.change import without
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.problem import Team
+from robochoc.run.orchestrator import Options, Runtime, solve
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 

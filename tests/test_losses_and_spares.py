@@ -11,13 +11,12 @@ from test_abt import triangle
 from test_change import named
 from test_changed_files import writable
 
-from robochoc.change import changed, changed_by, without
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.session import Epoch, Session
-from robochoc.epochs import Journey
 from robochoc.formats import PREDEFINED, read_team, write_team
-from robochoc.outcome import Metrics, Verdict
-from robochoc.problem import (
+from robochoc.model.change import changed, changed_by, without
+from robochoc.model.outcome import Metrics, Verdict
+from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
@@ -29,6 +28,7 @@ from robochoc.problem import (
     RemoveValue,
     Team,
 )
+from robochoc.run.scenario import Journey
 from robochoc.solver.compiled_team import CompiledTeam
 
 

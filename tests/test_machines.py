@@ -13,9 +13,9 @@ from machines import PAIR, TRIANGLE, Program, Site, ended, one_line, written
 from program import ROOT
 
 from robochoc.formats import read_team
-from robochoc.observers.checker import objections
-from robochoc.outcome import Verdict
-from robochoc.run import Options, Runtime, solve
+from robochoc.model.outcome import Verdict
+from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.verification.checker import objections
 
 FOUR = ROOT / "instances" / "queens3d-4"
 SEVEN = ROOT / "instances" / "queens3d-7"

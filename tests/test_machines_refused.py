@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from machines import LONG_S, LOOPBACK, PAIR, SOON_S, Site, ended, one_line, taken, written
 from program import ROOT
 
-from robochoc.cli.commands import cli
+from robochoc.cli.group import cli
 from robochoc.formats import write_team
 
 # Who is turned away

@@ -12,8 +12,8 @@ from click.testing import CliRunner
 from entries import entries_of
 from machines import PAIR, TRIANGLE, Program, Site, ended, one_line, wait_until, written
 
-from robochoc.cli.commands import cli
-from robochoc.observers.journal import read_journal
+from robochoc.cli.group import cli
+from robochoc.journal.journal import read_journal
 
 OBSERVER = ("--role", "observer")
 SNIFFER = (*OBSERVER, "--may", "sniff")

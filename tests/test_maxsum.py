@@ -15,9 +15,9 @@ from problems import team_of
 
 import robochoc.protocols.maxsum
 from robochoc.communication.host import BadSettings, settings_of
-from robochoc.communication.schedule import Concurrent
-from robochoc.outcome import Verdict
-from robochoc.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols import maxsum_factor
 from robochoc.protocols.cycles import Domain
 from robochoc.protocols.maxsum import MaxSum, MaxSumSettings, Q, R

@@ -14,9 +14,9 @@ from sparse_teams import profiles_of
 from robochoc.communication.network.members import Members, NotTaken
 from robochoc.communication.network.profile import Profile, Ranges
 from robochoc.formats import PREDEFINED
-from robochoc.problem import Constraint, Kind, Predicate
+from robochoc.model.problem import Constraint, Kind, Predicate
 from robochoc.protocols.traits import Traits
-from robochoc.solver.part import NO_BRIEF
+from robochoc.solver.agent_problem import NO_BRIEF
 
 TRIANGLE = [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in (("A", "B"), ("A", "C"), ("B", "C"))]
 PROFILES = profiles_of(team_of(dict.fromkeys("ABC", (1, 2)), TRIANGLE))

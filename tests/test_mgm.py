@@ -12,7 +12,7 @@ from courses import any_schedule, burden_of, course_of, domains_of, is_optimal, 
 from problems import team_of
 
 import robochoc.protocols.mgm
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.cycles import Value
 from robochoc.protocols.mgm import MGM, Gain
 

@@ -13,9 +13,9 @@ from problems import team_of
 
 import robochoc.protocols.mgm2
 from robochoc.communication.host import BadSettings, settings_of
-from robochoc.communication.schedule import Concurrent
-from robochoc.message import Message
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.model.message import Message
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.cycles import Domain, Value
 from robochoc.protocols.mgm import MGM, Gain
 from robochoc.protocols.mgm2 import MGM2, Accept, Go, Offer, Reject

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.expression import Apply, Constant, Name
-from robochoc.outcome import Epoch, Outcome, Verdict
-from robochoc.problem import AddAgent, Domain, Event, Robot, Team, Topic, Variable
-from robochoc.ros.crew import Craft, crafts_of
-from robochoc.ros.layout import Axis, field_of
-from robochoc.ros.mission import VAST_M, Mission, mission_of
+from robochoc.flight.crafts import Craft, crafts_of
+from robochoc.flight.layout import Axis, field_of
+from robochoc.flight.mission import VAST_M, Mission, mission_of
+from robochoc.model.expression import Apply, Constant, Name
+from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.model.problem import AddAgent, Domain, Event, Robot, Team, Topic, Variable
 
 
 def robot(name: str, z: str, x: int, y: int, *, times: int = 1) -> Robot:

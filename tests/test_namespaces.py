@@ -16,8 +16,8 @@ from problems import PREDICATES, team_of
 from program import ROOT
 
 from robochoc.formats import write_team
-from robochoc.problem import Constraint
-from robochoc.run import Options, Runtime, solve
+from robochoc.model.problem import Constraint
+from robochoc.run.orchestrator import Options, Runtime, solve
 
 WHY_NOT = why_not()
 pytestmark = pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT or "there are namespaces")

@@ -13,20 +13,20 @@ from pkc_problems import random_pkc_team
 from problems import random_team, solutions
 from test_complex_teams import compiled_by_hand
 
-from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.local import LocalNetwork
-from robochoc.communication.robot_link import RobotsLost
+from robochoc.communication.network.settings import Conditions
+from robochoc.communication.processes.robot_link import RobotsLost
 from robochoc.communication.run_result import RunResult
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.checker import cost, objections
-from robochoc.observers.events import AnyEvent, Decided, Lost, Received, Refused, Registered, Sent
-from robochoc.outcome import Verdict
-from robochoc.problem import INFINITE, Team
+from robochoc.journal.events import AnyEvent, Decided, Lost, Received, Refused, Registered, Sent
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.findings import NOTHING
-from robochoc.registry import protocol_named
+from robochoc.run.registry import protocol_named
+from robochoc.solver.agent_problem import Brief
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooMuch
-from robochoc.solver.part import Brief
+from robochoc.verification.checker import cost, objections
 
 TIMEOUT_S = 60
 FEW = (("afc-ng", ("signed", "sealed")), ("awc", ()), ("dynabt", ("signed",)))

@@ -20,15 +20,15 @@ from robochoc.authority.certificates import leaf_certificate, moment, new_key
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Conclusion
 from robochoc.communication.network.access import letter_key
+from robochoc.communication.network.control_messages import Ask, Register, Said
+from robochoc.communication.network.framing import LARGEST_LETTER, MASTER
 from robochoc.communication.network.inbox import Arrived
-from robochoc.communication.network.letters import LARGEST_LETTER, MASTER
-from robochoc.communication.network.post import CannotConnect, Post
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot import NetworkRobot
 from robochoc.communication.network.router import Router
-from robochoc.communication.network.words import Ask, Register, Said
-from robochoc.message import encode
-from robochoc.outcome import Verdict
+from robochoc.communication.network.transport import CannotConnect, Post
+from robochoc.model.message import encode
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot

@@ -9,11 +9,11 @@ from held import CHAIN
 from network_runs import SLICE_S, NetworkRun
 from relays import Relay
 
+from robochoc.communication.network.control_messages import Bye, Joined, Leave, Register, Welcome
+from robochoc.communication.network.framing import MASTER, Letters, Opened
 from robochoc.communication.network.inbox import Arrived
-from robochoc.communication.network.letters import MASTER, Letters, Opened
-from robochoc.communication.network.post import Post
 from robochoc.communication.network.profile import profile_of
-from robochoc.communication.network.words import Bye, Joined, Leave, Register, Welcome
+from robochoc.communication.network.transport import Post
 
 
 def test_robots_that_are_away_for_a_moment_hear_the_masters_farewell(tmp_path: Path) -> None:

@@ -25,17 +25,17 @@ from program import ROOT
 from relays import Relay
 
 from robochoc.authority.authority import Authority
-from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.manner import Manner
-from robochoc.communication.network.post import Post
 from robochoc.communication.network.robot import Ending, NetworkRobot
-from robochoc.communication.robot_link import RobotsLost
+from robochoc.communication.network.settings import Conditions
+from robochoc.communication.network.transport import Post
+from robochoc.communication.processes.robot_link import RobotsLost
 from robochoc.communication.run_result import RunResult
-from robochoc.observers.events import AnyEvent, Lost, Received, Sent
-from robochoc.outcome import Verdict
+from robochoc.journal.events import AnyEvent, Lost, Received, Sent
+from robochoc.model.outcome import Verdict
+from robochoc.solver.agent_problem import Brief
 from robochoc.solver.compiled_team import CompiledRobot
-from robochoc.solver.part import Brief
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 

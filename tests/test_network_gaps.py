@@ -17,15 +17,15 @@ from robochoc.authority.admission import Household
 from robochoc.authority.registry import Right, Role
 from robochoc.communication.control import Failed
 from robochoc.communication.network.access import ALL, letter_key
-from robochoc.communication.network.conditions import LEASE_MS, Conditions
+from robochoc.communication.network.control_messages import Ask, Register, Said
+from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.inbox import Arrived, Missed
-from robochoc.communication.network.letters import MASTER
-from robochoc.communication.network.post import Post
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.router import Router
-from robochoc.communication.network.words import Ask, Register, Said
-from robochoc.communication.robot_link import RobotsLost
-from robochoc.outcome import Verdict
+from robochoc.communication.network.settings import LEASE_MS, Conditions
+from robochoc.communication.network.transport import Post
+from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.model.outcome import Verdict
 
 FAR = 5000
 WATCHER = "Watcher"

@@ -11,17 +11,17 @@ from complex_problems import complex_team
 from held import Held
 from loose_problems import untold_interface
 
-from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.local import LocalNetwork
-from robochoc.epochs import Journey, Played
+from robochoc.communication.network.settings import Conditions
 from robochoc.formats import PREDEFINED
-from robochoc.observers.checker import objections
-from robochoc.observers.events import AnyEvent, Lost, Sent
-from robochoc.outcome import Verdict
-from robochoc.problem import Constraint
-from robochoc.registry import protocol_named
+from robochoc.journal.events import AnyEvent, Lost, Sent
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint
+from robochoc.run.registry import protocol_named
+from robochoc.run.scenario import Journey, Played
+from robochoc.solver.agent_problem import Brief
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.part import Brief
+from robochoc.verification.checker import objections
 
 DIFFER = PREDEFINED["ne"]
 TEAM = complex_team(

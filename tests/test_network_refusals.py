@@ -9,9 +9,9 @@ from clocks import working
 from robochoc.communication.control import Conclusion, Counters, Ready
 from robochoc.communication.network.refusals import KINDS, LONGEST, WHO, Refusals
 from robochoc.communication.network.router import Log, Refusal
-from robochoc.communication.network.tally import Tally, is_of
-from robochoc.observers.events import Decided, Received, Refused
-from robochoc.outcome import Verdict
+from robochoc.communication.network.search_state import Tally, is_of
+from robochoc.journal.events import Decided, Received, Refused
+from robochoc.model.outcome import Verdict
 
 
 def test_what_a_robot_tells_of_others() -> None:

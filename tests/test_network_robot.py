@@ -11,12 +11,7 @@ from lone_robot import LEAVE, UNPROVEN, differ, ok, played, task
 from offices import RUN, Scripted
 
 from robochoc.communication.control import Counters, Failed, Pause, Ready, Wave
-from robochoc.communication.network.inbox import Arrived, Item, Presence, Woken
-from robochoc.communication.network.letters import MASTER, Letter, Letters
-from robochoc.communication.network.manner import Manner
-from robochoc.communication.network.post import Post
-from robochoc.communication.network.robot import Ending, NetworkRobot
-from robochoc.communication.network.words import (
+from robochoc.communication.network.control_messages import (
     Account,
     Bye,
     Checked,
@@ -36,6 +31,11 @@ from robochoc.communication.network.words import (
     Welcome,
     Word,
 )
+from robochoc.communication.network.framing import MASTER, Letter, Letters
+from robochoc.communication.network.inbox import Arrived, Item, Presence, Woken
+from robochoc.communication.network.manner import Manner
+from robochoc.communication.network.robot import Ending, NetworkRobot
+from robochoc.communication.network.transport import Post
 from robochoc.protocols.abt import ABT
 from robochoc.solver.compiled_team import CompiledRobot
 

@@ -11,13 +11,7 @@ from lone_robot import LEAVE, UNPROVEN, differ, ok, played, task
 from offices import RUN, Scripted
 
 from robochoc.communication.control import Failed, Pause, Ready
-from robochoc.communication.network.inbox import Arrived, Item, Missed
-from robochoc.communication.network.letters import MASTER, Letter, Letters
-from robochoc.communication.network.post import Post
-from robochoc.communication.network.quotas import Kept, Share
-from robochoc.communication.network.robot import Ending, NetworkRobot
-from robochoc.communication.network.shared import PredicateRecord, SharedRecord
-from robochoc.communication.network.words import (
+from robochoc.communication.network.control_messages import (
     Account,
     Bye,
     Checked,
@@ -34,7 +28,13 @@ from robochoc.communication.network.words import (
     Welcome,
     Word,
 )
-from robochoc.problem import INFINITE, Model
+from robochoc.communication.network.framing import MASTER, Letter, Letters
+from robochoc.communication.network.inbox import Arrived, Item, Missed
+from robochoc.communication.network.quotas import Kept, Share
+from robochoc.communication.network.robot import Ending, NetworkRobot
+from robochoc.communication.network.shared import PredicateRecord, SharedRecord
+from robochoc.communication.network.transport import Post
+from robochoc.model.problem import INFINITE, Model
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.awc import AWC
 from robochoc.protocols.protocol import Protocol

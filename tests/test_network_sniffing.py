@@ -19,16 +19,16 @@ from clocks import waiting
 from network_runs import NetworkRun
 
 from robochoc.communication.network.access import ALL, journal_key
+from robochoc.communication.network.control_messages import Sniff, Sniffable
+from robochoc.communication.network.framing import MASTER, Letters
 from robochoc.communication.network.inbox import Arrived
-from robochoc.communication.network.letters import MASTER, Letters
-from robochoc.communication.network.post import CannotConnect
-from robochoc.communication.network.publication import ANSWERED_AT_MOST, Publication, piece_in, question
-from robochoc.communication.network.words import Sniff, Sniffable
-from robochoc.machines.consult import NoAnswer
-from robochoc.machines.place import Place
-from robochoc.machines.sniff import Followed, receive
-from robochoc.observers.journal_blocks import BEGINNING, PREAMBLE, framed
-from robochoc.outcome import Verdict
+from robochoc.communication.network.journal_server import ANSWERED_AT_MOST, Publication, piece_in, question
+from robochoc.communication.network.transport import CannotConnect
+from robochoc.journal.blocks import BEGINNING, PREAMBLE, framed
+from robochoc.model.outcome import Verdict
+from robochoc.run.networked.address import Place
+from robochoc.run.networked.consult import NoAnswer
+from robochoc.sniffer.remote import Followed, receive
 
 BLOCK = 1000
 FLOOD = 10 * ANSWERED_AT_MOST
@@ -39,8 +39,8 @@ import json, os, signal, sys, time
 import zenoh
 from robochoc.authority.identity import Identity, IdentityTexts
 from robochoc.communication.network.access import journal_key
-from robochoc.communication.network.post import Post
-from robochoc.communication.network.publication import question
+from robochoc.communication.network.transport import Post
+from robochoc.communication.network.journal_server import question
 
 texts, endpoint, run = json.loads(sys.stdin.readline())
 post = Post(endpoint, Identity.of(IdentityTexts(*map(str.encode, texts))), watch=())

@@ -12,11 +12,11 @@ from pkc_problems import random_pkc_team
 from problems import known_to_both, random_team, solutions
 
 from robochoc.authority.admission import Household
-from robochoc.outcome import Verdict
-from robochoc.problem import INFINITE
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
 from robochoc.protocols.abt import ABT
-from robochoc.registry import protocol_named, protocol_names
-from robochoc.solver.part import Brief
+from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.solver.agent_problem import Brief
 
 
 @pytest.mark.parametrize("protocol", ["abt", "afc-ng", "awc", "agile-abt", "afc-tree"])

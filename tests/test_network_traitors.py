@@ -11,16 +11,16 @@ import pytest
 from held import CHAIN, TRIANGLE, Held
 from network_runs import NetworkRun, letter
 
-from robochoc.communication.network.conditions import Conditions
+from robochoc.communication.network.control_messages import Copies, Denied, Register, Said, Word
+from robochoc.communication.network.framing import MASTER, Letters
 from robochoc.communication.network.inbox import Arrived
-from robochoc.communication.network.letters import MASTER, Letters
-from robochoc.communication.network.post import Post
 from robochoc.communication.network.profile import Profile, profile_of
-from robochoc.communication.network.words import Copies, Denied, Register, Said, Word
-from robochoc.communication.robot_link import RobotsLost
-from robochoc.message import encode
-from robochoc.outcome import Verdict
-from robochoc.problem import Kind
+from robochoc.communication.network.settings import Conditions
+from robochoc.communication.network.transport import Post
+from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.model.message import encode
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Kind
 from robochoc.protocols.abt import Ok
 
 # Revoked in the middle of a run

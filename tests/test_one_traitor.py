@@ -13,17 +13,16 @@ from offices import Office
 from problems import PREDICATES, known_to_both, team_of
 from traitors import Lie, changed
 
-from robochoc.cli.report import report
+from robochoc.cli.reports.outcome import report
 from robochoc.communication.control import Conclusion, Counters, Ready
+from robochoc.communication.network.control_messages import Account, Exchanged, Judged
 from robochoc.communication.network.plausibility import Declared
-from robochoc.communication.network.tally import Tally
-from robochoc.communication.network.words import Account, Exchanged, Judged
-from robochoc.communication.processes import ProcessesRun
-from robochoc.communication.robot_link import RobotsLost
+from robochoc.communication.network.search_state import Tally
+from robochoc.communication.processes.processes import ProcessesRun
+from robochoc.communication.processes.robot_link import RobotsLost
 from robochoc.formats.result import read_result, result_json
-from robochoc.machines.lead import claimed
-from robochoc.outcome import ALL_ROBOTS, Metrics, Outcome, Place, Thoroughness, Verdict
-from robochoc.problem import Constraint, Team
+from robochoc.model.outcome import ALL_ROBOTS, Metrics, Outcome, Place, Thoroughness, Verdict
+from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.afc import AFC
 from robochoc.protocols.awc import AWC
@@ -32,7 +31,8 @@ from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.sfb import SFB
 from robochoc.protocols.traits import Traits
-from robochoc.registry import protocol_named, protocol_names
+from robochoc.run.networked.lead import claimed
+from robochoc.run.registry import protocol_named, protocol_names
 
 _DIFFERENT = [Constraint("C", PREDICATES[0], pair, pair) for pair in (("A", "B"), ("B", "C"))]
 CHAIN = team_of(dict.fromkeys("ABC", (1, 2)), _DIFFERENT)

@@ -9,7 +9,7 @@ import traitors
 from machines import Program, Site, ended, written
 from problems import PREDICATES, team_of
 
-from robochoc.problem import Constraint, Team
+from robochoc.model.problem import Constraint, Team
 
 SLOW = pytest.mark.slow
 PAIRS = [Constraint("C", PREDICATES[0], pair, pair) for pair in (("A", "B"), ("B", "C"))]

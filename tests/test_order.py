@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from problems import random_team, teams
 
-from robochoc.problem import Team
+from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder, PseudoTree
+from robochoc.solver.agent_problem import Part, parts
 from robochoc.solver.compile import Compiler
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.part import Part, parts
 
 EVERY = settings(max_examples=50, deadline=None)
 complex_teams = st.integers(0, 2**32).map(lambda seed: random_complex_team(Random(seed)))

@@ -10,11 +10,11 @@ from entries import entries_of
 from program import robochoc
 from test_orders import graph_team, pkc_team
 
-from robochoc.cli.order import NAMES
+from robochoc.cli.options.order import NAMES
 from robochoc.formats import InvalidInput, read_team, write_team
 from robochoc.formats.order import read_order
-from robochoc.observers.journal import read_journal
-from robochoc.orders import Order
+from robochoc.journal.journal import read_journal
+from robochoc.model.orders import Order
 
 
 def test_the_command_line_knows_every_order() -> None:

@@ -11,17 +11,17 @@ from problems import random_team, solutions
 from test_complex_teams import compiled_by_hand
 from test_orders import SIMULATED, graph_team, shuffled
 
-from robochoc.communication.schedule import RandomChannels
-from robochoc.communication.simulator import Simulation
-from robochoc.observers.checker import objections
-from robochoc.orders import Order, reordered
-from robochoc.outcome import Verdict
-from robochoc.problem import (
+from robochoc.communication.simulator.schedule import RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.orders import Order, reordered
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import (
     Team,
 )
-from robochoc.registry import protocol_named
-from robochoc.run import solve
+from robochoc.run.orchestrator import solve
+from robochoc.run.registry import protocol_named
 from robochoc.solver.central import Judge, Judgement
+from robochoc.verification.checker import objections
 
 
 def test_robots_solve_in_the_order_they_are_given() -> None:

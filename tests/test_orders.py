@@ -15,11 +15,11 @@ from problems import random_team, solutions, team_of
 
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.orders import CannotTurn, Order, in_order, neighbours, order_of, reordered
-from robochoc.priorities import natural
-from robochoc.problem import Child, Constraint, Event, Model, Parent, Predicate, Relation, Robot, Semantics, Team
+from robochoc.model.orders import CannotTurn, Order, in_order, neighbours, order_of, reordered
+from robochoc.model.priorities import natural
+from robochoc.model.problem import Child, Constraint, Event, Model, Parent, Predicate, Relation, Robot, Semantics, Team
 from robochoc.protocols.order import PseudoTree
-from robochoc.run import Options, Runtime, solve
+from robochoc.run.orchestrator import Options, Runtime, solve
 from robochoc.solver.encoding import Unsupported
 
 DIFFER = Relation("differ", 2, Semantics.CONFLICTS, ((1, 1), (2, 2)))

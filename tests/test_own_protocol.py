@@ -21,9 +21,9 @@ from problems import team_of
 
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
-from robochoc.registry import UnknownProtocol, protocol_named, protocol_names
+from robochoc.run.registry import UnknownProtocol, protocol_named, protocol_names
+from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.part import parts
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / "docs" / "examples" / "breakout"
@@ -140,7 +140,7 @@ def _without_seconds(text: str) -> str:
 # What may go wrong
 
 SILENT = """
-from robochoc.message import Message
+from robochoc.model.message import Message
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 

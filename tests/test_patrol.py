@@ -8,10 +8,10 @@ import pytest
 from cost_problems import least_cost
 
 from robochoc.formats import read_team
-from robochoc.outcome import Verdict
-from robochoc.problem import Kind
-from robochoc.registry import protocol_named, protocol_names
-from robochoc.run import Options, Runtime, solve
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Kind
+from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run.registry import protocol_named, protocol_names
 
 PATROL = Path(__file__).parents[1] / "docs" / "examples" / "patrol"
 MINIMISING = [name for name in protocol_names() if protocol_named(name).traits.costs]

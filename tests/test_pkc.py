@@ -15,22 +15,22 @@ from pkc_problems import pkc_parts, random_pkc_team, with_part, with_private_par
 from problems import ON_ONE_MACHINE, random_team, solutions, team_of
 from test_complex_teams import compiled_by_hand
 
-from robochoc.communication.processes import ProcessesRun
-from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
-from robochoc.communication.simulator import Simulation
+from robochoc.communication.processes.processes import ProcessesRun
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats.folder import write_team
 from robochoc.formats.team import read_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.checker import objections
-from robochoc.outcome import Verdict
-from robochoc.problem import Constraint, Model, Relation, Semantics, Team
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Model, Relation, Semantics, Team
 from robochoc.protocols.abt import ABT, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.run import Options, Runtime, Withdrawal, solve
+from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import Unsupported
-from robochoc.solver.part import parts
+from robochoc.verification.checker import objections
 
 SECRETS = Path(__file__).parents[1] / "docs" / "examples" / "secrets"
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.machines.place import DEFAULT_PORT, BadPlace, Place
+from robochoc.run.networked.address import DEFAULT_PORT, BadPlace, Place
 
 
 @pytest.mark.parametrize(

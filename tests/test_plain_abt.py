@@ -7,11 +7,11 @@ from statistics import geometric_mean
 import pytest
 from plain_abt import Conflicts, search
 
-from robochoc.communication.schedule import Concurrent
-from robochoc.communication.simulator import Simulation
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
-from robochoc.outcome import Verdict
-from robochoc.problem import Relation, Team
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Relation, Team
 from robochoc.protocols.abt import ABT
 
 WITHIN = 0.02

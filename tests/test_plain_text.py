@@ -8,12 +8,12 @@ from io import StringIO
 import pytest
 from lone_robot import played
 
-from robochoc.cli.directory import _print_table
-from robochoc.cli.failure import LOST, Failure
+from robochoc.cli.commands.directory import _print_table
+from robochoc.cli.reports.failures import LOST, Failure
+from robochoc.communication.network.control_messages import Joined, Leave
 from robochoc.communication.network.refusals import Refusals
-from robochoc.communication.network.words import Joined, Leave
-from robochoc.plain_text import LONGEST, LONGEST_REASON, on_one_line
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
+from robochoc.system.plain_text import LONGEST, LONGEST_REASON, on_one_line
 
 HOSTILE = {
     "\x1b[2J\x1b[H": r"\x1b[2J\x1b[H",
@@ -85,7 +85,7 @@ def test_the_directorys_table_is_plain(capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_progress_is_plain(monkeypatch: pytest.MonkeyPatch) -> None:
-    from robochoc.cli import progress  # noqa: PLC0415 - of this test alone
+    from robochoc.cli.reports import progress  # noqa: PLC0415 - of this test alone
     from robochoc.communication.run_result import Progress  # noqa: PLC0415 - the same
 
     class Terminal(StringIO):

@@ -17,7 +17,7 @@ from pkc_problems import random_pkc_team
 from problems import random_team
 from sparse_teams import profiles_of, sparse_team
 
-from robochoc.change import without
+from robochoc.communication.network.control_messages import Task
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.profile import (
     LARGEST_WEIGHT,
@@ -35,14 +35,14 @@ from robochoc.communication.network.profile import (
     ranges_of,
     silhouette,
 )
-from robochoc.communication.network.words import Task
 from robochoc.formats import read_team
 from robochoc.formats.extension import MAX_VALUES
-from robochoc.problem import Domain, Kind, Robot, Team
+from robochoc.model.change import without
+from robochoc.model.problem import Domain, Kind, Robot, Team
 from robochoc.protocols.traits import Traits
+from robochoc.solver.agent_problem import NO_BRIEF, Brief, Part, parts
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
 from robochoc.solver.domain import CompiledDomain
-from robochoc.solver.part import NO_BRIEF, Brief, Part, parts
 
 ROOT = Path(__file__).parents[1]
 FILES = [file for place in ("instances", "docs/examples") for file in (ROOT / place).rglob("*.xml")]

@@ -13,10 +13,10 @@ from click.testing import CliRunner, Result
 from program import robochoc
 
 from robochoc import __version__
-from robochoc.cli.commands import cli
-from robochoc.cli.protocols_report import print_table, rows
+from robochoc.cli.group import cli
+from robochoc.cli.reports.protocols import print_table, rows
 from robochoc.protocols import abt
-from robochoc.registry import UnknownProtocol, offer_named, offers, protocol_named, protocol_names
+from robochoc.run.registry import UnknownProtocol, offer_named, offers, protocol_named, protocol_names
 
 WITHOUT_DOCSTRING = """
     from robochoc.protocols.first_fit import FirstFit, Placed

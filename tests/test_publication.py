@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.communication.network import publication as module
-from robochoc.communication.network.chronicle import Chronicle
-from robochoc.communication.network.publication import (
+from robochoc.communication.network import journal_server as module
+from robochoc.communication.network.control_messages import Sniff, Sniffable
+from robochoc.communication.network.journal_server import (
     ANSWERED_AT_MOST,
     PIECE_BYTES,
     SNIFF,
@@ -25,9 +25,9 @@ from robochoc.communication.network.publication import (
     piece_in,
     question,
 )
-from robochoc.communication.network.words import Sniff, Sniffable
-from robochoc.observers.events import AnyEvent, Granted, Refused
-from robochoc.observers.journal_entries import BadJournal
+from robochoc.communication.network.master_events import Chronicle
+from robochoc.journal.entries import BadJournal
+from robochoc.journal.events import AnyEvent, Granted, Refused
 
 RUN = "run"
 

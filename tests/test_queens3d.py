@@ -10,10 +10,10 @@ from problems import ON_ONE_MACHINE
 
 from robochoc.formats import read_robot, read_team, write_team
 from robochoc.generators.queens3d import QueensModel, queens3d
-from robochoc.observers.checker import could_join, objections
-from robochoc.outcome import Verdict
-from robochoc.problem import Constraint
-from robochoc.run import Options, Runtime, Withdrawal, solve
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint
+from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.verification.checker import could_join, objections
 
 FIGURE_2 = Path(__file__).parent / "data" / "figure2" / "Robot3.1.xml"
 INSTANCES = Path(__file__).parents[1] / "instances"

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.communication.queues import LARGEST_BODY, Corrupt, QueueReader, QueueWriter, unpack
+from robochoc.communication.processes.queues import LARGEST_BODY, Corrupt, QueueReader, QueueWriter, unpack
 
 
 @pytest.fixture

@@ -13,8 +13,8 @@ from test_random_csp import constraints, edges, relation
 from robochoc.formats import read_team, write_team
 from robochoc.generators.coloring import coloring
 from robochoc.generators.random_csp import random_csp
-from robochoc.orders import neighbours
-from robochoc.problem import INFINITE, Kind, Semantics, Team
+from robochoc.model.orders import neighbours
+from robochoc.model.problem import INFINITE, Kind, Semantics, Team
 
 
 def test_the_graph_is_model_bs() -> None:

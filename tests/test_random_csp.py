@@ -11,8 +11,8 @@ from program import robochoc
 
 from robochoc.formats import read_team, write_team
 from robochoc.generators.random_csp import random_csp
-from robochoc.orders import neighbours
-from robochoc.problem import Constraint, Relation, Robot, Semantics, Team
+from robochoc.model.orders import neighbours
+from robochoc.model.problem import Constraint, Relation, Robot, Semantics, Team
 
 SIZES = [
     (20, 10, 0.2, 0.6, 38, 60),

@@ -9,11 +9,11 @@ import pytest
 from cost_problems import with_costs
 from problems import team_of
 
-from robochoc import refusals
-from robochoc.options import Options, Runtime, Withdrawal
-from robochoc.problem import Constraint, Kind, Model, Relation, Semantics, Team
-from robochoc.registry import Offer, offers
-from robochoc.run import solve
+from robochoc.model.problem import Constraint, Kind, Model, Relation, Semantics, Team
+from robochoc.run import compatibility as refusals
+from robochoc.run.options import Options, Runtime, Withdrawal
+from robochoc.run.orchestrator import solve
+from robochoc.run.registry import Offer, offers
 from robochoc.solver.encoding import Unsupported
 from robochoc.solver.exact import EXACT
 

@@ -15,12 +15,10 @@ from golden import odd_team
 from problems import random_team
 from replays import as_told, in_binary, in_text, random_run, recorded, with_events
 
-from robochoc.communication.processes import ProcessesRun
-from robochoc.epochs import Announcer, Journey
+from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.message import Message, Value
-from robochoc.observers.events import (
+from robochoc.journal.events import (
     AnyEvent,
     Began,
     Decided,
@@ -31,15 +29,17 @@ from robochoc.observers.events import (
     Settled,
     actor,
 )
-from robochoc.observers.journal import Header, Journal, Recorder, read_journal
+from robochoc.journal.journal import Header, Journal, Recorder, read_journal
+from robochoc.model.message import Message, Value
 from robochoc.protocols.abt import ABT, Nogood
 from robochoc.protocols.dynabt import DynABT
-from robochoc.registry import protocol_names
 from robochoc.replay import CannotReplay, Means, Replayed, replay
-from robochoc.run import Options, Runtime, Withdrawal
+from robochoc.run.orchestrator import Options, Runtime, Withdrawal
+from robochoc.run.registry import protocol_names
+from robochoc.run.scenario import Announcer, Journey
 from robochoc.solver.ace import AceProcess
+from robochoc.solver.agent_problem import Brief
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.part import Brief
 
 FEW, MANY = 2, 100
 FOUR = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.FEWEST)

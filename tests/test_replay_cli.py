@@ -12,14 +12,14 @@ from click.testing import CliRunner, Result
 from replays import recorded, with_events
 from test_replay import FOUR, without_given
 
-from robochoc.cli.commands import cli
-from robochoc.cli.failure import INVALID, LOST, USAGE
+from robochoc.cli.group import cli
+from robochoc.cli.reports.failures import INVALID, LOST, USAGE
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import Sent
-from robochoc.observers.journal import Journal, Recorder, lines_of
-from robochoc.options import Options
-from robochoc.outcome import Verdict
+from robochoc.journal.events import Sent
+from robochoc.journal.journal import Journal, Recorder, lines_of
+from robochoc.model.outcome import Verdict
+from robochoc.run.options import Options
 
 THE_SAME = """\
 queens3d-2: abt, runtime simulator, seed 0

@@ -12,10 +12,10 @@ from replays import recorded
 
 from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.journal import Journal
-from robochoc.options import Options, Runtime, Withdrawal
-from robochoc.outcome import Verdict
+from robochoc.journal.journal import Journal
+from robochoc.model.outcome import Verdict
 from robochoc.replay import replay
+from robochoc.run.options import Options, Runtime, Withdrawal
 
 ALL_FLY = Options(protocol="abt", runtime=Runtime.SIMULATOR)
 

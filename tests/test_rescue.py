@@ -9,9 +9,9 @@ import pytest
 from entries import entries_of
 from program import ROOT, robochoc
 
-from robochoc.change import changed_by
 from robochoc.formats import read_robot, read_team
-from robochoc.problem import AddAgent, AddConstraint, RemoveAgent, RemoveConstraint, RemoveValue
+from robochoc.model.change import changed_by
+from robochoc.model.problem import AddAgent, AddConstraint, RemoveAgent, RemoveConstraint, RemoveValue
 
 RESCUE = ROOT / "docs" / "examples" / "rescue"
 VERDICTS = ["solution", "solution", "solution", "no-solution", "solution"]

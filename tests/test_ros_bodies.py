@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robochoc.ros.layout import Point
-from robochoc.ros.quadrotor.airframe import GRAVITY, HUMMINGBIRD, Airframe, Array
-from robochoc.ros.quadrotor.bodies import Bodies
-from robochoc.ros.quadrotor.control import Controller
-from robochoc.ros.quadrotor.simulation import DT
-from robochoc.ros.routes.timetable import plan
+from robochoc.flight.layout import Point
+from robochoc.flight.quadrotor.airframe import GRAVITY, HUMMINGBIRD, Airframe, Array
+from robochoc.flight.quadrotor.bodies import Bodies
+from robochoc.flight.quadrotor.control import Controller
+from robochoc.flight.quadrotor.simulation import DT
+from robochoc.flight.routes.timetable import plan
 
 CALM = np.zeros((3, 1))
 OFF = np.zeros((4, 1))

@@ -9,17 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robochoc.ros.mission import Goal
-from robochoc.ros.quadrotor.airframe import Array
-from robochoc.ros.quadrotor.course import STOP_S, Course
-from robochoc.ros.quadrotor.flown import quaternions
-from robochoc.ros.quadrotor.nearest import Nearest, Watch
-from robochoc.ros.quadrotor.simulation import DT
-from robochoc.ros.quadrotor.spots import free_spot, gaps
-from robochoc.ros.quadrotor.targets import Hazards, Targets, waits
-from robochoc.ros.quadrotor.wind import Wind
-from robochoc.ros.routes.motion import Limits
-from robochoc.ros.routes.timetable import plan
+from robochoc.flight.mission import Goal
+from robochoc.flight.quadrotor.airframe import Array
+from robochoc.flight.quadrotor.course import STOP_S, Course
+from robochoc.flight.quadrotor.flown import quaternions
+from robochoc.flight.quadrotor.nearest import Nearest, Watch
+from robochoc.flight.quadrotor.simulation import DT
+from robochoc.flight.quadrotor.spots import free_spot, gaps
+from robochoc.flight.quadrotor.targets import Hazards, Targets, waits
+from robochoc.flight.quadrotor.wind import Wind
+from robochoc.flight.routes.motion import Limits
+from robochoc.flight.routes.timetable import plan
 
 
 def test_gusts_have_the_spread_that_is_asked_for_and_come_again_from_their_seed() -> None:

@@ -13,8 +13,8 @@ from clocks import working
 from mcap.writer import CompressionType, Writer
 from ros_recordings import FILES, TOPICS, messages, read, write
 
-from robochoc.problem import Topic
-from robochoc.ros.mission import Drone
+from robochoc.flight.mission import Drone
+from robochoc.model.problem import Topic
 from robochoc.ros.publisher import Publisher
 from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sinks import open_sink

@@ -200,7 +200,7 @@ def test_files_that_cannot_be_written(text: str, monkeypatch: pytest.MonkeyPatch
 
     sink = open_sink(text)
     sink.publish("/a_1/waypoint", POSE, {}, NOW)
-    monkeypatch.setattr("robochoc.files._linked", full)
+    monkeypatch.setattr("robochoc.system.files._linked", full)
     with pytest.raises(SinkFailed, match=f"{place}: No space left"):
         sink.close()
     assert not [*Path().iterdir()]
@@ -248,7 +248,7 @@ os.kill(os.getpid(), 9)
 
 @pytest.mark.parametrize("text", FILES)
 def test_systems_without_unnamed_files(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robochoc.files._linked", lambda *_: None)
+    monkeypatch.setattr("robochoc.system.files._linked", lambda *_: None)
     check(read(write(text, messages(20))), messages(20))
     monkeypatch.delattr(os, "O_TMPFILE")
     check(read(write(text, messages(30))), messages(30))

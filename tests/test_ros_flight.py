@@ -10,16 +10,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from robochoc.flight.flight import Conditions, Failure, Flight, Flown, fly
+from robochoc.flight.layout import Point
+from robochoc.flight.mission import Goal, Mission, mission_of
+from robochoc.flight.quadrotor.airframe import GRAVITY
+from robochoc.flight.quadrotor.bounds import check_length
+from robochoc.flight.quadrotor.simulation import DT, Simulation
+from robochoc.flight.reports import Blocked, OutOfOrder
+from robochoc.flight.routes.timetable import NoWay, TooClose
 from robochoc.generators.queens3d import queens3d
-from robochoc.outcome import Outcome, Verdict
-from robochoc.ros.flight import Conditions, Failure, Flight, Flown, fly
-from robochoc.ros.layout import Point
-from robochoc.ros.mission import Goal, Mission, mission_of
-from robochoc.ros.quadrotor.airframe import GRAVITY
-from robochoc.ros.quadrotor.bounds import check_length
-from robochoc.ros.quadrotor.simulation import DT, Simulation
-from robochoc.ros.reports import Blocked, OutOfOrder
-from robochoc.ros.routes.timetable import NoWay, TooClose
+from robochoc.model.outcome import Outcome, Verdict
 
 IN_THE_WIND = (3.0, 4.0, 0.0)
 PAIR = np.array([[0.0, 0, 0], [2, 0, 0]])

@@ -10,17 +10,17 @@ import pytest
 from problems import ON_ONE_MACHINE
 from program import ROOT
 
-from robochoc.change import changed_by
+from robochoc.flight.flight import Flown
+from robochoc.flight.layout import Point
+from robochoc.flight.mission import Mission
 from robochoc.formats import read_team
-from robochoc.observers.checker import objections
-from robochoc.outcome import Outcome, Verdict
-from robochoc.problem import Event, RemoveAgent, RemoveValue
-from robochoc.ros.flight import Flown
-from robochoc.ros.layout import Point
-from robochoc.ros.loop import Loop, drones_of
-from robochoc.ros.mission import Mission
+from robochoc.model.change import changed_by
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.problem import Event, RemoveAgent, RemoveValue
+from robochoc.ros.closed_loop import Loop, drones_of
 from robochoc.ros.simulated import CannotFly, Flying, NoSuchDrone, Surroundings
-from robochoc.run import Options, Runtime, solve
+from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.verification.checker import objections
 
 HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")
 PLACE: Point = (3.0, 1.0, 3.0)

@@ -15,16 +15,16 @@ from program import ROOT
 from test_epochs import pair
 
 from robochoc.api import Problem
-from robochoc.communication.robot_link import RobotsLost
+from robochoc.communication.processes.robot_link import RobotsLost
 from robochoc.formats import read_team
-from robochoc.outcome import Epoch, Outcome, Verdict
-from robochoc.problem import AddAgent, Event, RemoveAgent, RemoveValue, Team
+from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.model.problem import AddAgent, Event, RemoveAgent, RemoveValue, Team
+from robochoc.ros.closed_loop import Loop, drones_of
 from robochoc.ros.listening import Listening
-from robochoc.ros.loop import Loop, drones_of
 from robochoc.ros.reading import Reading
 from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.source import Heard, Source, SourceFailed
-from robochoc.run import OnLoss, Options, Runtime, Withdrawal, solve
+from robochoc.run.orchestrator import OnLoss, Options, Runtime, Withdrawal, solve
 from robochoc.solver.encoding import Unsupported
 
 HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from robochoc.problem import Topic
-from robochoc.ros.mission import Drone
+from robochoc.flight.mission import Drone
+from robochoc.model.problem import Topic
 from robochoc.ros.names import LONGEST, REPORTS, NameClash, Names, ros_name
 
 TOKEN = re.compile(r"[A-Za-z][A-Za-z0-9_]*")

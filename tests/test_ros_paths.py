@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robochoc.ros.routes.paths import Space
-from robochoc.ros.routes.spacing import Array, gaps, norms
-from robochoc.ros.routes.timetable import Limits, Motion, NoWay, Plan, TooClose, plan
+from robochoc.flight.routes.paths import Space
+from robochoc.flight.routes.spacing import Array, gaps, norms
+from robochoc.flight.routes.timetable import Limits, Motion, NoWay, Plan, TooClose, plan
 
 HZ = 100
 LIMITS = Limits()

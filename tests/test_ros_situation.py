@@ -11,9 +11,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from problems import team_of
 
-from robochoc.change import changed
-from robochoc.expression import Expression, Type, parse
-from robochoc.problem import (
+from robochoc.flight.places import Places
+from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
+from robochoc.model.change import changed
+from robochoc.model.expression import Expression, Type, parse
+from robochoc.model.problem import (
     AddValue,
     Change,
     Domain,
@@ -24,10 +26,8 @@ from robochoc.problem import (
     Topic,
     Variable,
 )
-from robochoc.ros.loop import drones_of
-from robochoc.ros.places import Places
+from robochoc.ros.closed_loop import drones_of
 from robochoc.ros.reading import Reading
-from robochoc.ros.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.ros.situation import LIES_TIMES, Situation
 from robochoc.ros.source import Heard
 

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from offered import offered
 
-from robochoc.outcome import Verdict
-from robochoc.problem import Topic
+from robochoc.flight.mission import Drone, Goal, Leg
+from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Topic
 from robochoc.ros import mappings
 from robochoc.ros.mappings import NoMapping, WaypointMapping, kinds, mapping_for, short_kind
-from robochoc.ros.mission import Drone, Goal, Leg
 from robochoc.ros.names import REPORTS
 from robochoc.ros.publisher import NothingToPublish, Publisher
 from robochoc.ros.recordings.types import UnknownType, types_of
-from robochoc.ros.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.waypoint import Waypoint
 

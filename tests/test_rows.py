@@ -11,8 +11,8 @@ from program import robochoc
 
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.outcome import Metrics, Outcome, Verdict
-from robochoc.run import Options, Runtime, solve
+from robochoc.model.outcome import Metrics, Outcome, Verdict
+from robochoc.run.orchestrator import Options, Runtime, solve
 from robochoc.view.scene import scene_of
 
 

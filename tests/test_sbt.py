@@ -7,15 +7,15 @@ from random import Random
 import pytest
 from problems import random_team, solutions, team_of
 
-from robochoc.communication.schedule import Concurrent
-from robochoc.communication.simulator import Simulation
-from robochoc.message import Message
-from robochoc.outcome import Verdict
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.sbt import CPA, SBT, Backtrack
+from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.part import parts
 
 DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
 

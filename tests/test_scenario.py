@@ -8,9 +8,9 @@ import pytest
 from broken_case import TEAM, write_files
 from broken_scenarios import ADD_9, LATE, ROBOT_9, add, constraint, scenario
 
-from robochoc.change import changed, changed_by
 from robochoc.formats import InvalidInput, find_teams, read_robot, read_team
-from robochoc.problem import (
+from robochoc.model.change import changed, changed_by
+from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,

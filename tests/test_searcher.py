@@ -11,12 +11,7 @@ from sparse_teams import profiles_of
 
 from robochoc.communication.control import Conclusion, Counters, Events, Ready
 from robochoc.communication.host import BadMessage
-from robochoc.communication.network.members import Members
-from robochoc.communication.network.quotas import MIB
-from robochoc.communication.network.searcher import EVENTS_AT_ONCE, Searcher, Surroundings
-from robochoc.communication.network.shared import SharedRecord, record_of
-from robochoc.communication.network.tally import Tally
-from robochoc.communication.network.words import (
+from robochoc.communication.network.control_messages import (
     LATEST,
     Account,
     Checked,
@@ -26,18 +21,23 @@ from robochoc.communication.network.words import (
     Task,
     ToMaster,
 )
+from robochoc.communication.network.members import Members
+from robochoc.communication.network.quotas import MIB
+from robochoc.communication.network.search_state import Tally
+from robochoc.communication.network.searcher import EVENTS_AT_ONCE, Searcher, Surroundings
+from robochoc.communication.network.shared import SharedRecord, record_of
 from robochoc.formats import PREDEFINED
-from robochoc.message import Envelope, encode
-from robochoc.observers.events import Received
-from robochoc.problem import INFINITE, Constraint, Team
+from robochoc.journal.events import Received
+from robochoc.model.message import Envelope, encode
+from robochoc.model.problem import INFINITE, Constraint, Team
 from robochoc.protocols.abt import ABT, Ok
 from robochoc.protocols.awc import AWC
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.syncbb import BestPath, Path, SyncBB
+from robochoc.solver.agent_problem import NO_BRIEF, Brief
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.explanation import held
-from robochoc.solver.part import NO_BRIEF, Brief
 
 
 @dataclass

@@ -15,18 +15,18 @@ from sfb_robots import CHAIN, agents, cpas, introduced, row, rows, team
 
 import robochoc.protocols.sfb
 from robochoc.communication.host import BadSettings, settings_of
-from robochoc.communication.schedule import RandomChannels
-from robochoc.communication.simulator import Simulation
-from robochoc.message import Message, encode
-from robochoc.observers.events import Received, Sent
-from robochoc.outcome import Verdict
-from robochoc.problem import INFINITE
-from robochoc.protocols.alike import one_by_one
+from robochoc.communication.simulator.schedule import RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.journal.events import Received, Sent
+from robochoc.model.message import Message, encode
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import NOTHING
+from robochoc.protocols.interchangeable import one_by_one
 from robochoc.protocols.sfb import LARGEST, SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
+from robochoc.solver.agent_problem import Brief
 from robochoc.solver.encoding import TooMuch
 from robochoc.solver.exact import EXACT
-from robochoc.solver.part import Brief
 
 BOTH = ((1,), (2,))
 

@@ -9,8 +9,8 @@ from agents import told
 from sfb_robots import CHAIN, cpas, introduced, rows, team
 from trees import priced
 
-from robochoc.communication.schedule import RandomChannels
-from robochoc.communication.simulator import Simulation
+from robochoc.communication.simulator.schedule import RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
 from robochoc.protocols.sfb import SFB, Explored
 
 

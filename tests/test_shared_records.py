@@ -27,7 +27,7 @@ from robochoc.communication.network.shared import (
 )
 from robochoc.formats import PREDEFINED
 from robochoc.generators.queens3d import queens3d
-from robochoc.problem import INFINITE, Constraint, Model, Semantics, Team
+from robochoc.model.problem import INFINITE, Constraint, Model, Semantics, Team
 from robochoc.solver.explanation import Known, held, held_below
 
 MAKERS: list[Callable[[Random], Team]] = [

@@ -26,9 +26,9 @@ from faults import PROGRAM, Run, gone_within_s, ignores_ctrl_c, running, wait_un
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
-from robochoc.observers.events import Registered, Sent
-from robochoc.observers.journal import Follower, Line, read_journal
-from robochoc.problem import Team
+from robochoc.journal.events import Registered, Sent
+from robochoc.journal.journal import Follower, Line, read_journal
+from robochoc.model.problem import Team
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 

@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from problems import team_of, teams
 
-from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.generators.queens3d import queens3d
-from robochoc.message import Envelope
-from robochoc.observers.journal import Header, Recorder, lines_of, metrics_of, read_journal
-from robochoc.outcome import Verdict
-from robochoc.problem import Constraint, Relation, Semantics, Team
-from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
+from robochoc.journal.journal import Header, Recorder, lines_of, metrics_of, read_journal
+from robochoc.model.message import Envelope
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.run.orchestrator import Options, Runtime, ScheduleName, Withdrawal, solve
 
 
 @pytest.mark.parametrize(

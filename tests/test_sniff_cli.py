@@ -14,11 +14,11 @@ import pytest
 from faults import PROGRAM, Run, gone_within_s, running, wait_until
 from sniffed import journal_of, told
 
-from robochoc.cli.solve import solve
-from robochoc.cli.solve_settings import SolveCommand
+from robochoc.cli.commands.solve import solve
+from robochoc.cli.options.solve import SolveCommand
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.view.sniffer.viewer import Viewer
+from robochoc.sniffer.viewer import Viewer
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 LONG = ("--timeout", "60")

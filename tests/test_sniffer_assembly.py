@@ -15,14 +15,14 @@ import umsgpack
 from hatchling.builders.wheel import WheelBuilder
 from sniffed import header, journal_of, told
 
-from robochoc.expression import Name
-from robochoc.observers.events import AnyEvent, Began, Decided, Settled
-from robochoc.observers.journal import Journal, read_journal
-from robochoc.outcome import Outcome, Verdict
-from robochoc.problem import Domain, Robot, Topic, Variable
-from robochoc.view.sniffer.moves import Stage, whole_scene
-from robochoc.view.sniffer.page import page
-from robochoc.view.sniffer.trace import Trace
+from robochoc.journal.events import AnyEvent, Began, Decided, Settled
+from robochoc.journal.journal import Journal, read_journal
+from robochoc.model.expression import Name
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.problem import Domain, Robot, Topic, Variable
+from robochoc.sniffer.moves import Stage, whole_scene
+from robochoc.sniffer.page import page
+from robochoc.sniffer.trace import Trace
 
 ROOT = Path(__file__).parents[1]
 HOSTILE = "</script></title><img src=x onerror=alert(1)>"

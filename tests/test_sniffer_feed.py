@@ -11,17 +11,17 @@ import msgspec
 import pytest
 from recorded import fed, recorded
 
-from robochoc.communication.acl import parse
-from robochoc.communication.conversation import Conversation
-from robochoc.observers.events import AnyEvent, Began, Concluded, Given, Improved, Lost, Refused, Sent, Settled
-from robochoc.observers.journal import Header, Journal
-from robochoc.outcome import Epoch, Outcome, Verdict
-from robochoc.registry import protocol_named, protocol_names
-from robochoc.view.sniffer.columns import NOT_YET
-from robochoc.view.sniffer.feed import DETAILS, MOST_EPOCHS, MOST_NOTES, MOST_ROWS, BadRequest, Feed, verdict_of
-from robochoc.view.sniffer.packed import packed_feed
-from robochoc.view.sniffer.speech import PLATFORM
-from robochoc.view.sniffer.trace import Trace
+from robochoc.journal.events import AnyEvent, Began, Concluded, Given, Improved, Lost, Refused, Sent, Settled
+from robochoc.journal.journal import Header, Journal
+from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.sniffer.acl import parse
+from robochoc.sniffer.columns import NOT_YET
+from robochoc.sniffer.conversation import Conversation
+from robochoc.sniffer.feed import DETAILS, MOST_EPOCHS, MOST_NOTES, MOST_ROWS, BadRequest, Feed, verdict_of
+from robochoc.sniffer.packed import packed_feed
+from robochoc.sniffer.speech import PLATFORM
+from robochoc.sniffer.trace import Trace
 
 OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
 HOSTILE = '</script>"); DROP\n\x1b[2J\N{RIGHT-TO-LEFT OVERRIDE}'

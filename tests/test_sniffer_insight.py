@@ -14,17 +14,17 @@ import pytest
 from replays import random_run, recorded
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import Sent, Settled
-from robochoc.observers.journal import Journal, Recorder, lines_of
-from robochoc.options import Options, Runtime, Withdrawal
+from robochoc.journal.events import Sent, Settled
+from robochoc.journal.journal import Journal, Recorder, lines_of
 from robochoc.protocols.sfb import SFB
-from robochoc.registry import protocol_named, protocol_names
 from robochoc.replay.channels import Words
+from robochoc.run.options import Options, Runtime, Withdrawal
+from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.sniffer.feed import STATES, Feed
+from robochoc.sniffer.packed import packed_feed
+from robochoc.sniffer.session import Session
+from robochoc.sniffer.trace import Trace
 from robochoc.solver.ace import AceProcess
-from robochoc.view.sniffer.feed import STATES, Feed
-from robochoc.view.sniffer.packed import packed_feed
-from robochoc.view.sniffer.session import Session
-from robochoc.view.sniffer.trace import Trace
 
 FEWEST = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.FEWEST)
 MAXIMAL = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL)

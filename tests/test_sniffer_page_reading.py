@@ -27,8 +27,8 @@ from sniffer_pages import (
     until,
 )
 
-from robochoc.observers.journal import lines_of
-from robochoc.view.sniffer.session import Session
+from robochoc.journal.journal import lines_of
+from robochoc.sniffer.session import Session
 
 IN_SIGHT = """(m) => {
   const { filter, view, chart, list } = Sniffer.page;

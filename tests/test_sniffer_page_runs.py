@@ -27,10 +27,10 @@ from sniffer_pages import (
     until,
 )
 
-from robochoc.observers.journal import lines_of
-from robochoc.view.sniffer.packed import packed_feed
-from robochoc.view.sniffer.page import page as page_of
-from robochoc.view.sniffer.session import Session
+from robochoc.journal.journal import lines_of
+from robochoc.sniffer.packed import packed_feed
+from robochoc.sniffer.page import page as page_of
+from robochoc.sniffer.session import Session
 
 HOSTILE = "</script><img src=x onerror=document.title='broken'>"
 

@@ -20,14 +20,14 @@ from sniffed import TOKEN, Served, header, journal_of, served, told
 from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
-from robochoc.observers.events import AnyEvent
-from robochoc.observers.journal import lines_of, read_journal
-from robochoc.options import Runtime
-from robochoc.outcome import Outcome
-from robochoc.view.sniffer import following, server
-from robochoc.view.sniffer.feed import columns_of, steps_of
-from robochoc.view.sniffer.session import Session
-from robochoc.view.sniffer.trace import Trace
+from robochoc.journal.events import AnyEvent
+from robochoc.journal.journal import lines_of, read_journal
+from robochoc.model.outcome import Outcome
+from robochoc.run.options import Runtime
+from robochoc.sniffer import following, server
+from robochoc.sniffer.feed import columns_of, steps_of
+from robochoc.sniffer.session import Session
+from robochoc.sniffer.trace import Trace
 
 EVENTS, OUTCOME = told()
 WHOLE = journal_of(EVENTS, OUTCOME)

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from recorded import record, recorded
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import AnyEvent, Began, Decided, Received, Refused, Sent, Settled
-from robochoc.observers.journal import Header, Journal
-from robochoc.run import Options, Runtime, ScheduleName
-from robochoc.view.sniffer.columns import NOT_YET
-from robochoc.view.sniffer.feed import columns_of, steps_of
-from robochoc.view.sniffer.trace import MOST_COUNTED, MOST_NAMES, Trace, TraceTooLarge
+from robochoc.journal.events import AnyEvent, Began, Decided, Received, Refused, Sent, Settled
+from robochoc.journal.journal import Header, Journal
+from robochoc.run.orchestrator import Options, Runtime, ScheduleName
+from robochoc.sniffer.columns import NOT_YET
+from robochoc.sniffer.feed import columns_of, steps_of
+from robochoc.sniffer.trace import MOST_COUNTED, MOST_NAMES, Trace, TraceTooLarge
 
 HEADER = Header(team="a team", protocol="abt", runtime="simulator", seed=0)
 Key = tuple[int, str, int]

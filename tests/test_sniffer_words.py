@@ -22,12 +22,12 @@ from recorded import fed, record
 from robochoc.generators.queens3d import queens3d
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
-from robochoc.registry import protocol_named, protocol_names
-from robochoc.run import Options, Runtime, Withdrawal
-from robochoc.view.sniffer.feed import Feed
-from robochoc.view.sniffer.phrases import Setting, row
-from robochoc.view.sniffer.trace import Trace
-from robochoc.view.sniffer.words import sentence, wording_of
+from robochoc.run.orchestrator import Options, Runtime, Withdrawal
+from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.sniffer.feed import Feed
+from robochoc.sniffer.phrases import Setting, row
+from robochoc.sniffer.trace import Trace
+from robochoc.sniffer.words import sentence, wording_of
 
 OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
 PROTOCOLS: list[type[Protocol]] = [*map(protocol_named, OURS), FirstFit]

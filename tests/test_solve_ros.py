@@ -10,13 +10,13 @@ from click.testing import CliRunner, Result
 from machines import Site, ended
 from program import ROOT
 
-from robochoc.cli.commands import cli
+from robochoc.cli.group import cli
+from robochoc.flight.mission import Goal
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.outcome import Verdict
-from robochoc.ros.alone import crew_alone, leg_alone
-from robochoc.ros.mission import Goal
+from robochoc.model.outcome import Verdict
 from robochoc.ros.recordings.mcap_file import McapSink
+from robochoc.ros.single_robot import crew_alone, leg_alone
 from robochoc.ros.sinks import open_source
 
 HANGAR = ROOT / "docs" / "examples" / "hangar"

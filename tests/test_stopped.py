@@ -14,13 +14,13 @@ import pytest
 from faults import PROGRAM, running, wait_until
 from faulty_protocols import TEAM, Spins, StopsItself
 
-from robochoc.communication.processes import ProcessesRun
-from robochoc.communication.robot_link import Condition, RobotsLost
-from robochoc.communication.stopped import TOLD_S, Stopped
+from robochoc.communication.processes.processes import ProcessesRun
+from robochoc.communication.processes.robot_link import Condition, RobotsLost
+from robochoc.communication.processes.stopped import TOLD_S, Stopped
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.observers.events import AnyEvent, Lost
-from robochoc.outcome import Verdict
+from robochoc.journal.events import AnyEvent, Lost
+from robochoc.model.outcome import Verdict
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 

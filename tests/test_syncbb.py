@@ -13,16 +13,16 @@ from cost_problems import least_cost, random_cost_team
 from problems import team_of
 
 import robochoc.protocols.syncbb
-from robochoc.communication.schedule import Concurrent
-from robochoc.communication.simulator import Simulation
-from robochoc.message import Value
-from robochoc.outcome import Verdict
-from robochoc.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Value
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.syncbb import Backtrack, BestPath, Cost, Path, SyncBB, Terminate
+from robochoc.solver.agent_problem import Brief, parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.part import Brief, parts
 
 NONE = BestPath(math.inf)
 

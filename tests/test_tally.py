@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from robochoc.communication.control import Conclusion, Counters, OfEpoch, Ready
-from robochoc.communication.network.tally import Tally
-from robochoc.communication.network.words import Account, Checked, Exchanged, Said
-from robochoc.outcome import Metrics, Verdict
+from robochoc.communication.network.control_messages import Account, Checked, Exchanged, Said
+from robochoc.communication.network.search_state import Tally
+from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.findings import NOTHING, Findings
 
 ROBOTS = ("R1", "R2", "R3")

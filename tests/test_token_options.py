@@ -9,7 +9,7 @@ import click
 import pytest
 from click.testing import CliRunner, Result
 
-from robochoc.cli.tokens import LONGEST, token_options
+from robochoc.cli.options.tokens import LONGEST, token_options
 
 TOKEN = "abc.def"  # noqa: S105 - none that works
 

@@ -20,7 +20,6 @@ from problems import random_team, team_of
 from team_mutations import mutated
 
 import robochoc
-from robochoc.change import changed
 from robochoc.formats import (
     PREDEFINED,
     Diagnostic,
@@ -34,9 +33,9 @@ from robochoc.formats import (
 from robochoc.formats import validation as validating
 from robochoc.formats.objects import Objects
 from robochoc.generators.queens3d import queens3d
-from robochoc.options import Options, Runtime
-from robochoc.orders import reordered
-from robochoc.problem import (
+from robochoc.model.change import changed
+from robochoc.model.orders import reordered
+from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
@@ -53,7 +52,8 @@ from robochoc.problem import (
     Team,
     Variable,
 )
-from robochoc.run import solve
+from robochoc.run.options import Options, Runtime
+from robochoc.run.orchestrator import solve
 
 HERE = Options(runtime=Runtime.SIMULATOR)
 FILE_CASES = {case.name: case for case in CASES}

@@ -22,10 +22,10 @@ import pytest
 import umsgpack
 from flights import straight
 
-from robochoc.expression import Apply, Constant, Expression, Name
-from robochoc.outcome import Metrics, Outcome, Verdict
-from robochoc.problem import Domain, Robot, Team, Topic, Variable
-from robochoc.ros.layout import Point
+from robochoc.flight.layout import Point
+from robochoc.model.expression import Apply, Constant, Expression, Name
+from robochoc.model.outcome import Metrics, Outcome, Verdict
+from robochoc.model.problem import Domain, Robot, Team, Topic, Variable
 from robochoc.view import scene as scenes
 from robochoc.view.live import serve
 from robochoc.view.page import page
@@ -289,7 +289,7 @@ def test_meshcat_is_not_imported_before_a_scene_is_drawn() -> None:
 # The live viewer
 
 LIVE = """
-from robochoc.outcome import Outcome, Verdict
+from robochoc.model.outcome import Outcome, Verdict
 from robochoc.view import scene as scenes
 from robochoc.view.live import serve
 from robochoc.view.scene import scene_of

@@ -19,8 +19,8 @@ from pages import watched
 from PIL import Image
 from sniffer_pages import CONTRAST, NAMELESS, until
 
-from robochoc.ros.mission import mission_of
-from robochoc.ros.quadrotor.flown import Flown
+from robochoc.flight.mission import mission_of
+from robochoc.flight.quadrotor.flown import Flown
 from robochoc.view.page import page
 from robochoc.view.scene import Scene, scene_of
 
@@ -353,7 +353,7 @@ def test_without_a_flight_there_is_nothing_to_play(browser: Any, tmp_path: Path)
 LIVE = """
 import sys
 from flights import epochs_of_three, five, straight
-from robochoc.ros.mission import mission_of
+from robochoc.flight.mission import mission_of
 from robochoc.view.live import serve
 from robochoc.view.scene import scene_of
 outcome, mission = epochs_of_three(), mission_of(epochs_of_three(), five())

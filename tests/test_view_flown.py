@@ -20,13 +20,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from program import robochoc
 
+from robochoc.flight.flight import fly
+from robochoc.flight.mission import mission_of
+from robochoc.flight.quadrotor.conditions import Conditions, Failure
+from robochoc.flight.quadrotor.flown import Happening
 from robochoc.formats import write_team
 from robochoc.formats.result import result_json
-from robochoc.outcome import Outcome, Verdict
-from robochoc.ros.flight import fly
-from robochoc.ros.mission import mission_of
-from robochoc.ros.quadrotor.conditions import Conditions, Failure
-from robochoc.ros.quadrotor.flown import Happening
+from robochoc.model.outcome import Outcome, Verdict
 from robochoc.view import scene as scenes
 from robochoc.view.film import Look
 from robochoc.view.keyframes import angle, attitude_keys, position_keys, slerp

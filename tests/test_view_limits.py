@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from robochoc.outcome import Epoch, Outcome, Verdict
-from robochoc.ros.mission import mission_of
+from robochoc.flight.mission import mission_of
+from robochoc.model.outcome import Epoch, Outcome, Verdict
 from robochoc.view.scene import scene_of
 
 

@@ -17,16 +17,16 @@ from program import ROOT
 
 from robochoc.authority.admission import Household
 from robochoc.communication.control import Failed
-from robochoc.communication.network import post
+from robochoc.communication.network import transport as post
 from robochoc.communication.network.access import ALL, access_control
-from robochoc.communication.network.conditions import LEASE_MS
+from robochoc.communication.network.framing import LARGEST_LETTER, MASTER, Letters, TooLarge
 from robochoc.communication.network.inbox import Arrived, Item
-from robochoc.communication.network.letters import LARGEST_LETTER, MASTER, Letters, TooLarge
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.members import Members, NotTaken
-from robochoc.communication.network.post import Post
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.router import Router
+from robochoc.communication.network.settings import LEASE_MS
+from robochoc.communication.network.transport import Post
 from robochoc.communication.network.zenoh_config import RX_BYTES, config
 from robochoc.generators.random_csp import random_csp
 from robochoc.protocols.abt import ABT

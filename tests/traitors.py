@@ -12,9 +12,9 @@ from dataclasses import replace
 import msgspec
 
 from robochoc.communication.control import Conclusion, Counters, Ready
+from robochoc.communication.network.control_messages import Account, Checked, Exchanged, Task, ToMaster
 from robochoc.communication.network.searcher import Searcher, Surroundings
-from robochoc.communication.network.words import Account, Checked, Exchanged, Task, ToMaster
-from robochoc.outcome import Metrics
+from robochoc.model.outcome import Metrics
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
@@ -184,7 +184,7 @@ def program(lie: str, name: str, *words: object) -> str:
 
 def main(lie: str, name: str, words: list[str]) -> None:
     """What such a program does."""
-    from robochoc.cli.commands import cli  # noqa: PLC0415 - only a program needs it
+    from robochoc.cli.group import cli  # noqa: PLC0415 - only a program needs it
 
     install(LIES[lie], name)
     cli(words)

@@ -9,13 +9,13 @@ from typing import TypeVar
 from cost_problems import with_costs
 from problems import team_of
 
-from robochoc.message import Message
-from robochoc.problem import Constraint, Relation, Semantics, Team
+from robochoc.model.message import Message
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.bounding import Context
 from robochoc.protocols.dfs import TreeProtocol
 from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.part import parts
 
 P = TypeVar("P", bound=TreeProtocol)
 

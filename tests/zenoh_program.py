@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 
 from robochoc.communication.network.local import LocalNetwork
-from robochoc.communication.processes import ProcessesRun
+from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.generators.random_csp import random_csp
 from robochoc.protocols.abt import ABT
 

@@ -47,9 +47,9 @@ from robochoc.authority.registry import (
     locked,
 )
 from robochoc.authority.token import Token, digest
-from robochoc.files import write_atomically
 from robochoc.formats.diagnostics import on_one_line, shortened, suggestion
 from robochoc.formats.names import is_name
+from robochoc.system.files import write_atomically
 
 TOKEN_LIFETIME = timedelta(hours=24)
 CERTIFICATE_LIFETIME = timedelta(hours=24)

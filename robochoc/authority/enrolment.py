@@ -42,8 +42,8 @@ from robochoc.authority.frames import (
 )
 from robochoc.authority.identity import CERTIFICATE, Identity, private_folder, save
 from robochoc.authority.token import Token
-from robochoc.files import write_atomically
 from robochoc.formats.diagnostics import on_one_line
+from robochoc.system.files import write_atomically
 
 PATIENCE_S = 30.0
 """So long may a question take, with the time that the service lets it wait."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from robochoc.observers.events import Granted, Refused
+from robochoc.journal.events import Granted, Refused
 
 __all__ = ["AuthorityEvent", "AuthorityObserver", "Granted", "Refused", "unobserved"]
 

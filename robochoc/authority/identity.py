@@ -28,7 +28,7 @@ from robochoc.authority.certificates import (
     read_key,
 )
 from robochoc.authority.registry import PRIVATE
-from robochoc.files import write_atomically
+from robochoc.system.files import write_atomically
 
 KEY, CERTIFICATE, CA = "key.pem", "cert.pem", "ca.pem"
 _OTHERS = 0o077

@@ -17,7 +17,7 @@ from typing import Literal
 
 import msgspec
 
-from robochoc.files import write_atomically
+from robochoc.system.files import write_atomically
 
 PRIVATE = 0o600
 _FILE, _LOCK = "registry.json", "lock"

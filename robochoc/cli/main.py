@@ -28,7 +28,7 @@ def main() -> NoReturn:
     ending = Ending()
     try:
         ending.listen()
-        from robochoc.cli.commands import run
+        from robochoc.cli.group import run
 
         status = run()
         ending.ignore()

@@ -11,11 +11,11 @@ from multiprocessing.reduction import ForkingPickler
 
 import msgspec
 
-from robochoc.observers.events import AnyEvent
-from robochoc.outcome import Metrics
+from robochoc.journal.events import AnyEvent
+from robochoc.model.outcome import Metrics
 from robochoc.protocols.findings import Findings
+from robochoc.solver.agent_problem import Part
 from robochoc.solver.explanation import Void
-from robochoc.solver.part import Part
 
 QUEUES_AT_ONCE = 16
 """How many queues a robot asks for in one go. The parent holds so many descriptors more meanwhile."""

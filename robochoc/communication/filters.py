@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import cast
 
 from robochoc.authority.keyring import KeyRing
-from robochoc.entry_points import EntryPoint
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.installed import all_in, loaded, missing, named
+from robochoc.system.entry_points import EntryPoint
+from robochoc.system.installed import all_in, loaded, missing, named
 
 GROUP = "robochoc.filters"
 

@@ -14,14 +14,14 @@ from typing import Self, cast
 
 import msgspec
 
-from robochoc.message import Envelope, Message, encode
-from robochoc.observers.events import Concluded, Decided, Heard, Observer, Received, Sent, Settled
-from robochoc.outcome import Metrics, Verdict
+from robochoc.journal.events import Concluded, Decided, Heard, Observer, Received, Sent, Settled
+from robochoc.model.message import Envelope, Message, encode
+from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import DynamicProtocol, Protocol, Said, Settings
+from robochoc.solver.agent_problem import NO_BRIEF, Brief, Part
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Void
-from robochoc.solver.part import NO_BRIEF, Brief, Part
 
 
 class BadSettings(ValueError):  # noqa: N818 - named for what was given

@@ -8,7 +8,7 @@ from functools import reduce
 from operator import add
 from typing import NamedTuple, Self
 
-from robochoc.outcome import Metrics, Verdict
+from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.findings import Findings
 
 

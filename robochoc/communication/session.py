@@ -8,11 +8,11 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from robochoc.communication.run_result import RunResult
-from robochoc.problem import Team
+from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
+from robochoc.solver.agent_problem import NO_BRIEF, Brief, Part, parts
 from robochoc.solver.compiled_team import CompiledTeam, as_compiled
 from robochoc.solver.explanation import Void
-from robochoc.solver.part import NO_BRIEF, Brief, Part, parts
 
 
 class Epoch(NamedTuple):

@@ -1,6 +1,5 @@
 """Robots and teams as XML files: reading them with every mistake told, and writing them (FORMAT.md, Figure 2)."""
 
-from robochoc.files import write_atomically
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput, encodable, on_one_line
 from robochoc.formats.folder import write_team
@@ -8,6 +7,7 @@ from robochoc.formats.robot import read_robot, robot_in
 from robochoc.formats.team import find_teams, read_team, robot_names
 from robochoc.formats.validation import check_event, check_robot, check_team, held_to_rules
 from robochoc.formats.writer import robot_xml
+from robochoc.system.files import write_atomically
 
 __all__ = [
     "PREDEFINED",

@@ -19,7 +19,7 @@ from robochoc.formats.rules import (
     refuse_private_part,
 )
 from robochoc.formats.xml import attribute, line
-from robochoc.problem import INFINITE, Constraint, Kind, Model, Predicate, Relation, Term
+from robochoc.model.problem import INFINITE, Constraint, Kind, Model, Predicate, Relation, Term
 
 
 @dataclass(frozen=True)

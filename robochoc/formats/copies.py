@@ -11,10 +11,10 @@ from collections import Counter
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from itertools import product
 
-from robochoc.expression import Apply, Constant, Expression, Name, Undefined, compiled
 from robochoc.formats.diagnostics import Diagnostic, shortened
 from robochoc.formats.members import Members
-from robochoc.problem import INFINITE, Constraint, Domain, Model, Relation, Robot
+from robochoc.model.expression import Apply, Constant, Expression, Name, Undefined, compiled
+from robochoc.model.problem import INFINITE, Constraint, Domain, Model, Relation, Robot
 
 MAX_COMPARED = 1_000_000
 """So many tuples are tried at most to find a difference."""

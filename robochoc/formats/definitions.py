@@ -9,11 +9,11 @@ import re
 from collections.abc import Collection, Sequence
 from functools import lru_cache
 
-from robochoc.expression import Apply, Constant, Expression, ExpressionError, Name, Type, parse, text
-from robochoc.expression.parser import MAX_DEPTH, MAX_NODES
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.names import BEYOND, check_cost, check_integer, check_word, digits, in_short
-from robochoc.problem import Domain, Kind, Predicate, Relation, Semantics, Term, Topic
+from robochoc.model.expression import Apply, Constant, Expression, ExpressionError, Name, Type, parse, text
+from robochoc.model.expression.parser import MAX_DEPTH, MAX_NODES
+from robochoc.model.problem import Domain, Kind, Predicate, Relation, Semantics, Term, Topic
 
 MAX_VALUES = 100_000
 """Of a domain."""

@@ -8,8 +8,8 @@ from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from robochoc.plain_text import on_one_line as on_one_line  # noqa: PLC0414 - from here, too
-from robochoc.priorities import natural
+from robochoc.model.priorities import natural
+from robochoc.system.plain_text import on_one_line as on_one_line  # noqa: PLC0414 - from here, too
 
 MAX_PER_FILE = 100
 """So many mistakes of one file are told; who makes more needs no longer list."""

@@ -14,7 +14,7 @@ from robochoc.formats.definitions import (
 )
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.xml import attribute
-from robochoc.problem import INFINITE, Domain, Relation, Semantics
+from robochoc.model.problem import INFINITE, Domain, Relation, Semantics
 
 __all__ = ["MAX_VALUES", "check_count", "integer", "read_domain", "read_relation"]
 

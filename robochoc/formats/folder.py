@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from robochoc.files import resolved
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput
 from robochoc.formats.robot import robot_in
 from robochoc.formats.validation import check_writable
 from robochoc.formats.writer import robot_xml
-from robochoc.problem import Robot, Team
+from robochoc.model.problem import Robot, Team
+from robochoc.system.files import resolved
 
 _SURELY_READ = 1024 * 1024
 """Bytes of a file that meets no limit of its reader, if the robot is valid."""

@@ -6,11 +6,11 @@ from collections.abc import Collection
 
 from lxml import etree
 
-from robochoc.expression import Expression, ExpressionError, Type, parse
 from robochoc.formats.definitions import PREDEFINED, check_formal, expression_mistake, parsed
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.xml import attribute, line
-from robochoc.problem import Predicate, Topic
+from robochoc.model.expression import Expression, ExpressionError, Type, parse
+from robochoc.model.problem import Predicate, Topic
 
 __all__ = ["PREDEFINED", "read_predicate", "read_topic"]
 

@@ -8,7 +8,7 @@ from itertools import count
 from typing import TypeVar
 
 from robochoc.formats.definitions import PREDEFINED
-from robochoc.problem import Constraint, Domain, Predicate, Relation, Robot
+from robochoc.model.problem import Constraint, Domain, Predicate, Relation, Robot
 
 
 def with_names_apart(robot: Robot) -> Robot:

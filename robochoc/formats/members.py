@@ -8,8 +8,8 @@ from enum import StrEnum
 from functools import cached_property
 
 from robochoc.formats.places import Place, Places
-from robochoc.priorities import CycleError, priority_order
-from robochoc.problem import Child, Constraint, Parent, Robot
+from robochoc.model.priorities import CycleError, priority_order
+from robochoc.model.problem import Child, Constraint, Parent, Robot
 
 
 class Role(StrEnum):

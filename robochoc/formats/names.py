@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection
 
 from robochoc.formats.diagnostics import MistakeError, shortened
-from robochoc.problem import INFINITE
+from robochoc.model.problem import INFINITE
 
 MAX_WEIGHT = 1_000_000
 """Of a robot."""

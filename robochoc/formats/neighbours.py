@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from robochoc.formats.diagnostics import Diagnostic, shortened, suggestion
 from robochoc.formats.members import Members
-from robochoc.priorities import CycleError, priority_order
+from robochoc.model.priorities import CycleError, priority_order
 
 
 def missing_robots(members: Members) -> Iterator[Diagnostic]:

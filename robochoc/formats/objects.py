@@ -30,7 +30,7 @@ from robochoc.formats.rules import (
     repeated,
 )
 from robochoc.formats.shapes import AS_BUILT, ShapeError, check_shape
-from robochoc.problem import Constraint, Domain, Kind, Model, Predicate, Relation, Robot
+from robochoc.model.problem import Constraint, Domain, Kind, Model, Predicate, Relation, Robot
 
 Definition = Domain | Relation | Predicate
 

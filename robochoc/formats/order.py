@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput, Report, shortened, suggestion
-from robochoc.problem import Team
+from robochoc.model.problem import Team
 
 MAX_BYTES = 1024 * 1024
 _MISSING_SHOWN = 10

@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 
 from robochoc.formats.diagnostics import Diagnostic, shortened
 from robochoc.formats.names import in_short
-from robochoc.problem import Child, Constraint, Parent
+from robochoc.model.problem import Child, Constraint, Parent
 
 
 class Place(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from robochoc.outcome import Epoch, Metrics, Outcome, Place, Thoroughness, Verdict
+from robochoc.model.outcome import Epoch, Metrics, Outcome, Place, Thoroughness, Verdict
 
 
 class BadResult(ValueError):  # noqa: N818 - named for what was found

@@ -19,7 +19,7 @@ from robochoc.formats.names import check_robot_name, check_unique
 from robochoc.formats.places import FilePlaces
 from robochoc.formats.rules import NEIGHBOURS_ONCE, check_told, refuse_nothing_to_decide, repeated
 from robochoc.formats.xml import attribute, line, parsed_xml, read_xml
-from robochoc.problem import (
+from robochoc.model.problem import (
     Child,
     Constraint,
     Domain,

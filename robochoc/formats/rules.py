@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterator, Sequence
 from robochoc.formats.definitions import shown
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.names import check_cost, check_integer, is_name
-from robochoc.problem import INFINITE, Child, Constraint, Kind, Model, Parent, Predicate, Relation, Term
+from robochoc.model.problem import INFINITE, Child, Constraint, Kind, Model, Parent, Predicate, Relation, Term
 
 NEIGHBOURS_ONCE = "list every neighbour once, as parent or as child"
 """What to do about neighbours that are `repeated`."""

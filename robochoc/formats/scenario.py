@@ -9,14 +9,13 @@ from pathlib import Path
 
 from lxml import etree
 
-from robochoc.change import BadChange, changed
-from robochoc.files import resolved
 from robochoc.formats.constraints import Context, read_shared
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput, MistakeError, Report, shortened
 from robochoc.formats.robot import RobotFile, read_robot_file
 from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
 from robochoc.formats.xml import attribute, line, read_xml
-from robochoc.problem import (
+from robochoc.model.change import BadChange, changed
+from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
@@ -28,6 +27,7 @@ from robochoc.problem import (
     Robot,
     Team,
 )
+from robochoc.system.files import resolved
 
 SCENARIO = "scenario.xml"
 """The one XML file in a team's folder that is no robot."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from robochoc.formats.diagnostics import Diagnostic, shortened, suggestion
 from robochoc.formats.members import Members
-from robochoc.problem import Constraint, Model, Parent, Robot
+from robochoc.model.problem import Constraint, Model, Parent, Robot
 
 
 def misplaced(members: Members) -> Iterator[Diagnostic]:

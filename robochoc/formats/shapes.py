@@ -14,8 +14,8 @@ from enum import Enum
 from functools import cache
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
-from robochoc.expression import Apply, Constant, Name
 from robochoc.formats.diagnostics import shortened
+from robochoc.model.expression import Apply, Constant, Name
 
 _LEAVES = (Apply, Constant, Name)
 """Expressions: they may be too deep to be walked, and have a check of their own."""

@@ -12,8 +12,8 @@ from robochoc.formats.members import Members
 from robochoc.formats.robot import RobotFile, read_robot_file
 from robochoc.formats.scenario import SCENARIO, has_scenario, read_scenario
 from robochoc.formats.validation import between, note_valid
-from robochoc.priorities import natural, priority_order
-from robochoc.problem import Robot, Team
+from robochoc.model.priorities import natural, priority_order
+from robochoc.model.problem import Robot, Team
 
 _NEXT_STEP = "give a folder with one XML file per robot; 'robochoc generate queens3d --n 4' writes one"
 

@@ -13,7 +13,6 @@ from dataclasses import replace
 from itertools import islice
 from typing import TypeVar
 
-from robochoc.change import BadChange, changed
 from robochoc.formats.copies import differing_copies
 from robochoc.formats.diagnostics import Diagnostic, InvalidInput, MistakeError, shortened
 from robochoc.formats.members import Member, Members
@@ -31,8 +30,9 @@ from robochoc.formats.places import ObjectPlaces, Place
 from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
 from robochoc.formats.scopes import misplaced, misplaced_parts, untold
 from robochoc.formats.shapes import AS_BUILT, ShapeError, check_shape
-from robochoc.priorities import priority_order
-from robochoc.problem import AddAgent, AddConstraint, AddValue, Change, Event, RemoveValue, Robot, Team
+from robochoc.model.change import BadChange, changed
+from robochoc.model.priorities import priority_order
+from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, Event, RemoveValue, Robot, Team
 
 MAX_BETWEEN = 1000
 """So many mistakes between the robots of one team are told."""

@@ -8,10 +8,10 @@ from typing import TypeVar
 
 from lxml import etree
 
-from robochoc.expression import text
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.labels import with_names_apart
-from robochoc.problem import (
+from robochoc.model.expression import text
+from robochoc.model.problem import (
     INFINITE,
     Constraint,
     Domain,

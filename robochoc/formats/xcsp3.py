@@ -6,7 +6,7 @@ from contextlib import nullcontext
 
 from lxml import etree
 
-from robochoc.problem import Team
+from robochoc.model.problem import Team
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.merged import identifiers, merged
 

@@ -11,7 +11,7 @@ from random import Random
 
 from robochoc.formats import PREDEFINED
 from robochoc.generators.random_csp import MOST_AGENTS, MOST_VALUES, graph, team_on
-from robochoc.problem import Constraint, Kind, Team
+from robochoc.model.problem import Constraint, Kind, Team
 
 
 def coloring(agents: int, colors: int, degree: float, seed: int = 0, *, connected: bool = False) -> Team:

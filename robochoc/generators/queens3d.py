@@ -20,9 +20,9 @@ from dataclasses import replace
 from enum import StrEnum
 from typing import assert_never
 
-from robochoc.expression import Constant, Name, Type, parse
 from robochoc.formats import PREDEFINED
-from robochoc.problem import Child, Constraint, Domain, Parent, Predicate, Robot, Team, Topic, Variable
+from robochoc.model.expression import Constant, Name, Type, parse
+from robochoc.model.problem import Child, Constraint, Domain, Parent, Predicate, Robot, Team, Topic, Variable
 
 LARGEST_N = 64
 """4,096 robots; beyond that a folder of files is no longer a sensible form."""

@@ -23,7 +23,7 @@ import itertools
 from collections.abc import Iterator, Mapping
 from random import Random
 
-from robochoc.problem import (
+from robochoc.model.problem import (
     INFINITE,
     Child,
     Constraint,

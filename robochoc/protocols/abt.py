@@ -26,7 +26,7 @@ forbids (`_refuse_below`). Such a value is forgotten once it is refused, as that
 same again, is sure to come. Without a PKC nothing changes.
 
 >>> from robochoc.generators.queens3d import queens3d
->>> from robochoc.run import Options, Runtime, solve
+>>> from robochoc.run.orchestrator import Options, Runtime, solve
 >>> outcome = solve(queens3d(4), Options(protocol="abt", runtime=Runtime.SIMULATOR))
 >>> outcome.verdict.value, outcome.witness
 ('no-solution', 'Robot1.1')
@@ -36,8 +36,8 @@ from __future__ import annotations
 
 from typing import assert_never, cast
 
-from robochoc.message import Message, Value
-from robochoc.outcome import Verdict
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.backtracking import Backtracking
 from robochoc.protocols.nogood import contradicts
 from robochoc.protocols.order import PriorityOrder

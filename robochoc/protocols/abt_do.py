@@ -38,8 +38,8 @@ from __future__ import annotations
 
 from typing import assert_never, cast
 
-from robochoc.message import Message, Value
-from robochoc.outcome import Verdict
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.backtracking import Backtracking
 from robochoc.protocols.nogood import contradicts
 from robochoc.protocols.order import PriorityOrder

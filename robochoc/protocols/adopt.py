@@ -28,8 +28,8 @@ When nobody speaks all have terminated. Otherwise there is a highest robot that 
 All contexts agree, so all robots have their parents' bounds and thresholds; and with LB(d) <= threshold < UB(d) for
 its value d, some child has t < ub. That is a threshold below UB again, and so on, down to a leaf, where LB = UB.
 
->>> from robochoc.communication.schedule import Concurrent
->>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(2), ADOPT, Concurrent(seed=0)).run()
 >>> result.verdict.value
@@ -41,9 +41,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import assert_never, cast
 
-from robochoc import message
-from robochoc.message import Message
-from robochoc.problem import INFINITE
+from robochoc.model import message
+from robochoc.model.message import Message
+from robochoc.model.problem import INFINITE
 from robochoc.protocols.bounding import BoundingProtocol, Context, Entry, Number, Terminate
 from robochoc.protocols.dfs import TreeMessage
 from robochoc.protocols.order import PriorityOrder

@@ -35,8 +35,8 @@ changed, and when the CPA comes; every CPA tells B, so that nobody thinks that t
 one is under way; whoever finds that nothing is better, with any beginning, tells all to be silent; a robot whose
 domain is empty says so when the search begins.
 
->>> from robochoc.communication.schedule import Concurrent
->>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(4), AFB, Concurrent(seed=0)).run()
 >>> result.verdict.value
@@ -49,8 +49,8 @@ import math
 from collections.abc import Sequence
 from typing import assert_never, cast
 
-from robochoc.message import Message, Value
-from robochoc.outcome import Verdict
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.afb_bounds import Assignment, Cost, Estimates, Prices, Told, agreement, stamp_of
 from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder

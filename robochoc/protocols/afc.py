@@ -28,8 +28,8 @@ from __future__ import annotations
 
 from typing import assert_never, cast
 
-from robochoc.message import Message, Value
-from robochoc.outcome import Verdict
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_EITHER, Traits

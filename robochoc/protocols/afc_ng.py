@@ -29,8 +29,8 @@ The last robot's CPA is a solution, and all robots hold its values when it is fo
 for a nogood without a left side, which no value of a solution can get; the second only for that or a new CPA of the
 first, and so on. `Solved` tells them that they may be silent.
 
->>> from robochoc.communication.schedule import Concurrent
->>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(4), AFCng, Concurrent(seed=0)).run()
 >>> result.verdict.value, result.witness
@@ -42,8 +42,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import assert_never, cast
 
-from robochoc.message import Message, Value
-from robochoc.outcome import Verdict
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.nogood import NogoodStore, contradicts
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol

@@ -22,8 +22,8 @@ so that ancestor was at the value of the nogood, with a compatible view, and has
 the robot has a value, chosen for the present ones above it. Accepts are kept as they tell a root that its part
 is solved, and cost a message a robot at the least.
 
->>> from robochoc.communication.schedule import Concurrent
->>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(4), AFCTree, Concurrent(seed=0)).run()
 >>> result.verdict.value, result.witness
@@ -35,7 +35,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import assert_never, cast
 
-from robochoc.message import Message, Value
+from robochoc.model.message import Message, Value
 from robochoc.protocols.afc_ng import CPA, AFCng, Nogood, Solved
 from robochoc.protocols.order import PriorityOrder, PseudoTree
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits

@@ -28,8 +28,8 @@ having `UNKNOWN` values left, more than any other; values are checked one by one
 those without a nogood so far; messages are read by packets. As in `abt.py`, of several nogoods for a value the one
 with the highest possible lowest variable is kept, and a nogood names only the variables that matter.
 
->>> from robochoc.communication.schedule import Concurrent
->>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> Simulation(queens3d(4), AgileABT, Concurrent(seed=0)).run().verdict.value
 'no-solution'
@@ -39,8 +39,8 @@ from __future__ import annotations
 
 from typing import assert_never, cast
 
-from robochoc.message import Message, Value
-from robochoc.outcome import Verdict
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.agile_order import (
     UNKNOWN,
     Explanation,

@@ -24,7 +24,7 @@ import heapq
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from robochoc.message import Value
+from robochoc.model.message import Value
 from robochoc.protocols.nogood import LeftSide
 from robochoc.protocols.order import PriorityOrder
 

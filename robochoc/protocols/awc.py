@@ -29,8 +29,8 @@ from __future__ import annotations
 
 from typing import NamedTuple, assert_never, cast
 
-from robochoc.message import Message, Value
-from robochoc.outcome import Verdict
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.nogood import LeftSide, joined
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol

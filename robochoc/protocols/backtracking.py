@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from robochoc.message import Value
+from robochoc.model.message import Value
 from robochoc.protocols.nogood import NogoodStore, joined
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol

@@ -34,8 +34,8 @@ UB > LB. All contexts agree, so LB(d) < UB for its value d, and for some child l
 what the child has said last, LB < UB there, and LB < TH; so LB(d) < min(TH, UB) for its value d, and so on, down to a
 leaf, where LB = UB.
 
->>> from robochoc.communication.schedule import Concurrent
->>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(2), BnBADOPT, Concurrent(seed=0)).run()
 >>> result.verdict.value
@@ -48,9 +48,9 @@ from typing import assert_never, cast
 
 import msgspec
 
-from robochoc import message
-from robochoc.message import Message
-from robochoc.problem import INFINITE
+from robochoc.model import message
+from robochoc.model.message import Message
+from robochoc.model.problem import INFINITE
 from robochoc.protocols.bounding import BoundingProtocol, Context, Number, Terminate
 from robochoc.protocols.dfs import TreeMessage
 from robochoc.protocols.order import PriorityOrder

@@ -12,10 +12,10 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import msgspec
 
-from robochoc import message
-from robochoc.message import Message
-from robochoc.outcome import Verdict
-from robochoc.problem import INFINITE
+from robochoc.model import message
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
 from robochoc.protocols.dfs import TreeProtocol
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.order import PriorityOrder

@@ -16,8 +16,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeVar
 
-from robochoc import message as wire
-from robochoc.outcome import Verdict
+from robochoc.model import message as wire
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol, Settings

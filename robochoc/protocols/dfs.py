@@ -17,8 +17,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 
-from robochoc.message import Message
-from robochoc.outcome import Place, Verdict
+from robochoc.model.message import Message
+from robochoc.model.outcome import Place, Verdict
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol

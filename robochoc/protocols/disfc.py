@@ -20,8 +20,8 @@ that a value has come back; an assignment that is kept keeps its counter; whom n
 and who asked for a link, gets a filter that allows everything; a robot of several variables is filtered over all
 values that its interface variables could have together.
 
->>> from robochoc.communication.schedule import Concurrent
->>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(4), DisFC, Concurrent(0)).run()
 >>> result.verdict.value, result.witness
@@ -32,8 +32,8 @@ from __future__ import annotations
 
 from typing import assert_never, cast
 
-from robochoc.message import Message
-from robochoc.outcome import Verdict
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.nogood import NogoodStore
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol

@@ -34,8 +34,8 @@ Costs are integers, added up in float64. Where they could come to 2^53 or more, 
 The limit is each robot's own, on arrays: what a runtime holds of a message under way does not count, nor do the prices
 that a local problem remembers.
 
->>> from robochoc.communication.schedule import Concurrent
->>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(3), DPOP, Concurrent(seed=0)).run()
 >>> result.verdict.value
@@ -50,8 +50,8 @@ from typing import Annotated, TypeVar, assert_never, cast
 
 import msgspec
 
-from robochoc.message import Message, Value
-from robochoc.outcome import Verdict
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.dfs import TreeMessage, TreeProtocol
 from robochoc.protocols.dpop_tables import (
     Arriving,

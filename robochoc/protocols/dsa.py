@@ -21,8 +21,8 @@ for how else would neighbours know that the cycle is over; a robot is in conflic
 or charges anything; constraints may be n-ary, and each robot of a scope weighs what the constraint charges for
 itself; fewer broken hard constraints are always better; of several best values one is drawn by lot.
 
->>> from robochoc.communication.schedule import Concurrent
->>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(4), DSA, Concurrent(seed=0)).search()
 >>> result.metrics.messages
@@ -34,7 +34,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal
 
-from robochoc.message import Message
+from robochoc.model.message import Message
 from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, CycleSettings, Value, gain, said
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 

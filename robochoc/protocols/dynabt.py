@@ -22,8 +22,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from robochoc.message import Value
-from robochoc.outcome import Verdict
+from robochoc.model.message import Value
+from robochoc.model.outcome import Verdict
 from robochoc.protocols import abt
 from robochoc.protocols.abt import ABT, AddLink, Ok
 from robochoc.protocols.nogood import NOTHING, Explanation, NogoodStore

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import msgspec
 
-from robochoc.message import Value
-from robochoc.outcome import Place
+from robochoc.model.message import Value
+from robochoc.model.outcome import Place
 
 
 class Best(msgspec.Struct, frozen=True):

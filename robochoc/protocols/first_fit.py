@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import cast
 
-from robochoc.message import Message, Value
+from robochoc.model.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits

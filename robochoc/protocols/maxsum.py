@@ -30,8 +30,8 @@ costs `inf`, and nothing is ever subtracted from that. It stays out, for what ma
 all of whose values are out has proven that there is no solution. Constraints may be n-ary, up to a size of their
 tables.
 
->>> from robochoc.communication.schedule import Concurrent
->>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(2), MaxSum, Concurrent(seed=0)).search()
 >>> result.verdict.value, result.metrics.messages
@@ -43,9 +43,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from operator import add, sub
 
-from robochoc import message as wire
-from robochoc.outcome import Verdict
-from robochoc.problem import INFINITE
+from robochoc.model import message as wire
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
 from robochoc.protocols.cycles import CycleProtocol, CycleSettings, Domain
 from robochoc.protocols.maxsum_factor import Factor, Row
 from robochoc.protocols.order import PriorityOrder

@@ -17,8 +17,8 @@ What the paper leaves open: the first value is drawn by lot, and so is one of se
 gain the same the one that comes first in the priority order moves; constraints may be n-ary, as all robots of a scope
 are neighbours; a gain is a pair, of broken hard constraints first, so the search also works on plain DisCSPs.
 
->>> from robochoc.communication.schedule import Concurrent
->>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(4), MGM, Concurrent(seed=0)).search()
 >>> result.metrics.messages
@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from robochoc import message as wire
+from robochoc.model import message as wire
 from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, Value, gain, said
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits

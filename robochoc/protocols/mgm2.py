@@ -23,8 +23,8 @@ the two saves less than nothing while what they share is laid at its own door; w
 offers have come. Values, the first ones and those that are equally good, and equal gains are settled as in `mgm`;
 constraints may be n-ary.
 
->>> from robochoc.communication.schedule import Concurrent
->>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(2), MGM2, Concurrent(seed=0)).search()
 >>> result.metrics.messages
@@ -36,7 +36,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from robochoc import message as wire
+from robochoc.model import message as wire
 from robochoc.protocols.cycles import NO_GAIN, CycleSettings, Domain, Value, gain, said
 from robochoc.protocols.mgm import Gain, Gainers
 from robochoc.protocols.order import PriorityOrder

@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 
 import msgspec
 
-from robochoc.message import Message
-from robochoc.outcome import Verdict
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.findings import NOTHING, Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import Traits

@@ -30,10 +30,10 @@ below what it costs. When the first robot has nothing left to extend, the last s
 Constraints may be n-ary: the last but one robot of a scope adds what the last one will pay. Prices are looked up in
 tables that are made before the search (see `LocalProblem.tables`), so all constraint checks are done by then.
 
->>> from robochoc.communication.schedule import Concurrent
->>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
->>> from robochoc.solver.part import Brief
+>>> from robochoc.solver.agent_problem import Brief
 >>> result = Simulation(queens3d(4), SFB, Concurrent(seed=0), brief=Brief(aside=1)).run()
 >>> sum(bool(values) for values in result.assignments.values())  # of 16, and no more can fly
 10
@@ -48,10 +48,10 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from typing import Self, assert_never, cast
 
-from robochoc.message import Message, Value
-from robochoc.outcome import Verdict
-from robochoc.protocols.alike import Run, fitting, grouped, one_by_one
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.findings import NOTHING, Best, Findings
+from robochoc.protocols.interchangeable import Run, fitting, grouped, one_by_one
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol, Settings
 from robochoc.protocols.sfb_bounds import BOUND, ForwardBounds, Rows, dearest

@@ -14,8 +14,8 @@ its own; the last robot looks on for a cheaper value before it sends the path ba
 bound goes back without a look at the values that are left; a robot whose domain is empty from the start says so at
 once; the first robot tells the others what the best path was, and who hears of it takes the value in it.
 
->>> from robochoc.communication.schedule import Concurrent
->>> from robochoc.communication.simulator import Simulation
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(4), SyncBB, Concurrent(seed=0)).run()
 >>> result.verdict.value, result.witness
@@ -29,8 +29,8 @@ from typing import assert_never, cast
 
 import msgspec
 
-from robochoc.message import Message, Value
-from robochoc.outcome import Verdict
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol

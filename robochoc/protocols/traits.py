@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from robochoc.outcome import Verdict
+from robochoc.model.outcome import Verdict
 
 ENDS_WITH_PROOF = (Verdict.NO_SOLUTION,)
 """Solutions are found by falling quiet; one robot alone can only tell that there is none."""

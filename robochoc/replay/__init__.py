@@ -1,8 +1,8 @@
 """Playing a recorded run again: the same protocol objects, the same packets, and what comes of them."""
 
-from robochoc.replay.cast import CannotReplay, Means
 from robochoc.replay.ending import Contradiction
 from robochoc.replay.insight import Choice, State, states_of
+from robochoc.replay.rebuild import CannotReplay, Means
 from robochoc.replay.replay import Difference, Replayed, Stopped, replay
 
 __all__ = [

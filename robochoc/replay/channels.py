@@ -18,8 +18,8 @@ from typing import Any, get_args
 
 import msgspec
 
-from robochoc.message import Envelope, Message
-from robochoc.observers.events import AnyEvent, Received, Sent
+from robochoc.journal.events import AnyEvent, Received, Sent
+from robochoc.model.message import Envelope, Message
 from robochoc.protocols.protocol import Protocol
 
 Edge = tuple[str, str]

@@ -12,18 +12,18 @@ from itertools import chain
 
 import msgspec
 
-from robochoc.answers import answered, placed
 from robochoc.communication.run_result import RunResult
-from robochoc.observers.checker import Refuted
-from robochoc.observers.events import AnyEvent, Lost, Received, Sent
-from robochoc.observers.journal import Header, Journal, metrics_of
-from robochoc.observers.journal_entries import STAMPED_LATE
-from robochoc.options import CENTRAL
-from robochoc.outcome import Epoch, Outcome, Verdict
-from robochoc.registry import speaker
-from robochoc.replay.cast import Ensemble
+from robochoc.journal.entries import STAMPED_LATE
+from robochoc.journal.events import AnyEvent, Lost, Received, Sent
+from robochoc.journal.journal import Header, Journal, metrics_of
+from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.replay.rebuild import Ensemble
 from robochoc.replay.steps import Run
+from robochoc.run.evaluation import answered, placed
+from robochoc.run.options import CENTRAL
+from robochoc.run.registry import speaker
 from robochoc.solver.domain import TooManySolutions
+from robochoc.verification.checker import Refuted
 
 _COUNTED = ("messages", "bytes", "ncccs", "checks", "largest")
 _COUNTED_BEFORE = _COUNTED[:-1]

@@ -14,8 +14,8 @@ import msgspec
 
 from robochoc.protocols.order import PriorityOrder
 from robochoc.replay.phrases import cut
+from robochoc.solver.agent_problem import Part
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.part import Part
 
 DEEPEST = 3
 """So many levels of what things are made of are shown."""

@@ -10,11 +10,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import msgspec
 
-from robochoc.observers.events import AnyEvent
-from robochoc.observers.journal import Header, Journal
-from robochoc.replay.cast import CannotReplay, Cast, Means
-from robochoc.replay.look import Look, carefully
+from robochoc.journal.events import AnyEvent
+from robochoc.journal.journal import Header, Journal
+from robochoc.replay.inspection import Look, carefully
 from robochoc.replay.reasons import Reasons
+from robochoc.replay.rebuild import CannotReplay, Cast, Means
 from robochoc.replay.replay import Difference, Scene, Stops
 from robochoc.replay.steps import Step, runs_of, steps_of
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from robochoc.message import Value
-from robochoc.solver.part import Interfaces
+from robochoc.model.message import Value
+from robochoc.solver.agent_problem import Interfaces
 
 LONGEST = 200
 """Characters of a phrase; what is longer is cut."""

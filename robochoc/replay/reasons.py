@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
-from robochoc.message import Message
-from robochoc.observers.events import Concluded, Sent
-from robochoc.outcome import Verdict
+from robochoc.journal.events import Concluded, Sent
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.nogood import NogoodStore
 from robochoc.protocols.protocol import Protocol
-from robochoc.replay.look import ALWAYS, MOST_VALUES, Look, carefully
+from robochoc.replay.inspection import ALWAYS, MOST_VALUES, Look, carefully
 from robochoc.replay.phrases import as_value
 from robochoc.replay.steps import Step
 

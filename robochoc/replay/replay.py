@@ -16,13 +16,13 @@ import msgspec
 
 from robochoc.communication.host import Host
 from robochoc.communication.run_result import Progress
-from robochoc.message import Envelope, Message
-from robochoc.observers.events import AnyEvent, Event, Received, Sent, Settled
-from robochoc.observers.journal import Header, Journal
-from robochoc.observers.journal_entries import STAMPED_LATE
-from robochoc.replay.cast import Cast, Ensemble, Means
+from robochoc.journal.entries import STAMPED_LATE
+from robochoc.journal.events import AnyEvent, Event, Received, Sent, Settled
+from robochoc.journal.journal import Header, Journal
+from robochoc.model.message import Envelope, Message
 from robochoc.replay.channels import Channels, Words
 from robochoc.replay.ending import Contradiction, Played, contradictions, played
+from robochoc.replay.rebuild import Cast, Ensemble, Means
 from robochoc.replay.steps import RobotEvent, Run, Step, runs_of, steps_of
 
 SIMULATED = "simulator"

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import takewhile
 from typing import NamedTuple
 
-from robochoc.observers.events import (
+from robochoc.journal.events import (
     AnyEvent,
     Began,
     Concluded,

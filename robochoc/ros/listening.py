@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from itertools import starmap
 
+from robochoc.flight.mission import Cast, Leg
+from robochoc.flight.reports import Report
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.loop import TOGETHER_S, Senses
+from robochoc.ros.closed_loop import TOGETHER_S, Senses
 from robochoc.ros.mappings import short_kind
-from robochoc.ros.mission import Cast, Leg
 from robochoc.ros.names import REPORTS
 from robochoc.ros.reading import Reading
-from robochoc.ros.reports import Report
 from robochoc.ros.source import Source
 
 PATIENCE_S = 10.0

@@ -14,11 +14,11 @@ from functools import cache
 from types import MappingProxyType
 from typing import cast
 
+from robochoc.flight.layout import Point
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.installed import loaded, named, names_in
-from robochoc.ros.layout import Point
 from robochoc.ros.sink import Fields
 from robochoc.ros.waypoint import Waypoint
+from robochoc.system.installed import loaded, named, names_in
 
 GROUP = "robochoc.waypoints"
 

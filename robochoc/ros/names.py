@@ -13,8 +13,8 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 
+from robochoc.flight.mission import Drone
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.mission import Drone
 
 REPORTS: Mapping[str, str] = MappingProxyType(
     {

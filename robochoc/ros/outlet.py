@@ -9,10 +9,10 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.ros.mission import Drone, Leg, Mission
+from robochoc.flight.mission import Drone, Leg, Mission
+from robochoc.flight.quadrotor.flown import Flown
+from robochoc.flight.reports import OutOfOrder, Report
 from robochoc.ros.publisher import Publisher
-from robochoc.ros.quadrotor.flown import Flown
-from robochoc.ros.reports import OutOfOrder, Report
 from robochoc.ros.sink import Sink
 from robochoc.ros.waypoint import waypoints
 

@@ -8,12 +8,12 @@ from typing import assert_never
 import numpy as np
 from numpy.typing import NDArray
 
+from robochoc.flight.layout import Point
+from robochoc.flight.mission import Drone, Leg
+from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.layout import Point
 from robochoc.ros.mappings import NoMapping, WaypointMapping, mapping_of, point
-from robochoc.ros.mission import Drone, Leg
 from robochoc.ros.names import REPORTS, Names
-from robochoc.ros.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.waypoint import Waypoint, waypoints
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from robochoc.flight.layout import Point
+from robochoc.flight.mission import Drone
+from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.layout import Point
-from robochoc.ros.mission import Drone
 from robochoc.ros.names import REPORTS, Names
-from robochoc.ros.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.ros.source import Heard
 
 LONGEST = 200

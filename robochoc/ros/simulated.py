@@ -9,13 +9,13 @@ from itertools import islice
 
 import numpy as np
 
+from robochoc.flight.flight import Conditions, Failure, Flight, Flown
+from robochoc.flight.layout import Point
+from robochoc.flight.mission import Cast, Drone, Goal, Leg
+from robochoc.flight.reports import OutOfOrder, Report
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.flight import Conditions, Failure, Flight, Flown
-from robochoc.ros.layout import Point
-from robochoc.ros.loop import TOGETHER_S, Senses
-from robochoc.ros.mission import Cast, Drone, Goal, Leg
+from robochoc.ros.closed_loop import TOGETHER_S, Senses
 from robochoc.ros.outlet import Broadcast, nanoseconds
-from robochoc.ros.reports import OutOfOrder, Report
 
 MOST_NAMES = 12
 """So many drones stand in a message."""

@@ -9,12 +9,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import cast
 
-from robochoc.entry_points import EntryPoint
-from robochoc.files import resolved
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.installed import loaded, missing, named
 from robochoc.ros.sink import Sink, SinkFailed
 from robochoc.ros.source import Source, SourceFailed
+from robochoc.system.entry_points import EntryPoint
+from robochoc.system.files import resolved
+from robochoc.system.installed import loaded, missing, named
 
 SINKS, SOURCES = "robochoc.sinks", "robochoc.sources"
 

@@ -12,13 +12,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import assert_never
 
-from robochoc.expression import Expression, Name, Undefined, evaluate, names
-from robochoc.problem import AddValue, Change, Domain, RemoveAgent, RemoveValue, Robot, Team
-from robochoc.ros.crew import Craft, crafts_of
-from robochoc.ros.layout import Point
-from robochoc.ros.mission import Drone
-from robochoc.ros.places import Places
-from robochoc.ros.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
+from robochoc.flight.crafts import Craft, crafts_of
+from robochoc.flight.layout import Point
+from robochoc.flight.mission import Drone
+from robochoc.flight.places import Places
+from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
+from robochoc.model.expression import Expression, Name, Undefined, evaluate, names
+from robochoc.model.problem import AddValue, Change, Domain, RemoveAgent, RemoveValue, Robot, Team
 
 BATTERY = 0.2
 """A drone whose battery holds less is out of order, where nobody says otherwise."""

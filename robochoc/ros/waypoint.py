@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robochoc.ros.layout import Point
-from robochoc.ros.mission import Drone, Leg
+from robochoc.flight.layout import Point
+from robochoc.flight.mission import Drone, Leg
 from robochoc.ros.names import Names
 
 

@@ -27,7 +27,6 @@ from typing import Any
 
 import msgspec
 
-from robochoc.orphans import signal_when_orphaned
 from robochoc.solver.ace_words import (
     BEST,
     LENGTH,
@@ -42,6 +41,7 @@ from robochoc.solver.ace_words import (
     ToSolver,
     codes_of,
 )
+from robochoc.system.orphans import signal_when_orphaned
 
 JVM_OPTIONS = (
     "-XX:+UseSerialGC",  # two cores, small heaps: the collector with the least to start

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import msgspec
 
-from robochoc.files import write_atomically
 from robochoc.solver.encoding import Codes, Network
+from robochoc.system.files import write_atomically
 
 FORMAT = 1
 """Counts up when what is stored, or how networks are encoded, changes."""

@@ -14,17 +14,17 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 
-from robochoc.outcome import Verdict
-from robochoc.problem import Kind, Team
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Kind, Team
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_words import Strategy
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.cliques import strengthened
 from robochoc.solver.encoding import Codes, Component, Network, components
 from robochoc.solver.failures import SolverTimeout
-from robochoc.solver.priced import Priced, charged_anyway, priced, with_robots_aside
 from robochoc.solver.question import Answer, Means
 from robochoc.solver.symmetry import broken, orbits, symmetries
+from robochoc.solver.weighted import Priced, charged_anyway, priced, with_robots_aside
 
 LONGEST_TABLE = 20_000
 """A clique with more solutions than this stays an allDifferent."""

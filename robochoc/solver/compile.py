@@ -9,7 +9,7 @@ from enum import StrEnum
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from robochoc.problem import Robot
+from robochoc.model.problem import Robot
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.domain import MOST_SOLUTIONS, CompiledDomain, TooManySolutions, compiled_domain
 from robochoc.solver.encoding import Codes, Network, Unsupported

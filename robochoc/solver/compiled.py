@@ -17,11 +17,11 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from robochoc.message import Value
-from robochoc.problem import INFINITE, Model
+from robochoc.model.message import Value
+from robochoc.model.problem import INFINITE, Model
+from robochoc.solver.agent_problem import Part
 from robochoc.solver.explanation import Known, held, held_below
 from robochoc.solver.filters import Filters
-from robochoc.solver.part import Part
 from robochoc.solver.shared import Conflict, Others, OwnValues, SharedConstraint, in_order_of_lowest
 
 if TYPE_CHECKING:

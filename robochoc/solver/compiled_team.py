@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from robochoc.problem import Robot, Team
+from robochoc.model.problem import Robot, Team
 from robochoc.solver.domain import CompiledDomain, compiled_domain
 
 CompileRobot = Callable[[Robot], CompiledDomain]

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.message import Value
+from robochoc.model.message import Value
 from robochoc.solver.shared import Others, SharedConstraint
 
 REMEMBERED = 512

@@ -12,8 +12,8 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from robochoc.message import Value
-from robochoc.problem import Constraint, Robot
+from robochoc.model.message import Value
+from robochoc.model.problem import Constraint, Robot
 from robochoc.solver.encoding import Codes, Component, Network, Unsupported, components, is_soft, price_on
 
 MOST_SOLUTIONS = 100_000

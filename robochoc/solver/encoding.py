@@ -13,8 +13,8 @@ import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from robochoc.expression import Undefined, compiled
-from robochoc.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Variable
+from robochoc.model.expression import Undefined, compiled
+from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Variable
 
 MOST_TUPLES = 4_000_000
 """How many tuples of values a constraint may have to be tried on."""

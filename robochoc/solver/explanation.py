@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from robochoc.problem import Constraint, Robot, Team
+from robochoc.model.problem import Constraint, Robot, Team
 
 
 class Known(NamedTuple):

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from robochoc.message import Value
+from robochoc.model.message import Value
+from robochoc.solver.agent_problem import Part
 from robochoc.solver.encoding import Unsupported
-from robochoc.solver.part import Part
 from robochoc.solver.shared import SharedConstraint
 
 LARGEST = 65_536

@@ -6,11 +6,11 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from robochoc.problem import Constraint, Kind, Team
+from robochoc.model.problem import Constraint, Kind, Team
 from robochoc.solver.cliques import strengthened
 from robochoc.solver.encoding import Codes, Component, Network, Table, Unsupported, components, is_soft
-from robochoc.solver.priced import HIGHEST, charged_anyway, charges_on
 from robochoc.solver.propagation import propagated
+from robochoc.solver.weighted import HIGHEST, charged_anyway, charges_on
 
 LEAST_VALUE, GREATEST_VALUE = -(2**31) + 10, 2**31 - 11
 """Values that ACE 2.6 reads: of 32 bits, but for a few that it keeps for itself (tried with ACE, one by one)."""

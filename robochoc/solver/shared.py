@@ -6,8 +6,8 @@ import itertools
 import math
 from collections.abc import Container, Iterable, Mapping, Sequence
 
-from robochoc.message import Value
-from robochoc.problem import Constraint
+from robochoc.model.message import Value
+from robochoc.model.problem import Constraint
 from robochoc.solver.encoding import dearest, holds_on, price_on
 
 Conflict = Mapping[str, Value]

@@ -8,7 +8,7 @@ from functools import partial
 from itertools import count
 from typing import TYPE_CHECKING
 
-from robochoc.problem import Robot, Team
+from robochoc.model.problem import Robot, Team
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import Compiler, Limits, Source
 from robochoc.solver.compiled_team import CompiledTeam

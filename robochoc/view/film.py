@@ -12,10 +12,10 @@ from enum import StrEnum
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.outcome import Verdict
-from robochoc.ros.layout import Axis, Point
-from robochoc.ros.mission import Leg, Mission
-from robochoc.ros.quadrotor.flown import Flown, Happening
+from robochoc.flight.layout import Axis, Point
+from robochoc.flight.mission import Leg, Mission
+from robochoc.flight.quadrotor.flown import Flown, Happening
+from robochoc.model.outcome import Verdict
 
 _HIT = "hits the ground"
 """What the flight says in the end of one that falls."""

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.ros.layout import Point
+from robochoc.flight.layout import Point
 from robochoc.view.palette import Colour
 from robochoc.view.quadrotor import Shape
 

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robochoc.outcome import Outcome, Verdict
-from robochoc.problem import Team
-from robochoc.ros.flight import fly
-from robochoc.ros.layout import Axis, Point
-from robochoc.ros.mission import Goal, Mission, mission_of
-from robochoc.ros.quadrotor.flown import Flown
+from robochoc.flight.flight import fly
+from robochoc.flight.layout import Axis, Point
+from robochoc.flight.mission import Goal, Mission, mission_of
+from robochoc.flight.quadrotor.flown import Flown
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.problem import Team
 from robochoc.view.film import Film, fell, film_of, in_cells, roomy
 
 _NO_FLIGHT = (ValueError, ArithmeticError, MemoryError)
@@ -77,7 +77,7 @@ def scene_of(
 
     `team` is as its files have it, before its scenario. `mission` is what the outcome asks of the drones, where that
     is known already, and `flown` how they flew that; without one they are flown here, in calm air, of
-    which `progress` hears (`ros/flight.py`).
+    which `progress` hears (`flight/flight.py`).
 
     Never raises for want of a place: a robot whose coordinates are missing or undefined is placed by the two
     numbers its name ends in (row and column), and failing that in a tidy grid, at the height of its first value. Nor

@@ -11,7 +11,7 @@ from typing import assert_never
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.ros.layout import Axis, Point
+from robochoc.flight.layout import Axis, Point
 from robochoc.view.film import Film, Look
 from robochoc.view.keyframes import Keys, Samples, angle, attitude_keys, position_keys
 from robochoc.view.label import label

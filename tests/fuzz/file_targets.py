@@ -29,18 +29,18 @@ from fuzz.mutations import (
     spoilt_text,
     spoilt_xml,
 )
-from robochoc.cli.commands import cli
-from robochoc.communication.schedule import Concurrent
-from robochoc.communication.simulator import Simulation
+from robochoc.cli.group import cli
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.flight.mission import mission_of
 from robochoc.formats import InvalidInput, read_team, write_team
 from robochoc.formats.result import BadResult, read_result, result_json
-from robochoc.observers.journal import BadJournal, Header, Recorder, lines_of, read_journal
-from robochoc.observers.journal_blocks import BEGINNING, PREAMBLE, Damaged, Unframer, framed
-from robochoc.outcome import Epoch, Metrics, Outcome, Place, Verdict
-from robochoc.problem import Team
+from robochoc.journal.blocks import BEGINNING, PREAMBLE, Damaged, Unframer, framed
+from robochoc.journal.journal import BadJournal, Header, Recorder, lines_of, read_journal
+from robochoc.model.outcome import Epoch, Metrics, Outcome, Place, Verdict
+from robochoc.model.problem import Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.dpop import DPOP
-from robochoc.ros.mission import mission_of
 from robochoc.ros.source import SourceFailed
 
 ROOT = Path(__file__).parents[2]

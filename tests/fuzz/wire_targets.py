@@ -39,10 +39,9 @@ from robochoc.authority.frames import (
     decode_question,
 )
 from robochoc.authority.keyring import BadCard, KeyCard
-from robochoc.communication.acl import ACLMessage, BadACL, parse, text
 from robochoc.communication.control import Conclusion, Counters, Events, Failed, Pause, Ready, Wave
-from robochoc.communication.network import words
-from robochoc.communication.network.letters import MASTER, Letters, Refused
+from robochoc.communication.network import control_messages as words
+from robochoc.communication.network.framing import MASTER, Letters, Refused
 from robochoc.communication.network.profile import (
     BadProfile,
     Profile,
@@ -56,9 +55,9 @@ from robochoc.communication.network.profile import (
 )
 from robochoc.communication.network.shared import BadShared, SharedRecord, known_of, record_of
 from robochoc.formats import on_one_line
-from robochoc.observers.events import AnyEvent, Decided, Sent
-from robochoc.outcome import Metrics, Place, Verdict
-from robochoc.problem import Robot, Team
+from robochoc.journal.events import AnyEvent, Decided, Sent
+from robochoc.model.outcome import Metrics, Place, Verdict
+from robochoc.model.problem import Robot, Team
 from robochoc.protocols.findings import Findings
 from robochoc.services.communicative_acts import Performative
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
@@ -66,6 +65,7 @@ from robochoc.services.directory import Directory
 from robochoc.services.facilitator import handle, subscribe
 from robochoc.services.identifier import AgentIdentifier, identifier_on
 from robochoc.services.sl import Function, df_on, request
+from robochoc.sniffer.acl import ACLMessage, BadACL, parse, text
 from robochoc.solver.explanation import Known
 
 LATEST = 1_800_000_000.0

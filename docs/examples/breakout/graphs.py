@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from random import Random
 
-from robochoc.expression import Type, parse
-from robochoc.problem import Child, Constraint, Domain, Parent, Predicate, Robot, Team, Variable
+from robochoc.model.expression import Type, parse
+from robochoc.model.problem import Child, Constraint, Domain, Parent, Predicate, Robot, Team, Variable
 
 DIFFER = Predicate("differ", ("X", "Y"), parse("ne(X, Y)", ("X", "Y"), Type.BOOLEAN))
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from robochoc.communication.network.letters import MASTER
+from robochoc.communication.network.framing import MASTER
 from robochoc.formats.names import is_name
 
 ALL = "*"

@@ -6,8 +6,8 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 
+from robochoc.communication.network.control_messages import Ask, Told
 from robochoc.communication.network.profile import Profile
-from robochoc.communication.network.words import Ask, Told
 from robochoc.services.communicative_acts import Performative
 from robochoc.services.descriptions import MAX_SERVICES, AgentDescription, Refused, ServiceDescription
 from robochoc.services.directory import Directory

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
+from robochoc.communication.network.control_messages import Gap
 from robochoc.communication.network.inbox import Missed
 from robochoc.communication.network.members import Members
-from robochoc.communication.network.words import Gap
 
 TO_MASTER = "a letter to the master"
 

@@ -21,24 +21,24 @@ from multiprocessing.util import get_temp_dir
 from typing import cast
 
 from robochoc.authority.admission import Household
-from robochoc.change import still_showing
 from robochoc.communication.network import fork_server
-from robochoc.communication.network.conditions import Conditions
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members, reach
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot_process import START_S, Given, robot_process
 from robochoc.communication.network.router import RouterFailed
-from robochoc.communication.robot_link import fate_of
+from robochoc.communication.network.settings import Conditions
+from robochoc.communication.processes.robot_link import fate_of
+from robochoc.communication.resources import require_descriptors, signals_held
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import Epoch, Session
-from robochoc.communication.system import require_descriptors, signals_held
-from robochoc.observers.events import Observer
-from robochoc.problem import Team
+from robochoc.journal.events import Observer
+from robochoc.model.change import still_showing
+from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
+from robochoc.solver.agent_problem import NO_BRIEF, Brief
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import Unsupported
-from robochoc.solver.part import NO_BRIEF, Brief
 
 LOOPBACK = "127.0.0.1"
 FAREWELL_S = 1.0

@@ -21,21 +21,8 @@ from robochoc.authority.admission import Admission
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Events, Failed, OfEpoch, Pause, Wave
 from robochoc.communication.network.access import ALL, journal_key
-from robochoc.communication.network.chronicle import Chronicle
-from robochoc.communication.network.conditions import Conditions
-from robochoc.communication.network.facilitator import DirectoryFacilitator
-from robochoc.communication.network.gaps import TO_MASTER, Gaps
-from robochoc.communication.network.gate import Gate
-from robochoc.communication.network.inbox import Arrived, Inbox, Missed, Presence, Woken
-from robochoc.communication.network.letters import MASTER, Letters, Refused
-from robochoc.communication.network.members import Member, Members, NotTaken
-from robochoc.communication.network.post import Post
-from robochoc.communication.network.profile import Profile
-from robochoc.communication.network.publication import Publication, PublicationDesk
-from robochoc.communication.network.requests import Requests
-from robochoc.communication.network.router import Refusal
-from robochoc.communication.network.tally import Tally
-from robochoc.communication.network.words import (
+from robochoc.communication.network.connection_policy import Gate
+from robochoc.communication.network.control_messages import (
     Ask,
     Bye,
     Denied,
@@ -54,15 +41,28 @@ from robochoc.communication.network.words import (
     Welcome,
     Word,
 )
-from robochoc.communication.robot_link import RobotsLost
+from robochoc.communication.network.facilitator import DirectoryFacilitator
+from robochoc.communication.network.framing import MASTER, Letters, Refused
+from robochoc.communication.network.gaps import TO_MASTER, Gaps
+from robochoc.communication.network.inbox import Arrived, Inbox, Missed, Presence, Woken
+from robochoc.communication.network.journal_server import Publication, PublicationDesk
+from robochoc.communication.network.master_events import Chronicle
+from robochoc.communication.network.members import Member, Members, NotTaken
+from robochoc.communication.network.profile import Profile
+from robochoc.communication.network.requests import Requests
+from robochoc.communication.network.router import Refusal
+from robochoc.communication.network.search_state import Tally
+from robochoc.communication.network.settings import Conditions
+from robochoc.communication.network.transport import Post
+from robochoc.communication.processes.robot_link import RobotsLost
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import over
-from robochoc.observers.events import Observer
-from robochoc.outcome import Verdict
-from robochoc.plain_text import LONGEST_REASON, on_one_line
+from robochoc.journal.events import Observer
+from robochoc.model.outcome import Verdict
 from robochoc.protocols.traits import Traits
+from robochoc.solver.agent_problem import Brief
 from robochoc.solver.encoding import TooMuch, Unsupported
-from robochoc.solver.part import Brief
+from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 
 TICK_S = 0.2
 REGISTRY_S = 0.5

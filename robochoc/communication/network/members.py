@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from robochoc.communication.network.access import ALL
+from robochoc.communication.network.control_messages import Task
 from robochoc.communication.network.plausibility import Declared
 from robochoc.communication.network.profile import (
     BadProfile,
@@ -20,10 +21,9 @@ from robochoc.communication.network.profile import (
     ranges_of,
     silhouette,
 )
-from robochoc.communication.network.words import Task
-from robochoc.problem import Robot
+from robochoc.model.problem import Robot
 from robochoc.protocols.traits import Traits
-from robochoc.solver.part import Brief
+from robochoc.solver.agent_problem import Brief
 
 
 def reach(profiles: Mapping[str, Profile], *, beyond: bool) -> dict[str, tuple[str, ...]]:

@@ -14,14 +14,14 @@ from itertools import chain
 from types import MappingProxyType
 from typing import NamedTuple
 
-from robochoc.communication.network.letters import LARGEST_LETTER
+from robochoc.communication.network.control_messages import Account, Checked, Exchanged, Judged
+from robochoc.communication.network.framing import LARGEST_LETTER
 from robochoc.communication.network.profile import LONGEST_NAME, MOST_VARIABLES
-from robochoc.communication.network.words import Account, Checked, Exchanged, Judged
 from robochoc.communication.quiescence import Counts
 from robochoc.formats.diagnostics import shortened
 from robochoc.formats.names import is_name
-from robochoc.outcome import Thoroughness
-from robochoc.problem import INFINITE, Domain
+from robochoc.model.outcome import Thoroughness
+from robochoc.model.problem import INFINITE, Domain
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.traits import Traits
 

@@ -13,8 +13,8 @@ import msgspec
 
 from robochoc.formats.extension import MAX_VALUES
 from robochoc.formats.names import is_name
-from robochoc.priorities import CycleError, priority_order
-from robochoc.problem import Child, Constraint, Domain, Kind, Parent, Robot, Variable
+from robochoc.model.priorities import CycleError, priority_order
+from robochoc.model.problem import Child, Constraint, Domain, Kind, Parent, Robot, Variable
 from robochoc.solver.encoding import dearest
 
 Ranges = tuple[tuple[int, int], ...]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-from robochoc.plain_text import on_one_line
+from robochoc.system.plain_text import on_one_line
 
 KINDS = 50
 """So many kinds of refusals of one and the same are told apart."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from robochoc.communication.network.control_messages import Ask, Sniff, Sniffable, Told
 from robochoc.communication.network.facilitator import DirectoryFacilitator, TooOften
-from robochoc.communication.network.publication import PublicationDesk
-from robochoc.communication.network.words import Ask, Sniff, Sniffable, Told
+from robochoc.communication.network.journal_server import PublicationDesk
 
 
 class Requests:

@@ -22,15 +22,7 @@ from robochoc.authority.keyring import BadCard, KeyCard, KeyRing, UnknownPeer
 from robochoc.communication.control import Failed, Pause, Wave
 from robochoc.communication.filters import FilterStack, NotGenuine, UnknownFilter, filter_named
 from robochoc.communication.host import BadMessage
-from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
-from robochoc.communication.network.letters import MASTER, Letters, Opened, Refused
-from robochoc.communication.network.manner import AS_USUAL, Manner
-from robochoc.communication.network.post import Post
-from robochoc.communication.network.profile import among, profile_of, ranges_of
-from robochoc.communication.network.quotas import Kept
-from robochoc.communication.network.refusals import Refusals
-from robochoc.communication.network.searcher import Searcher, Surroundings
-from robochoc.communication.network.words import (
+from robochoc.communication.network.control_messages import (
     Bye,
     Copies,
     Denied,
@@ -52,11 +44,19 @@ from robochoc.communication.network.words import (
     Welcome,
     Word,
 )
-from robochoc.message import Envelope
-from robochoc.plain_text import LONGEST_REASON, on_one_line
+from robochoc.communication.network.framing import MASTER, Letters, Opened, Refused
+from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
+from robochoc.communication.network.manner import AS_USUAL, Manner
+from robochoc.communication.network.profile import among, profile_of, ranges_of
+from robochoc.communication.network.quotas import Kept
+from robochoc.communication.network.refusals import Refusals
+from robochoc.communication.network.searcher import Searcher, Surroundings
+from robochoc.communication.network.transport import Post
+from robochoc.model.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.encoding import TooMuch, Unsupported
+from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 
 IDLE_S = 0.002
 """A robot that has heard nothing for so long reports its counters. Only when to ask; never whether it is over."""

@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 from robochoc.authority.identity import Identity, IdentityTexts
 from robochoc.communication.network.manner import Manner
-from robochoc.communication.network.post import CannotConnect, Post
 from robochoc.communication.network.robot import NetworkRobot
-from robochoc.orphans import signal_when_orphaned
+from robochoc.communication.network.transport import CannotConnect, Post
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
+from robochoc.system.orphans import signal_when_orphaned
 
 START_S = 60.0
 """How long robots may take to come."""

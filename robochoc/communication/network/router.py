@@ -20,8 +20,8 @@ from typing import IO, NamedTuple, cast
 
 from robochoc.authority.identity import Identity
 from robochoc.communication.network.access import access_control, yielding
-from robochoc.communication.network.letters import MASTER
-from robochoc.communication.network.post import encoded
+from robochoc.communication.network.framing import MASTER
+from robochoc.communication.network.transport import encoded
 
 START_S = 10.0
 """How long the router may take to listen."""

@@ -15,7 +15,7 @@ import sys
 import zenoh
 
 from robochoc.communication.network.zenoh_config import config
-from robochoc.orphans import signal_when_orphaned
+from robochoc.system.orphans import signal_when_orphaned
 
 READY = "listening"
 

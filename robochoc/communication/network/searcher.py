@@ -16,11 +16,7 @@ import msgspec
 
 from robochoc.communication.control import Conclusion, Counters, Events, Ready
 from robochoc.communication.host import BadMessage, Host
-from robochoc.communication.network.plausibility import MOST_JUDGED, fault_of_findings
-from robochoc.communication.network.profile import BadProfile, domain_of
-from robochoc.communication.network.quotas import Kept
-from robochoc.communication.network.shared import BadShared, SharedRecord, known_of, record_of
-from robochoc.communication.network.words import (
+from robochoc.communication.network.control_messages import (
     LATEST,
     Account,
     Checked,
@@ -31,17 +27,21 @@ from robochoc.communication.network.words import (
     Task,
     ToMaster,
 )
-from robochoc.communication.system import own_memory
-from robochoc.message import Envelope
-from robochoc.observers.events import AnyEvent
-from robochoc.outcome import Metrics
-from robochoc.problem import INFINITE, Constraint, Kind, Model
+from robochoc.communication.network.plausibility import MOST_JUDGED, fault_of_findings
+from robochoc.communication.network.profile import BadProfile, domain_of
+from robochoc.communication.network.quotas import Kept
+from robochoc.communication.network.shared import BadShared, SharedRecord, known_of, record_of
+from robochoc.communication.resources import own_memory
+from robochoc.journal.events import AnyEvent
+from robochoc.model.message import Envelope
+from robochoc.model.outcome import Metrics
+from robochoc.model.problem import INFINITE, Constraint, Kind, Model
 from robochoc.protocols.findings import NOTHING, Findings
 from robochoc.protocols.protocol import Protocol
+from robochoc.solver.agent_problem import Brief, Part
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.encoding import Unsupported
 from robochoc.solver.explanation import Known, held
-from robochoc.solver.part import Brief, Part
 
 EVENTS_AT_ONCE = 500
 PAIR = 2

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import msgspec
 
-from robochoc.expression import Expression, ExpressionError, Type, parse, text
 from robochoc.formats.diagnostics import shortened
 from robochoc.formats.names import is_name
-from robochoc.problem import Constraint, Model, Predicate, Relation, Semantics, Term
+from robochoc.model.expression import Expression, ExpressionError, Type, parse, text
+from robochoc.model.problem import Constraint, Model, Predicate, Relation, Semantics, Term
 from robochoc.solver.explanation import Known
 
 MOST_TERMS = 1000

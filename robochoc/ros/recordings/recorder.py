@@ -9,10 +9,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import ClassVar
 
-from robochoc.files import Unfinished
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.recordings.types import BadFields, UnknownType, Version, types_of
 from robochoc.ros.sink import Fields, Sink, SinkFailed
+from robochoc.system.files import Unfinished
 
 _END_OF_TIME = (1 << 32) * 10**9
 """Nanoseconds since the epoch that ROS 1 can tell."""

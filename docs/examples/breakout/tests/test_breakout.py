@@ -9,15 +9,15 @@ import pytest
 from graphs import colouring, soluble
 from robochoc_breakout import Breakout, Improve, Ok
 
-from robochoc.communication.schedule import Concurrent, RandomChannels, Schedule
-from robochoc.communication.simulator import Simulation
-from robochoc.message import Message
-from robochoc.observers.checker import objections
-from robochoc.outcome import Verdict
-from robochoc.problem import Team
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.part import parts
+from robochoc.verification.checker import objections
 
 
 def agents(team: Team) -> dict[str, Breakout]:

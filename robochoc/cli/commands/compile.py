@@ -1,0 +1,97 @@
+"""`robochoc compile`: what the robots' local problems come to."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from robochoc.cli.options.local_problems import limits, local_options
+from robochoc.cli.options.paths import InputPath, teams_at
+from robochoc.cli.reports.failures import LIMIT, Failure, failures_told, worst
+
+if TYPE_CHECKING:
+    from robochoc.solver.cache import SolutionCache
+    from robochoc.solver.compile import Limits
+
+
+@click.command("compile")
+@click.argument("paths", nargs=-1, required=True, type=InputPath(), metavar="TEAM ...")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a team.")
+@local_options
+@click.pass_context
+def compile_team(
+    context: click.Context,
+    paths: tuple[Path, ...],
+    *,
+    as_json: bool,
+    local_solutions: int,
+    local_timeout: float,
+    always_ace: bool,
+    no_cache: bool,
+) -> None:
+    """Compile the local problem of every robot of the teams at TEAM or below, and show what it comes to.
+
+    A robot's local solutions are all values of its variables that its private constraints allow. Those that look
+    alike to its neighbours make one group; the groups are the values that a protocol sees.
+
+    \b
+    variables  the robot's own
+    seen       those of them that neighbours see (shared constraints, what children are told)
+    private    constraints on own variables only
+    local      solutions of these
+    groups     of local solutions that look alike from outside
+    cost       of the cheapest local solution of a group, from the cheapest group to the dearest (DisWCSP)
+    how        direct: nothing to search; enumerated: a small problem, without ACE; ACE: solved by it now;
+               cached: by it, before; equal: for a robot above
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.solver.cache import SolutionCache
+
+    bounds = limits(local_solutions, local_timeout, always_ace=always_ace)
+    cache = None if no_cache else SolutionCache()
+    context.exit(worst([_status(folder, bounds, cache, as_json=as_json) for folder in teams_at(paths)]))
+
+
+def _status(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_json: bool) -> int:
+    try:
+        with failures_told(folder):
+            return _compile(folder, bounds, cache, as_json=as_json)
+    except Failure as failure:
+        failure.show()
+        return failure.exit_code
+
+
+def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_json: bool) -> int:
+    """Compile the team in `folder`, robots that reach a limit included, tell of it, and return the exit status."""
+    from robochoc.cli.reports.compile import json_report, print_table
+    from robochoc.cli.reports.progress import progress_line
+    from robochoc.communication.run_result import Progress
+    from robochoc.formats import on_one_line, read_team
+    from robochoc.solver.compile import Compilation, Compiler, CompileTimeout
+    from robochoc.solver.domain import TooManySolutions
+
+    began = time.monotonic()
+    team = read_team(folder)
+    found: list[Compilation | TooManySolutions | CompileTimeout] = []
+    with progress_line(team.name) as progress, Compiler(bounds, cache) as compiler:
+        for number, robot in enumerate(team.robots, 1):
+            if progress:
+                stage = f"compiling {robot.name} ({number} of {len(team.robots)})"
+                progress(Progress(0, time.monotonic() - began, stage))
+            try:
+                found.append(compiler.compile(robot))
+            except (TooManySolutions, CompileTimeout) as limit:
+                found.append(limit)
+    if as_json:
+        click.echo(json_report(team, found, time.monotonic() - began))
+    else:
+        print_table(team, found, time.monotonic() - began, folder)
+    limited = [one for one in found if not isinstance(one, Compilation)]
+    if not limited:
+        return 0
+    first, *others = limited
+    more = f" (and {len(others)} more: {', '.join(one.robot for one in others)})" if others else ""
+    click.echo(on_one_line(f"{folder}: {first}{more}"), err=True)
+    return LIMIT

@@ -1,0 +1,120 @@
+"""`robochoc directory`: ask a running master's Directory Facilitator who is there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from robochoc.cli.options.network import PlaceType, network_failures_told
+from robochoc.cli.options.paths import InputPath
+from robochoc.cli.options.tokens import token_options
+
+if TYPE_CHECKING:
+    from robochoc.run.networked.address import Place
+    from robochoc.services.descriptions import AgentDescription
+
+
+@click.command()
+@click.option(
+    "--master", "place", type=PlaceType(), required=True, metavar="HOST:PORT", help="Where the master listens."
+)
+@click.option(
+    "--as", "name", required=True, metavar="NAME", help="Who asks: an enrolled name (--role observer will do)."
+)
+@token_options()
+@click.option(
+    "--identity",
+    type=InputPath(),
+    metavar="DIR",
+    help="Where the key and the certificate are  [default: robochoc/identities/NAME in your data folder]",
+)
+@click.option(
+    "--search",
+    "slots",
+    multiple=True,
+    metavar="SLOT=VALUE",
+    help="Only who matches: protocol=abt, variable=V3.1, topic=..., name=Robot3.1, ontology=..., language=...",
+)
+@click.option(
+    "--patience",
+    "patience_s",
+    type=click.FloatRange(0, min_open=True),
+    default=10.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="How long the master may be out of reach.",
+)
+@click.option("--at-most", type=click.IntRange(1), metavar="N", help="At most so many agents.")
+@click.option("--watch", "watching", is_flag=True, help="Go on, and tell who comes and goes, until Ctrl-C.")
+@click.option("--sl", is_flag=True, help="Print the answer as it comes: FIPA-SL0.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object an agent.")
+def directory(
+    place: Place,
+    name: str,
+    token: str | None,
+    identity: Path | None,
+    *,
+    sl: bool,
+    as_json: bool,
+    watching: bool,
+    **given: Any,  # noqa: ANN401 - what to ask for, and how long to wait
+) -> None:
+    """List the agents that a running master's Directory Facilitator knows: their protocols, variables and topics.
+
+    A search gives back who matches all that is asked for.
+    """
+    if sl and as_json:
+        raise click.UsageError("--sl and --json are two forms of one answer; drop one")
+    with network_failures_told(place):
+        from robochoc.run.networked.consult import consult, found, search_words, watch
+        from robochoc.run.networked.join import identity_of
+
+        words = search_words(place, given["slots"], given["at_most"])
+        patience_s = given["patience_s"]
+        proof = identity_of(name, place, identity, token, patience_s)
+        if watching:
+            for answer in watch(place, proof, words, patience_s):
+                _tell(answer, sl=sl, as_json=as_json)
+            return
+        answer = consult(place, proof, words, patience_s)
+        if sl or as_json:
+            _tell(answer, sl=sl, as_json=as_json)
+        else:
+            _print_table(found(answer))
+
+
+def _tell(answer: str, *, sl: bool, as_json: bool) -> None:
+    """One answer, line by line; of one who has gone the name is all that is left."""
+    import msgspec
+
+    from robochoc.run.networked.consult import about, found
+    from robochoc.system.plain_text import on_one_line
+
+    if sl:
+        click.echo(on_one_line(answer, len(answer)))
+        return
+    agents = found(answer)
+    for agent in agents:
+        kinds = ", ".join(f"{one.type} {one.name}" for one in agent.services)
+        click.echo(msgspec.json.encode(agent).decode() if as_json else on_one_line(f"{agent.name}: {kinds}"))
+    gone = "" if agents else about(answer)
+    if gone:
+        told = msgspec.json.encode({"name": gone, "gone": True}).decode()
+        click.echo(told if as_json else on_one_line(f"{gone} has gone"))
+
+
+def _print_table(agents: tuple[AgentDescription, ...]) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    from robochoc.system.plain_text import on_one_line
+
+    table = Table("agent", "protocols", "variables", "topics")
+    for agent in agents:
+        kinds = {kind: [one.name for one in agent.services if one.type == kind] for kind in ("variable", "topic")}
+        cells = (agent.name, *map(", ".join, (agent.protocols, kinds["variable"], kinds["topic"])))
+        table.add_row(*(escape(on_one_line(cell)) for cell in cells))
+    Console().print(table if agents else "nobody that matches")

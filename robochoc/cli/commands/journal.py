@@ -1,0 +1,182 @@
+"""`robochoc journal`: what is in a journal, and in forms that other programs read."""
+
+from __future__ import annotations
+
+import shlex
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
+from robochoc.cli.options.saved import saved_journal
+from robochoc.cli.reports.failures import INVALID, USAGE, Failure
+
+if TYPE_CHECKING:
+    from robochoc.journal.journal import Journal
+    from robochoc.sniffer.selection import Selection
+    from robochoc.sniffer.trace import Trace
+
+FORMATS = ("jsonl", "acl", "csv", "mermaid", "html")
+MOST_IN_PAGE = 100_000
+"""Messages: with more, the page would be too large for browsers to open at once."""
+
+
+@click.group()
+def journal() -> None:
+    """What 'robochoc solve --journal FILE' has written: all that robots said to each other, took in and decided."""
+
+
+@journal.command(short_help="Say what is in a journal.")
+@click.argument("file", type=InputPath(), metavar="FILE")
+def show(file: Path) -> None:
+    """Say what was run, who took part, what was said how often, how it ended, and whether the journal is whole."""
+    from robochoc.cli.reports.journal import report
+
+    for line in report(_trace(saved_journal(file), file)):
+        click.echo(line)
+
+
+@journal.command(short_help="Write conversations for other programs, or as a page.")
+@click.argument("file", type=InputPath(), metavar="FILE")
+@click.option("--format", "form", type=click.Choice(FORMATS), required=True, help="What to write; see above.")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File to write  [default: standard output]")
+@click.option("--robots", default="", metavar="PATTERNS", help="Only what these say to each other: Robot3.1,Robot2.*")
+@click.option("--types", default="", metavar="PATTERNS", help="Only messages of these types: Ok,Nogood")
+@click.option("--from", "first", type=click.IntRange(0), default=0, metavar="N", help="From message N on; 0 is first.")
+@click.option("--to", "last", type=click.IntRange(0), metavar="N", help="Up to message N.")
+@click.option("--conversation", type=click.IntRange(1), metavar="N", help="Only run (or epoch) N; 1 is the first.")
+def export(
+    file: Path,
+    form: str,
+    output: Path | None,
+    robots: str,
+    types: str,
+    first: int,
+    last: int | None,
+    conversation: int | None,
+) -> None:
+    """Write the messages in the journal FILE, all or those that are meant.
+
+    \b
+    jsonl    the journal as text, one JSON object a line; robochoc reads it as well
+    acl      messages of FIPA ACL as text (FIPA00070), one a line
+    csv      a table: one message a row, with its cause, its words and its content
+    mermaid  a sequence diagram, for Markdown pages
+    html     one page that holds everything, to be opened in a browser or mailed
+
+    In PATTERNS, * stands for anything and ? for one character. Messages have the numbers that the page shows.
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.sniffer.patterns import patterns_in
+    from robochoc.sniffer.selection import NothingMeant, Selection
+    from robochoc.system.files import write_atomically
+
+    meant = Selection(patterns_in(robots), patterns_in(types), first, last, conversation)
+    refuse_same_places({"-o": output}, {"the journal": file})
+    read = saved_journal(file)
+    trace = _trace(read, file)
+    try:
+        messages = meant.of(trace)
+    except NothingMeant as nothing:
+        raise click.UsageError(_one_line(str(nothing))) from nothing
+    if trace.damage:
+        click.echo(_one_line(f"{file}: it is not whole, this is what can be read: {trace.damage}"), err=True)
+    options = {"--robots": robots, "--types": types, "--from": first, "--conversation": conversation, "-o": output}
+    try:
+        pieces = _pieces(form, read, trace, meant, messages)
+    except _TooMany as many:
+        again = f"; the first of them: {_command(file, form, {**options, '--to': many.last})}" if many.last else ""
+        raise Failure(USAGE, f"{many}{again}") from many
+    if output is None:
+        for piece in pieces:
+            click.echo(piece, nl=False)
+        return
+    content = b"".join(pieces)
+    try:
+        write_atomically(output, content)
+    except OSError as error:
+        why = f"{output}: the export cannot be written: {error.strerror} (free some space, or name another file)"
+        raise Failure(INVALID, _one_line(why)) from error
+    count = f"{len(messages):,} message{'s' * (len(messages) != 1)}"
+    click.echo(f"{output}: {count}, {len(content):,} bytes")
+
+
+def _pieces(form: str, read: Journal, trace: Trace, meant: Selection, messages: range | list[int]) -> Iterable[bytes]:
+    """The export, piece by piece."""
+    from robochoc.journal.journal import lines_of
+    from robochoc.sniffer.export import TooMuchToDraw, acl_texts, drawable, mermaid, table
+    from robochoc.sniffer.feed import Feed
+    from robochoc.sniffer.part import part_of
+
+    whole = len(messages) == len(trace.messages.t)
+    match form:
+        case "jsonl":
+            return lines_of(read if whole else part_of(read, trace, messages))
+        case "acl":
+            return acl_texts(Feed(trace), messages)
+        case "csv":
+            return table(Feed(trace), messages)
+        case "mermaid":
+            feed = Feed(trace)
+            try:
+                return [mermaid(feed, messages)]
+            except TooMuchToDraw as much:
+                why = f"{much} (choose some, by --robots, --types, --from and --to)"
+                raise _TooMany(why, drawable(feed, messages)) from much
+        case _:
+            return [_page(read, trace, meant)]
+
+
+class _TooMany(Exception):  # noqa: N818 - named for what was found
+    """Too many messages for the form; `last` is the last one of those that are not (None: there are none)."""
+
+    def __init__(self, why: str, fitting: Sequence[int]) -> None:
+        super().__init__(why)
+        self.last = fitting[-1] if fitting else None
+
+
+def _command(file: Path, form: str, options: Mapping[str, object]) -> str:
+    """The command to be entered for the same, with `options` as far as they say something."""
+    given = [str(part) for name, value in options.items() if value not in (None, "", 0) for part in (name, value)]
+    return shlex.join(["robochoc", "journal", "export", str(file), "--format", form, *given])
+
+
+def _page(read: Journal, trace: Trace, meant: Selection) -> bytes:
+    """The whole run: what some messages were said for, and what came of them, stands in others."""
+    from robochoc.sniffer.selection import Selection
+
+    if meant != replace(Selection(), robots=meant.robots):
+        raise click.UsageError("a page holds the whole run; choose in it (--robots says whom it shows at first)")
+    count = len(trace.messages.t)
+    if count > MOST_IN_PAGE:
+        raise Failure(
+            USAGE,
+            f"{count:,} messages are too many for one page: at most {MOST_IN_PAGE:,}"
+            " (look at them with 'robochoc sniff', or export another format)",
+        )
+    from robochoc.sniffer.feed import Feed
+    from robochoc.sniffer.moves import whole_scene
+    from robochoc.sniffer.packed import packed_feed
+    from robochoc.sniffer.page import page
+
+    feed = Feed(trace, chosen=meant.robots)
+    answers = {**packed_feed(feed, read), "scene": zlib.compress(whole_scene(trace))}
+    return page("embedded", answers, title=f"{read.header.protocol} on {read.header.team}")
+
+
+def _trace(read: Journal, file: Path) -> Trace:
+    from robochoc.sniffer.trace import Trace, TraceTooLarge
+
+    try:
+        return Trace.of(read)
+    except TraceTooLarge as large:
+        raise Failure(USAGE, f"{file}: {large}") from large
+
+
+def _one_line(words: str) -> str:
+    from robochoc.formats import on_one_line
+
+    return on_one_line(words)

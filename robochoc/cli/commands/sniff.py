@@ -1,0 +1,91 @@
+"""`robochoc sniff`: the page that explains a run, from its journal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from robochoc.cli.commands.sniff_master import Page, asks_master, master_options, sniff_master
+from robochoc.cli.options.paths import InputPath
+from robochoc.cli.options.saved import JOURNAL_STEP
+from robochoc.cli.reports.failures import INVALID, USAGE, Failure, invalid_input_fails
+
+if TYPE_CHECKING:
+    from robochoc.sniffer.session import Session
+
+
+@click.command()
+@click.argument("journal", type=InputPath(), metavar="[JOURNAL]", required=False)
+@master_options
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port of the page; 0 is any free one.")
+@click.option("--open", "open_browser", is_flag=True, help="Show the page in a browser.")
+@click.option(
+    "--robots",
+    "chosen",
+    default="",
+    metavar="PATTERNS",
+    help="Robots to begin with: names or patterns, such as Robot3.1,Robot2.*.  [default: all]",
+)
+@click.option(
+    "--team",
+    "folder",
+    type=InputPath(),
+    metavar="DIR",
+    help="The team's folder, for the 3D scene.  [default: what the journal says]",
+)
+@click.pass_context
+@invalid_input_fails
+def sniff(
+    context: click.Context,
+    /,
+    journal: Path | None,
+    port: int,
+    chosen: str,
+    folder: Path | None,
+    *,
+    open_browser: bool,
+    **asked: Any,  # noqa: ANN401 - who follows a master, and how
+) -> None:
+    """Show the conversations in JOURNAL on a page of this machine, until Ctrl-C: who said what, and why.
+
+    JOURNAL is what 'robochoc solve --journal' writes; while it is still written, the page follows it. With --master
+    it is what a master on another machine gives out of its run, to those who may sniff: docs/several-machines.md.
+    """
+    elsewhere = asks_master(journal, folder, asked)
+    if elsewhere or journal is None:
+        from robochoc.sniffer.patterns import patterns_in
+
+        context.exit(sniff_master(Page(tuple(patterns_in(chosen)), port, open_browser), **asked))
+    from robochoc.sniffer.server import serve
+
+    session = _session(journal, chosen, folder)
+    try:
+        serve(
+            session,
+            port=port,
+            open_browser=open_browser,
+            ready=lambda url: click.echo(f"{url} shows {journal} on this machine; Ctrl-C ends it", err=True),
+        )
+    except OSError as error:
+        raise Failure(USAGE, f"port {port}: {error.strerror} (choose another, or none)") from error
+
+
+def _session(journal: Path, chosen: str, folder: Path | None) -> Session:
+    """The journal, opened; its first piece is read, for what is none to be told at once."""
+    from robochoc.formats import on_one_line, read_team
+    from robochoc.journal.journal import BadJournal
+    from robochoc.sniffer.patterns import patterns_in
+    from robochoc.sniffer.session import Session
+    from robochoc.sniffer.trace import TraceTooLarge
+
+    robots = {robot.name: robot for robot in read_team(folder).robots} if folder else {}
+    try:
+        session = Session(journal, chosen=patterns_in(chosen), robots=robots)
+        session.begin()
+    except (BadJournal, TraceTooLarge) as wrong:
+        raise Failure(INVALID, on_one_line(f"{journal}: {wrong} ({JOURNAL_STEP})")) from wrong
+    except OSError as error:
+        raise Failure(INVALID, on_one_line(f"{journal}: {error.strerror or error} ({JOURNAL_STEP})")) from error
+    return session

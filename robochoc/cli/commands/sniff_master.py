@@ -1,0 +1,209 @@
+"""`robochoc sniff --master`: follow a run of a master elsewhere, on a page of this machine, or into a file."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from robochoc.cli.options.network import PlaceType, network_failures_told
+from robochoc.cli.options.paths import InputPath, OutputFile
+from robochoc.cli.options.tokens import token_options
+from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure
+
+if TYPE_CHECKING:
+    from robochoc.authority.identity import Identity
+    from robochoc.run.networked.address import Place
+    from robochoc.sniffer.remote import Followed
+    from robochoc.sniffer.viewer import Viewer
+
+Command = TypeVar("Command", bound=Callable[..., object])
+NAME = "Sniffer"
+"""Who sniffs if nothing else is said."""
+_ONLY_THERE = {"as": "name", "identity": "identity", "journal": "copy", "no-page": "no_page"}
+_OPTIONS = (
+    click.option(
+        "--master",
+        "place",
+        type=PlaceType(),
+        metavar="HOST:PORT",
+        help="Follow the run of the master there, which has to be --sniffable.",
+    ),
+    click.option(
+        "--as",
+        "name",
+        metavar="NAME",
+        help=f"With --master: who sniffs, a name enrolled with --may sniff.  [default: {NAME}]",
+    ),
+    token_options("With --master: enrol"),
+    click.option(
+        "--identity",
+        type=InputPath(),
+        metavar="DIR",
+        help="With --master: where key and certificate are  [default: robochoc/identities/NAME in your data folder]",
+    ),
+    click.option(
+        "--patience",
+        "patience_s",
+        type=click.FloatRange(0, min_open=True),
+        default=10.0,
+        show_default=True,
+        metavar="SECONDS",
+        help="With --master: how long it may be out of reach.",
+    ),
+    click.option(
+        "--journal", "copy", type=OutputFile(), metavar="FILE", help="With --master: keep what comes in FILE."
+    ),
+    click.option("--no-page", is_flag=True, help="With --master and --journal: no page; ends with the run."),
+)
+
+
+def master_options(command: Command) -> Command:
+    """What `sniff` is told of a master."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def asks_master(journal: Path | None, folder: Path | None, asked: Mapping[str, Any]) -> bool:
+    """Whether a master is to be followed, and not a `journal` looked into; `asked` holds what `master_options` give.
+
+    Raises `UsageError` where both are asked for, neither is, or something that does not go with it.
+    """
+    if asked["place"] is None:
+        if journal is None:
+            raise click.UsageError("say what to look into: a JOURNAL, or the run of --master HOST:PORT")
+        useless = [f"--{option}" for option, name in _ONLY_THERE.items() if asked[name]]
+        if useless:
+            raise click.UsageError(f"{useless[0]} goes with --master")
+    elif journal is not None:
+        raise click.UsageError("a JOURNAL and --master are two things to look into; drop one (--journal FILE keeps)")
+    elif folder is not None:
+        raise click.UsageError("--team goes with a JOURNAL: nobody shows its file to a sniffer")
+    elif asked["no_page"] and asked["copy"] is None:
+        raise click.UsageError("--no-page goes with --journal FILE: otherwise nothing would come of it")
+    return asked["place"] is not None
+
+
+@dataclass(frozen=True)
+class Page:
+    """How the run is shown: the robots to begin with (names and patterns), the page's port, and in a browser or not."""
+
+    chosen: tuple[str, ...]
+    port: int
+    open_browser: bool
+
+
+def sniff_master(
+    page: Page,
+    *,
+    place: Place,
+    copy: Path | None,
+    patience_s: float,
+    no_page: bool,
+    **given: Any,  # noqa: ANN401 - who sniffs
+) -> int:
+    """Follow the run of the master at `place` until it ends, then keep the page until Ctrl-C; the exit status."""
+    from robochoc.formats import on_one_line
+
+    with network_failures_told(place), ExitStack() as stack:
+        proof = _proof(place, patience_s, **given)
+        showing = _Showing(place, None if no_page else page, copy, stack)
+        ending = _received(place, proof, patience_s, showing)
+        click.echo(on_one_line(f"{ending.why}; {showing.kept}"), err=True)
+        showing.stay()
+    return 0 if ending.over else LOST
+
+
+def _proof(place: Place, patience_s: float, *, name: str | None, token: str | None, identity: Path | None) -> Identity:
+    """Whose right it is. Without a name it is the identity's."""
+    from robochoc.authority.identity import Identity
+    from robochoc.run.networked.join import identity_of
+
+    who = name or (Identity.load(identity).name if identity and not token else NAME)
+    return identity_of(who, place, identity, token, patience_s)
+
+
+def _received(place: Place, proof: Identity, patience_s: float, showing: _Showing) -> Followed:
+    from robochoc.sniffer.remote import receive
+
+    try:
+        return receive(place, proof, showing.write, patience_s=patience_s, granted=showing.begin)
+    except _NotKept as error:
+        raise Failure(INVALID, f"{error} (free some space, or name another file)") from error
+
+
+class _NotKept(Exception):  # noqa: N818 - named for what happened
+    """What comes cannot be written."""
+
+
+class _Showing:
+    """Where the journal goes: a file without a name, which the page's process reads, and a file of the user's."""
+
+    def __init__(self, place: Place, page: Page | None, copy: Path | None, stack: ExitStack) -> None:
+        self._place = place
+        self._page = page
+        self._copy = copy
+        self._stack = stack
+        self._sinks: list[Callable[[bytes], object]] = []
+        self._viewer: Viewer | None = None
+        self._size = 0
+
+    def begin(self) -> None:
+        """The master has agreed: show what will come."""
+        from robochoc.formats import on_one_line
+        from robochoc.journal.journal import JournalFile
+
+        if self._copy:
+            file = JournalFile(self._copy)
+            self._stack.callback(file.close)
+            self._sinks.append(file.write)
+        if self._page is None:
+            click.echo(on_one_line(f"following the run at {self._place} into {self._copy}"), err=True)
+            return
+        from robochoc.sniffer.viewer import Viewer
+
+        journal = self._stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115 - the stack closes it
+
+        def write(blocks: bytes) -> None:
+            journal.write(blocks)
+            journal.flush()
+
+        self._sinks.append(write)
+        try:
+            asked = self._page
+            viewer = Viewer(journal.fileno(), asked.chosen, asked.port, open_browser=asked.open_browser)
+        except OSError as error:
+            why = f"port {self._page.port}: {error.strerror} (choose another, or none)"
+            raise Failure(USAGE, why) from error
+        self._viewer = self._stack.enter_context(viewer)
+        click.echo(f"{viewer.url} shows the run at {self._place} on this machine; Ctrl-C ends it", err=True)
+
+    def write(self, blocks: bytes) -> None:
+        """Take in whole blocks. Raises `_NotKept`."""
+        try:
+            for sink in self._sinks:
+                sink(blocks)
+        except OSError as error:
+            what = f"{self._copy}: " if self._copy else ""
+            raise _NotKept(f"{what}what the master sends cannot be kept: {error.strerror}") from error
+        self._size += len(blocks)
+
+    @property
+    def kept(self) -> str:
+        """How much is here, in words."""
+        where = f"{self._size:,} bytes of its journal are here"
+        return f"{where}, in {self._copy}" if self._copy else where
+
+    def stay(self) -> None:
+        """Keep the page until Ctrl-C, or until its process has ended."""
+        if self._viewer is None:
+            return
+        with suppress(KeyboardInterrupt):  # which may come as soon as it is asked for
+            click.echo(f"{self._viewer.url} stays until Ctrl-C", err=True)
+            self._viewer.wait()

@@ -1,0 +1,379 @@
+"""`robochoc solve`: teams in, verdicts out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from robochoc.cli.options.channel import ChannelName, channel_for
+from robochoc.cli.options.local_problems import limits, local_options
+from robochoc.cli.options.order import GIVEN, OrderName, order_for
+from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places, teams_at
+from robochoc.cli.options.recording import recording, shown_and_flushed
+from robochoc.cli.options.ros import (
+    check_ros,
+    flight_options,
+    looped,
+    ros_asked,
+    ros_options,
+    situation_options,
+)
+from robochoc.cli.options.solve import (
+    WITHDRAWALS,
+    Products,
+    SolveCommand,
+    Wanted,
+    check_settings,
+    protocol_settings,
+)
+from robochoc.cli.reports.closed_loop import flight_told, told_of
+from robochoc.cli.reports.failures import LIMIT, Failure, failures_told, worst
+from robochoc.cli.reports.live_sniffer import Watch, check_chosen, watching
+from robochoc.run.defaults import MINIMISES, SATISFIES, suits
+
+if TYPE_CHECKING:
+    from robochoc.journal.journal import Header, Recorder
+    from robochoc.model.outcome import Outcome
+    from robochoc.model.problem import Team
+    from robochoc.ros.closed_loop import Loop
+    from robochoc.run.orchestrator import Options
+    from robochoc.verification.objective import Objective
+    from robochoc.view.scene import Scene
+
+
+@click.command(cls=SolveCommand)
+@click.argument("paths", nargs=-1, required=True, type=InputPath(), metavar="PATH ...")
+@click.option(
+    "--protocol",
+    metavar="NAME",
+    help=(
+        f"The robots solve it together by this one; by default {SATISFIES}, and {MINIMISES} where there are costs."
+        " central: no robots, one model of all files merged, solved by ACE if it is not small. All that there are:"
+        " robochoc protocols."
+    ),
+)
+@click.option(
+    "--set",
+    "settings_given",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="A setting of the protocol, such as --set cycles=500 for dsa; robochoc protocols NAME shows them.",
+)
+@click.option(
+    "--order",
+    type=OrderName(),
+    default=GIVEN,
+    show_default=True,
+    metavar="NAME|FILE",
+    help=(
+        "Priority order of the robots: given (the files'), lexicographic, max-degree, min-width, dom-deg, dfs, random"
+        " (from --seed), or a text file with a robot's name a line, the highest priority first."
+    ),
+)
+@click.option(
+    "--runtime",
+    type=click.Choice(["processes", "simulator", "network"]),
+    default="processes",
+    show_default=True,
+    help=(
+        "processes: one OS process per robot; simulator: one thread, repeatable; network: processes that register with"
+        " a master and talk through it by mutual TLS, on this machine (see robochoc master)."
+    ),
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Seed of the simulator, of --order random, of protocols that draw lots, and of --gusts.",
+)
+@click.option(
+    "--schedule",
+    type=click.Choice(["concurrent", "random"]),
+    default="concurrent",
+    show_default=True,
+    help="Simulator only. concurrent: time is counted in constraint checks; random: any channel may come next.",
+)
+@click.option(
+    "--delay",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Simulator, concurrent schedule only: the longest delay of a message, in constraint checks.",
+)
+@click.option(
+    "--channel",
+    type=ChannelName(),
+    metavar="NAME|FILE",
+    help=(
+        "Simulator only, instead of --delay: simulate time in seconds, computing and radio, by a channel model: wlan,"
+        " wpan, wman, wwan, or a TOML file (docs/channels.md)."
+    ),
+)
+@click.option(
+    "--timeout",
+    type=click.FloatRange(0, min_open=True),
+    metavar="SECONDS",
+    help="Give up after so long, compiling and the start of the processes included: verdict unknown, exit status 3.",
+)
+@click.option(
+    "--withdraw",
+    type=click.Choice(WITHDRAWALS),
+    metavar="[=fewest|maximal]",
+    help=(
+        "When the whole team has no solution, robots step aside. fewest (also without a word): as few as possible, by"
+        " their weights, and proven; maximal: whoever finds no place, in priority order, which is quick: nobody could"
+        " be added, but fewer might do."
+    ),
+)
+@click.option(
+    "--messages",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Give up after (about) so many messages: verdict unknown, exit status 3.",
+)
+@click.option(
+    "--on-loss",
+    type=click.Choice(["fail", "withdraw"]),
+    help=(
+        "When a robot's process dies. fail: the run ends, exit status 4 (the default); withdraw: the robot leaves the"
+        " problem with its constraints, the others go on."
+    ),
+)
+@click.option(
+    "--spare",
+    "spares",
+    type=click.IntRange(0),
+    default=0,
+    metavar="[=N]",
+    help=(
+        "N robots that die (1, without a number) come back: their files are read again, and they join at the end of"
+        " the order. Implies --on-loss withdraw."
+    ),
+)
+@click.option(
+    "--filter",
+    "filters",
+    multiple=True,
+    metavar="NAME",
+    help="Network only: signed or sealed, or an installed filter; messages go through all of them, in this order.",
+)
+@click.option("--explain", is_flag=True, help="Show the pseudo-tree too, if the robots have built one.")
+@click.option("--count", is_flag=True, help="With --protocol central: count all solutions.")
+@click.option(
+    "--verify",
+    is_flag=True,
+    help="Have a no-solution or a least cost confirmed by the central judge, on all files merged: two ways must agree.",
+)
+@local_options
+@ros_options
+@situation_options
+@flight_options
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a team, and nothing else, on standard output.")
+@click.option(
+    "--html",
+    type=OutputFile(),
+    metavar="FILE",
+    help="Write the 3D scene: one page that needs no server.",
+)
+@click.option(
+    "--journal",
+    type=OutputFile(),
+    metavar="FILE",
+    help="Write down every message and decision while the run goes on, in a compact file (docs/journal.md).",
+)
+@click.option("--serve", is_flag=True, help="Show the 3D scene live on this machine until Ctrl-C.")
+@click.option(
+    "--sniff",
+    metavar="[=PATTERNS]",
+    help=(
+        "Show who says what, as it is said, on a page of this machine until Ctrl-C; of these robots at first, such as"
+        " Robot3.1,Robot2.* (see robochoc sniff)."
+    ),
+)
+@click.option("--open", "open_browser", is_flag=True, help="With --sniff: show the page in a browser, then begin.")
+@click.pass_context
+def solve(
+    context: click.Context,
+    /,
+    paths: tuple[Path, ...],
+    *,
+    as_json: bool,
+    html: Path | None,
+    journal: Path | None,
+    serve: bool,
+    explain: bool,
+    **settings: Any,  # noqa: ANN401 - the options of `robochoc.run.orchestrator.Options`, by their names
+) -> None:
+    """Solve every team at PATH or below: by default each robot in its own OS process.
+
+    Every solution is held against every constraint of every file before it is told.
+    """
+    from robochoc.run.orchestrator import OnLoss, Options, Runtime, ScheduleName, Withdrawal
+
+    ros = ros_asked(settings)
+    check_settings(settings)
+    check_ros(ros, settings)
+    if explain and as_json:
+        raise click.UsageError("--explain is for people; the JSON result has the tree without it")
+    withdraw = settings.pop("withdraw")
+    protocol = settings.pop("protocol")
+    on_loss = settings.pop("on_loss") or ("withdraw" if settings["spares"] else "fail")
+    order = settings.pop("order")
+    named = {"--order": order, "--channel": settings["channel"]}
+    given = {option: value for option, value in named.items() if isinstance(value, Path)}
+    watched = watching(settings.pop("sniff"), open_browser=settings.pop("open_browser"))
+    with failures_told("--channel"):
+        channel = channel_for(settings.pop("channel"))
+    options = Options(
+        local=limits(
+            settings.pop("local_solutions"), settings.pop("local_timeout"), always_ace=settings.pop("always_ace")
+        ),
+        cache=not settings.pop("no_cache"),
+        settings=protocol_settings(settings.pop("settings_given")),
+        runtime=Runtime(settings.pop("runtime")),
+        schedule=ScheduleName(settings.pop("schedule")),
+        withdraw=Withdrawal(withdraw) if withdraw else None,
+        on_loss=OnLoss(on_loss),
+        channel=channel,
+        **settings,
+    )
+    folders = teams_at(paths)
+    refuse_same_places(
+        {"--html": html, "--journal": journal}, given, teams=folders, sinks=ros.sinks, situation=ros.situation
+    )
+    products = Products(html, journal, serve, watched)
+    if settings["count"] and products:
+        raise click.UsageError("--count gives a number: there is nothing for --html, --journal, --serve or --sniff")
+    if serve and products.watching:
+        raise click.UsageError("--serve and --sniff both stay until Ctrl-C; the page of --sniff shows the scene, too")
+    if ros and len(folders) > 1:
+        raise click.UsageError(f"--ros and --situation are for one team; {len(folders)} were found")
+    if products and len(folders) > 1:
+        raise click.UsageError(f"--html, --journal, --serve and --sniff are for one team; {len(folders)} were found")
+    wanted = Wanted(protocol, order, as_json=as_json, explain=explain, ros=ros)
+    context.exit(worst([_solve_one(folder, options, products, wanted) for folder in folders]))
+
+
+def _solve_one(folder: Path, options: Options, products: Products, wanted: Wanted) -> int:
+    """Solve the team in `folder`, tell the outcome, and return the exit status, once nobody watches any more."""
+    with Watch(products.watching) as watch:
+        status = _solved(folder, options, products, wanted, watch)
+        watch.stay()
+    return status
+
+
+def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, watch: Watch) -> int:
+    """The exit status of a run that somebody may watch."""
+    from robochoc.formats import on_one_line, read_team
+
+    try:
+        with failures_told(folder):
+            team = read_team(folder)
+            check_chosen(products.watching, team)
+            protocol = wanted.protocol or suits(team.kind)
+            options = replace(options, protocol=protocol, order=order_for(team, wanted.order))
+            header = partial(_header, team, options)
+            objective = None if wanted.ros.situation else _objective(team, options)
+            with (
+                looped(wanted.ros, team, options.seed) as loop,
+                recording(products.journal, header, objective, watch.begun()) as recorder,
+            ):
+                outcome = _run(team, options, recorder, loop)
+                team = loop.team if loop else team
+                _tell(team, outcome, wanted)
+                if loop and loop.mission is None:  # the run knew nothing of it
+                    loop.publish(outcome)
+                flight = flight_told(loop, wanted.ros, quiet=wanted.as_json)
+    except Failure as failure:
+        failure.show()
+        return failure.exit_code
+    for line in told_of(loop) if loop and not wanted.as_json else ():
+        click.echo(line, err=True)
+    if products.html or products.serve:
+        from robochoc.cli.reports.progress import stages
+        from robochoc.view.scene import scene_of
+
+        with stages(team.name) as progress:
+            scene = scene_of(outcome, team, mission=flight.mission, flown=flight.flown, progress=progress)
+        _show(scene, products, quiet=wanted.as_json)
+    if outcome.verdict != "unknown":
+        return flight.status
+    if outcome.reason and wanted.as_json:
+        click.echo(on_one_line(f"{folder}: {outcome.reason}"), err=True)
+    return LIMIT
+
+
+def _run(team: Team, options: Options, recorder: Recorder | None, loop: Loop | None) -> Outcome:
+    """Run with whatever watches, a journal, a line on the terminal, and where decisions go."""
+    from robochoc.cli.reports.progress import progress_line, waiting
+    from robochoc.run.orchestrator import CENTRAL
+    from robochoc.run.orchestrator import solve as run
+
+    told = loop and (loop.senses or (team.dynamic and options.protocol != CENTRAL))
+    with progress_line(team.name) as progress:
+        show = shown_and_flushed(recorder, progress)
+        if loop and loop.senses and show:
+            loop.senses.idle = waiting(show)
+        outcome = run(team, options, observer=recorder, progress=show, field=loop if told else None)
+    if recorder:
+        recorder.outcome = outcome
+        recorder.close()  # before anything else goes to where it may be written
+    return outcome
+
+
+def _header(team: Team, options: Options) -> Header:
+    """What the journal says of the run."""
+    from msgspec import UNSET
+
+    from robochoc.journal.journal import Header
+
+    return Header(
+        team=team.name,
+        protocol=options.protocol,
+        runtime=options.runtime,
+        seed=options.seed,
+        order=options.order or UNSET,
+        channel=options.channel.name if options.channel else UNSET,
+    )
+
+
+def _objective(team: Team, options: Options) -> Callable[[], Objective] | None:
+    """What the journal weighs decisions by; None where nothing is minimised, or the problem changes."""
+    from robochoc.run.orchestrator import Withdrawal
+    from robochoc.verification.objective import Objective, aside_cost
+
+    fewest = options.withdraw is Withdrawal.FEWEST
+    if team.dynamic or not (fewest or team.kind == "DisWCSP"):
+        return None
+    return lambda: Objective(team, aside_cost(team) if fewest else None)
+
+
+def _tell(team: Team, outcome: Outcome, wanted: Wanted) -> None:
+    if wanted.as_json:
+        from robochoc.formats.result import result_json
+
+        click.echo(result_json(outcome))
+    else:
+        from robochoc.cli.reports.outcome import report
+
+        click.echo(report(team, outcome))
+        if wanted.explain:
+            from robochoc.cli.reports.pseudo_tree import explained
+
+            click.echo(explained(outcome))
+
+
+def _show(scene: Scene, products: Products, *, quiet: bool) -> None:
+    """Write the page and serve the scene, as asked."""
+    from robochoc.cli.reports.scene import serve_scene, write_page
+
+    if products.html:
+        write_page(scene, products.html, quiet=quiet)
+    if products.serve:
+        serve_scene(scene)

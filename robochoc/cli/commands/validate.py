@@ -1,0 +1,108 @@
+"""`robochoc validate`: every mistake of every file, in one go."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from robochoc.cli.options.paths import InputPath
+from robochoc.cli.reports.failures import INVALID
+
+if TYPE_CHECKING:
+    from robochoc.formats import InvalidInput
+    from robochoc.model.problem import Robot
+
+
+@click.command()
+@click.argument("paths", nargs=-1, type=InputPath(), metavar="[PATH ...]")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a team.")
+@click.pass_context
+def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) -> None:
+    """Check every team at PATH or below (default: instances/), or single robots' files.
+
+    Four layers: XML, schema, each file's own meaning, the team as a whole. All mistakes of all files are told at
+    once, of each file those of its first layer that has any. Exit status 1 if there are any.
+    """
+    from robochoc.formats import InvalidInput, find_teams
+
+    reports: list[dict[str, Any]] = []
+    for path in paths or (Path("instances"),):
+        try:
+            found = [path] if path.is_file() else find_teams(path)
+        except InvalidInput as invalid:
+            reports.append(_invalid(path, invalid))
+        else:
+            reports.extend(_report(place) for place in found)
+    for report in reports:
+        _print_json(report) if as_json else _print(report)
+    if not all(report["valid"] for report in reports):
+        context.exit(INVALID)
+
+
+def _report(place: Path) -> dict[str, Any]:
+    """The validation of one team, or of one robot's file."""
+    from robochoc.formats import InvalidInput, encodable, read_robot, read_team
+
+    try:
+        if place.is_file():
+            robots: tuple[Robot, ...] = (read_robot(place),)
+            events = 0
+        else:
+            team = read_team(place)
+            robots, events = team.robots, len(team.scenario)
+    except InvalidInput as invalid:
+        return _invalid(place, invalid)
+    return {"path": encodable(str(place)), "valid": True, **_sizes(robots), "events": events, "errors": []}
+
+
+def _sizes(robots: tuple[Robot, ...]) -> dict[str, int]:
+    shared = sum(len(robot.private) + len(robot.shared) for robot in robots)
+    parts = sum(len(child.constraints) for robot in robots for child in robot.children)
+    return {
+        "robots": len(robots),
+        "variables": sum(len(robot.variables) for robot in robots),
+        "constraints": shared + parts,
+    }
+
+
+def _invalid(place: Path, invalid: InvalidInput) -> dict[str, Any]:
+    from robochoc.formats import encodable
+
+    errors = [
+        {
+            "file": encodable(one.file),
+            "line": one.line,
+            "message": one.message,
+            "hint": one.hint,
+            "text": str(one),
+        }
+        for one in invalid.diagnostics
+    ]
+    return {"path": encodable(str(place)), "valid": False, "errors": errors}
+
+
+def _print_json(report: dict[str, Any]) -> None:
+    import msgspec
+
+    click.echo(msgspec.json.encode(report))
+
+
+def _print(report: dict[str, Any]) -> None:
+    from robochoc.formats import on_one_line
+
+    path = on_one_line(report["path"])
+    if report["valid"]:
+        counts = ", ".join(
+            f"{report[what]} {what if report[what] != 1 else what[:-1]}"
+            for what in ("robots", "variables", "constraints", "events")
+            if what != "events" or report[what]
+        )
+        alone = "" if Path(report["path"]).is_dir() else " by itself"
+        click.echo(f"{path}: {counts}: ok{alone}")
+        return
+    errors = report["errors"]
+    click.echo(f"{path}: {len(errors)} error{'s' * (len(errors) != 1)}")
+    for error in errors:
+        click.echo(f"  {error['text']}")

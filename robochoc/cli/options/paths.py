@@ -1,0 +1,124 @@
+"""Paths on the command line: what cannot be read or written is said before the work, not after it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from types import MappingProxyType
+
+import click
+
+from robochoc.cli.reports.failures import INVALID, Failure
+
+PathLike = str | os.PathLike[str]
+
+
+class InputPath(click.Path):
+    """A path to read. Not the empty one, which an unset shell variable leaves: it would mean everything here."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: PathLike, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """The path. Fails, as wrong usage, where it is empty."""
+        if not os.fspath(value):
+            self.fail("a path is empty; write '.' for this folder", param, ctx)
+        return Path(os.fsdecode(super().convert(value, param, ctx)))
+
+
+class OutputFile(click.Path):
+    """A file to write, in a folder that is there and may be written to."""
+
+    def __init__(self) -> None:
+        super().__init__(dir_okay=False, path_type=Path)
+
+    def convert(self, value: PathLike, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """The path. Fails, as wrong usage, where no file could come into being."""
+        from robochoc.system.files import resolved
+
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        if path.is_dir():
+            self.fail(f"{path} is a folder; name a file", param, ctx)
+        if path.exists() and not path.is_file():  # a device or a pipe
+            return path
+        try:
+            folder = resolved(path).parent
+        except OSError as error:
+            self.fail(f"{path}: {error.strerror}; name another file", param, ctx)
+        if not folder.is_dir():
+            self.fail(f"there is no folder {folder}; make it first", param, ctx)
+        if not os.access(folder, os.W_OK | os.X_OK):
+            self.fail(f"nothing may be written in {folder}; choose another folder", param, ctx)
+        return path
+
+
+def refuse_same_places(
+    outputs: Mapping[str, Path | None],
+    inputs: Mapping[str, Path | None] = MappingProxyType({}),
+    *,
+    teams: Iterable[Path] = (),
+    sinks: Sequence[str] = (),
+    situation: str | None = None,
+) -> None:
+    """Raise `click.UsageError` where a command would write over what it reads, or two things to one place.
+
+    `outputs` and `inputs` are files, by what they are called on the command line; `teams` are folders whose files are
+    read; `sinks` and `situation` are what `--ros` and `--situation` name. Devices and pipes may be shared.
+    """
+    from robochoc.system.files import resolved
+
+    taken = dict(_named(inputs))
+    if situation:
+        taken[_place_of(f"--situation {situation}", situation)] = f"--situation {situation}"
+    written = [*_named(outputs), *((_place_of(f"--ros {text}", text), f"--ros {text}") for text in sinks)]
+    folders = [resolved(team) for team in teams if team.is_dir()]
+    for place, option in written:
+        other = taken.setdefault(place, option)
+        if other is not option:
+            told = f"{option} is given twice" if other == option else f"{other} and {option} are one place"
+            raise click.UsageError(told)
+        if isinstance(place, Path) and place.suffix == ".xml":
+            for folder in folders:
+                if place.is_relative_to(folder):
+                    raise click.UsageError(f"{option} would be a file of the team in {folder}; name another")
+
+
+def _named(files: Mapping[str, Path | None]) -> Iterator[tuple[Path | str, str]]:
+    """Where each file is that is given, and how it is called; no devices, and nothing that is nowhere."""
+    from robochoc.system.files import resolved
+
+    for what, path in files.items():
+        with suppress(OSError):  # whoever reads or writes it says what is wrong
+            if path and (path.is_file() or not path.exists()):
+                yield resolved(path), f"{what} {path}"
+
+
+def _place_of(option: str, text: str) -> Path | str:
+    """Where a sink or a source is. Raises `click.UsageError`."""
+    from robochoc.ros.sinks import place_of
+
+    try:
+        return place_of(text)
+    except OSError as error:
+        raise click.UsageError(f"{option}: {error.strerror}; name another file") from error
+
+
+def teams_at(paths: Iterable[Path]) -> list[Path]:
+    """Return the folders of all teams at `paths` or below, each once.
+
+    Raises `Failure`, which names every path without a team: nothing is done by half.
+    """
+    from robochoc.formats import InvalidInput, find_teams
+
+    folders: dict[Path, None] = {}
+    wrong = []
+    for path in paths:
+        try:
+            folders.update(dict.fromkeys(find_teams(path)))
+        except InvalidInput as invalid:
+            wrong.append(str(invalid))
+    if wrong:
+        raise Failure(INVALID, "\n".join(wrong))
+    return list(folders)

@@ -1,0 +1,385 @@
+"""Options of the commands that publish decisions, fly them, and listen to what the robots report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from robochoc.cli.options.paths import refuse_same_places
+from robochoc.cli.reports.failures import INVALID, USAGE, Failure
+
+if TYPE_CHECKING:
+    from robochoc.flight.flight import Conditions
+    from robochoc.flight.mission import Drone, Mission
+    from robochoc.model.problem import Assignment, Robot, Team
+    from robochoc.ros.closed_loop import Loop, Senses
+    from robochoc.ros.simulated import Surroundings
+    from robochoc.ros.sink import Sink
+
+Command = TypeVar("Command", bound=Callable[..., object])
+
+FLIGHT = "flight"
+"""What `--situation` says for the simulation."""
+FRAME = "map"
+AXES = 3
+
+
+class FrameType(click.ParamType[str]):
+    """The name of a frame."""
+
+    name = "frame"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """A name without blanks."""
+        if not value or not value.isprintable() or " " in value:
+            self.fail(f"{value!r} is no name of a frame, such as {FRAME}", param, ctx)
+        return value
+
+
+class PointType(click.ParamType["tuple[float, ...]"]):
+    """Three numbers with commas between them."""
+
+    name = "point"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:  # noqa: ANN401 - click's signature
+        """`1,2,0.5` as numbers."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            point = tuple(map(float, value.split(",")))
+        except ValueError:
+            point = ()
+        if len(point) != AXES or not all(map(math.isfinite, point)):
+            self.fail(f"{value!r} is not three numbers such as 1,2,3", param, ctx)
+        return point
+
+
+class WindType(PointType):
+    """A wind's velocity; one number is its speed along x."""
+
+    name = "wind"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:  # noqa: ANN401 - click's signature
+        """`3` as `3,0,0`."""
+        alone = isinstance(value, str) and "," not in value
+        return super().convert(f"{value},0,0" if alone else value, param, ctx)
+
+
+class FailureType(click.ParamType["tuple[str, float]"]):
+    """A robot or a drone, and when it fails."""
+
+    name = "failure"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, float]:  # noqa: ANN401 - click's signature
+        """`Robot3.1@5` as a name and seconds."""
+        from robochoc.ros.simulated import FAILS_S
+
+        if isinstance(value, tuple):
+            return value
+        name, at, seconds = value.rpartition("@")
+        if not at:
+            return value, FAILS_S
+        try:
+            at_s = float(seconds)
+        except ValueError:
+            at_s = math.nan
+        if not name or not 0 <= at_s < math.inf:
+            self.fail(f"{value!r} is not ROBOT or ROBOT@SECONDS", param, ctx)
+        return name, at_s
+
+
+class Finite(click.FloatRange):
+    """A number in a range, and one that can be reckoned with."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ANN401 - click's signature
+        """The number."""
+        number = super().convert(value, param, ctx)
+        return number if math.isfinite(number) else self.fail(f"{value} is no such number", param, ctx)
+
+
+def _optional(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
+    def decorated(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorated
+
+
+ros_options = _optional(
+    click.option(
+        "--ros",
+        "sinks",
+        multiple=True,
+        metavar="SINK",
+        help=(
+            "Publish decisions as waypoints: mcap:FILE (for Foxglove), rosbag:FILE, rosbridge://HOST:PORT, rospy, or"
+            " what is installed (docs/ros.md). May be given several times."
+        ),
+    ),
+    click.option("--frame", type=FrameType(), metavar="NAME", help=f"The frame of all places.  [default: {FRAME}]"),
+    click.option(
+        "--scale",
+        type=Finite(1e-6, 1e6),
+        metavar="METRES",
+        help="So long is a unit of the topics' x, y and z.  [default: 1, or less for a vast field]",
+    ),
+)
+"""`--ros`, `--frame`, `--scale`."""
+
+flight_options = _optional(
+    click.option(
+        "--fail",
+        "failures",
+        multiple=True,
+        type=FailureType(),
+        metavar="ROBOT[@SECONDS]",
+        help="In the simulated flight, a motor of this robot's drone stops (after 2 s). May be given several times.",
+    ),
+    click.option(
+        "--distance",
+        type=Finite(0, min_open=True),
+        metavar="METRES",
+        help="No two drones of the simulated flight come nearer.  [default: 0.5, or less where places are nearer]",
+    ),
+    click.option("--wind", type=WindType(), metavar="X[,Y,Z]", help="Wind in the simulated flight, in m/s."),
+    click.option("--gusts", type=Finite(0), metavar="M/S", help="Gusts in the simulated flight."),
+)
+"""`--fail`, `--distance`, `--wind`, `--gusts`."""
+
+situation_options = _optional(
+    click.option(
+        "--situation",
+        metavar="SOURCE",
+        help=(
+            "What robots report changes the problem, and the team solves again: flight (the decisions are flown in a"
+            " simulation), mcap:FILE, rosbag:FILE, rosbridge://HOST:PORT, rospy, or what is installed (docs/ros.md)."
+        ),
+    ),
+    click.option(
+        "--patience",
+        type=Finite(0, min_open=True),
+        metavar="SECONDS",
+        help=(
+            "A robot whose process is stopped (SIGSTOP), or on a network out of reach, for so long is lost (see"
+            " --on-loss).  [default: it is waited for; on a network 10]  With --situation: so long robots have to"
+            " report something after each decision; then the run is over.  [default: 10]"
+        ),
+    ),
+    click.option(
+        "--battery",
+        type=Finite(0, 1),
+        metavar="LEVEL",
+        help="A robot leaves when a battery of its drones holds less (1 is full).  [default: 0.2]",
+    ),
+    click.option(
+        "--obstacle",
+        "obstacles",
+        multiple=True,
+        type=PointType(),
+        metavar="X,Y,Z",
+        help="Something in the way of the simulated flight, in the problem's units. May be given several times.",
+    ),
+)
+"""`--situation`, `--patience`, `--battery`, `--obstacle`."""
+
+_FLOWN = {"failures": "--fail", "distance": "--distance", "wind": "--wind", "gusts": "--gusts"}
+_FLOWN_HERE = {**_FLOWN, "obstacles": "--obstacle"}
+_HEARD = {"battery": "--battery"}
+_PLACED = {"frame": "--frame", "scale": "--scale"}
+_NOT_PUBLISHED = "is for what is published: add --ros SINK"
+
+
+@dataclass(frozen=True)
+class Ros:
+    """What the options ask for: where decisions go, and where the robots' situation comes from."""
+
+    sinks: tuple[str, ...]
+    situation: str | None
+    frame: str
+    scale: float | None
+    patience: float | None
+    battery: float | None
+    surroundings: Mapping[str, Any]
+
+    def __bool__(self) -> bool:
+        return bool(self.sinks or self.situation)
+
+
+def ros_asked(settings: dict[str, Any]) -> Ros:
+    """Take the options of this file out of `settings`. What would be ignored is wrong usage."""
+    sinks, situation = settings.pop("sinks"), settings.pop("situation")
+    given = {name: settings.pop(name) for name in (*_FLOWN_HERE, *_HEARD, *_PLACED)}
+    patience = settings["patience"]
+    asked = {name for name, value in given.items() if value not in (None, ())}
+    if situation != FLIGHT:
+        _refuse(_FLOWN_HERE, asked, "is for the simulated flight: add --situation flight")
+    if situation in {None, FLIGHT}:
+        _refuse(_HEARD, asked, "is for robots that are listened to: add --situation mcap:FILE, or another source")
+        if patience is not None and (settings["runtime"] == "simulator" or settings["protocol"] == "central"):
+            raise click.UsageError("--patience is for robots with processes, and for those that are listened to")
+    if not (sinks or situation):
+        _refuse(_PLACED, asked, _NOT_PUBLISHED)
+    surroundings = {name: given[name] for name in _FLOWN_HERE if name in asked}
+    frame = given["frame"] or FRAME
+    return Ros(sinks, situation, frame, given["scale"], patience, given["battery"], surroundings)
+
+
+def _refuse(options: Mapping[str, str], asked: set[str], why: str) -> None:
+    for name, option in options.items():
+        if name in asked:
+            raise click.UsageError(f"{option} {why}")
+
+
+def check_ros(ros: Ros, settings: Mapping[str, Any]) -> None:
+    """What does not go together with the rest of `robochoc solve`: `settings` are its options."""
+    if settings["count"] and ros:
+        raise click.UsageError("--count gives a number: there is nothing for --ros, and nothing that could change")
+    if not ros.situation:
+        return
+    asked = {
+        "--withdraw": settings["withdraw"],
+        "--runtime network": settings["runtime"] == "network",
+        "--protocol central": settings["protocol"] == "central",
+    }
+    for option in (name for name, value in asked.items() if value):
+        raise click.UsageError(
+            f"--situation changes the problem while robots solve it; {option} cannot go on with that"
+        )
+
+
+@contextmanager
+def ros_failures_told() -> Iterator[None]:
+    """What goes wrong with sinks, sources and names becomes one line, and `Failure`."""
+    from robochoc.ros.mappings import NoMapping
+    from robochoc.ros.names import NameClash
+    from robochoc.ros.publisher import NothingToPublish
+    from robochoc.ros.sink import SinkFailed
+    from robochoc.ros.sinks import NoSuchSink, NoSuchSource
+    from robochoc.ros.source import SourceFailed
+
+    try:
+        yield
+    except (NoSuchSink, NoSuchSource) as wrong:
+        raise Failure(USAGE, str(wrong)) from wrong
+    except (NameClash, NoMapping, NothingToPublish, SinkFailed, SourceFailed) as wrong:
+        raise Failure(INVALID, str(wrong)) from wrong
+
+
+@contextmanager
+def flights_told() -> Iterator[None]:
+    """A decision that cannot be flown becomes one line, and `Failure`."""
+    from robochoc.ros.simulated import CannotFly
+
+    try:
+        yield
+    except CannotFly as wrong:
+        raise Failure(INVALID, str(wrong)) from wrong
+
+
+def open_sinks(texts: Sequence[str], stack: ExitStack) -> list[Sink]:
+    """The sinks, which `stack` closes. Raises `SinkFailed`."""
+    from robochoc.ros.sinks import open_sink
+
+    return [stack.enter_context(open_sink(text)) for text in texts]
+
+
+def surroundings_of(given: Mapping[str, Any], seed: int) -> Surroundings:
+    """What the options of a simulated flight ask for; those that are not given are left out."""
+    from robochoc.ros.simulated import Surroundings
+
+    return Surroundings(seed=seed, **given)
+
+
+@contextmanager
+def _surroundings_told() -> Iterator[None]:
+    """A drone that is not there, or weather in which nothing flies, is wrong usage."""
+    from robochoc.ros.simulated import NoSuchDrone
+
+    try:
+        yield
+    except NoSuchDrone as wrong:
+        raise click.UsageError(f"--fail: {wrong}") from wrong
+    except ValueError as wrong:
+        raise click.UsageError(str(wrong)) from wrong
+
+
+def conditions_of(given: Mapping[str, Any], mission: Mission) -> Conditions:
+    """What the options of `robochoc fly` ask for. Raises `click.UsageError` for a drone that is not there."""
+    asked = {name: given[name] for name in _FLOWN if given[name] not in (None, ())}
+    with _surroundings_told():
+        return surroundings_of(asked, given["seed"]).conditions(mission.drones, mission.scale)
+
+
+@contextmanager
+def looped(ros: Ros, team: Team, seed: int) -> Iterator[Loop | None]:
+    """The loop of `team`, if there is to be one; what it publishes is complete once the `with` is left without error.
+
+    Raises `Failure`, and `click.UsageError` for what does not go with the team, or the source.
+    """
+    if not ros:
+        yield None
+        return
+    from robochoc.ros.closed_loop import Loop, drones_of
+    from robochoc.ros.situation import BATTERY
+
+    with flights_told() if ros.situation == FLIGHT else nullcontext(), ros_failures_told(), ExitStack() as stack:
+        senses = _senses(ros, drones_of(team), seed, stack) if ros.situation else None
+        battery = BATTERY if ros.battery is None else ros.battery
+        sinks = open_sinks(ros.sinks, stack)
+        yield Loop(team, sinks, senses, frame=ros.frame, scale=ros.scale, battery=battery)
+
+
+def _senses(ros: Ros, drones: Sequence[Drone], seed: int, stack: ExitStack) -> Senses:
+    """What `--situation` asks for."""
+    if ros.situation == FLIGHT:
+        from robochoc.ros.simulated import Flying
+
+        surroundings = surroundings_of(ros.surroundings, seed)
+        with _surroundings_told():
+            surroundings.check(drones)
+        return Flying(surroundings)
+    from robochoc.ros.listening import PATIENCE_S, Listening
+    from robochoc.ros.reading import Reading
+    from robochoc.ros.sinks import open_source
+
+    source = stack.enter_context(open_source(ros.situation or ""))
+    if ros.patience is not None and not source.live:
+        raise click.UsageError(f"--patience is for robots that report while we wait; {ros.situation} is a recording")
+    return Listening(source, Reading(drones, ros.frame), ros.patience or PATIENCE_S)
+
+
+@contextmanager
+def outlets(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assignment], list[str]]]:
+    """Takes --ros, --frame and --scale out of `given`: what `robot` alone is to publish, and where.
+
+    Gives a function for the run's end, by the master's words, and the robot's own decision: it publishes that, and says
+    what went where. Raises `Failure`.
+    """
+    texts, frame, scale = (given.pop(name) for name in ("sinks", *_PLACED))
+    if not texts:
+        _refuse(_PLACED, {name for name, value in zip(_PLACED, (frame, scale), strict=True) if value}, _NOT_PUBLISHED)
+        yield lambda _why, _assignment: []
+        return
+    import time
+
+    from robochoc.ros.outlet import Outlet
+    from robochoc.ros.single_robot import crew_alone, leg_alone
+
+    refuse_same_places({}, sinks=texts)
+    with ros_failures_told(), ExitStack() as stack:
+        opened = open_sinks(texts, stack)
+        found = [Outlet(robot.name, crew_alone(robot), sink, frame or FRAME) for sink in opened]
+
+        def publish(why: str, assignment: Assignment) -> list[str]:
+            leg = leg_alone(robot, why, assignment, scale)
+            for outlet in found:
+                outlet.decide(leg, time.time_ns())
+            return [f"{outlet.place}: {outlet.told}" for outlet in found]
+
+        yield publish

@@ -1,0 +1,114 @@
+"""What robochoc has written itself, and is given back: journals and results, and the team that they are of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from robochoc.cli.options.paths import InputPath
+from robochoc.cli.reports.failures import INVALID, Failure
+
+if TYPE_CHECKING:
+    from robochoc.journal.journal import Journal
+    from robochoc.model.outcome import Outcome
+    from robochoc.model.problem import Team
+
+LARGEST_FILE = 1 << 30
+"""1 GiB: a journal of hundreds of millions of messages, or one of millions as text."""
+JOURNAL_STEP = "give what 'robochoc solve --journal' wrote"
+_OUTCOME_STEP = "give what 'robochoc solve --json' or '--journal' wrote"
+
+team_option = click.option(
+    "--team",
+    "folder",
+    type=InputPath(),
+    metavar="DIR",
+    help="The team's folder: it has the robots' names and topics.  [default: instances/TEAM, if it is there]",
+)
+
+
+def saved_content(file: Path, next_step: str) -> bytes:
+    """What is in `file`. Raises `Failure`, which ends in `next_step`."""
+    try:
+        with file.open("rb") as stream:
+            content = stream.read(LARGEST_FILE + 1)
+    except OSError as error:
+        raise _refused(file, str(error.strerror or error), next_step) from error
+    if len(content) > LARGEST_FILE:
+        raise _refused(file, f"it has more than {LARGEST_FILE:,} bytes", next_step)
+    return content
+
+
+def saved_journal(file: Path) -> Journal:
+    """The journal in `file`. Raises `Failure`."""
+    from robochoc.journal.journal import BadJournal, read_journal
+
+    content = saved_content(file, JOURNAL_STEP)
+    try:
+        return read_journal(content)
+    except BadJournal as wrong:
+        raise _refused(file, str(wrong), JOURNAL_STEP) from wrong
+
+
+def saved_outcome(saved: Path) -> Outcome:
+    """What the file, a JSON result or a journal, tells of the end of a run. Raises `Failure`."""
+    from robochoc.formats.result import BadResult, read_result
+    from robochoc.journal.journal import BadJournal, is_journal, read_journal
+
+    content = saved_content(saved, _OUTCOME_STEP)
+    try:
+        if not is_journal(content):
+            return read_result(content)
+        journal = read_journal(content)
+    except (BadJournal, BadResult) as wrong:
+        raise Failure(INVALID, f"{saved}: {wrong} ({_OUTCOME_STEP})") from wrong
+    if journal.outcome is None:
+        why = journal.damage or "the run broke off"
+        raise Failure(INVALID, f"{saved}: {why}, so there is no outcome to show ({_OUTCOME_STEP})")
+    return journal.outcome
+
+
+def team_of(outcome: Outcome, saved: Path, folder: Path | None) -> Team | None:
+    """The team in `folder`, or where teams of that name usually are; None, which is told, if it is not there.
+
+    Raises `InvalidInput`, and `Failure` for another team than that of `outcome`, which is from the file `saved`.
+    """
+    from robochoc.formats import read_team
+
+    folder = folder or _usual_folder(outcome)
+    team = read_team(folder) if folder else None
+    if team and not _is_team_of(outcome, team):
+        why = f"this is not the team of {saved}, {outcome.team} (give its folder with --team)"
+        raise Failure(INVALID, f"{folder}: {why}")
+    return team
+
+
+def _is_team_of(outcome: Outcome, team: Team) -> bool:
+    """Whether all who took part, and all that they decided, are known to `team` or come with its scenario."""
+    from robochoc.flight.mission import everybody
+
+    robots = everybody(team)
+    names = {robot.name for robot in robots}
+    variables = {variable.name for robot in robots for variable in robot.variables}
+    epochs = outcome.epochs
+    there = {*outcome.withdrawn, *(name for epoch in epochs for name in epoch.robots)}
+    decided = {*outcome.assignment, *(name for epoch in epochs for name in epoch.assignment)}
+    return there <= names and decided <= variables
+
+
+def _usual_folder(outcome: Outcome) -> Path | None:
+    """Where `generate` puts teams of that name, if it is there."""
+    name = Path(outcome.team).name
+    folder = Path("instances") / name
+    if name not in {"", ".."} and folder.is_dir():
+        return folder
+    click.echo(f"{folder} is not there: drones are named for variables, without topics (give --team DIR)", err=True)
+    return None
+
+
+def _refused(file: Path, why: str, next_step: str) -> Failure:
+    from robochoc.formats import on_one_line
+
+    return Failure(INVALID, on_one_line(f"{file}: {why} ({next_step})"))

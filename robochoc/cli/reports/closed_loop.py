@@ -1,0 +1,53 @@
+"""What is told of a closed loop: what was published, what could not be heeded, and how a simulated flight went."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import click
+
+from robochoc.cli.options.ros import FLIGHT, Ros
+from robochoc.cli.reports.failures import LOST
+
+if TYPE_CHECKING:
+    from robochoc.flight.flight import Flown
+    from robochoc.flight.mission import Mission
+    from robochoc.ros.closed_loop import Loop
+
+
+def told_of(loop: Loop) -> list[str]:
+    """What was published where, and what could not be heeded: a line each."""
+    return [*(f"{outlet.place}: {outlet.told}" for outlet in loop.outlets), *loop.notes]
+
+
+class Flight(NamedTuple):
+    """What a simulated flight has come to, if there was one."""
+
+    status: int = 0
+    mission: Mission | None = None
+    flown: Flown | None = None
+
+
+def flight_told(loop: Loop | None, ros: Ros, *, quiet: bool) -> Flight:
+    """How a simulated flight went, which is told. Whoever fell has left the team: that alone is no failure."""
+    if loop is None or ros.situation != FLIGHT:
+        return Flight()
+    from robochoc.cli.reports.flight import as_planned, how_it_went, too_late
+
+    flight = _flown_by(loop)
+    if flight is None:
+        return Flight()
+    mission, flown = flight
+    if not quiet:
+        click.echo(how_it_went(flown))
+        for line in too_late(ros.surroundings.get("failures", ()), flown):
+            click.echo(line, err=True)
+    return Flight(0 if as_planned(flown, may_fall=True) else LOST, mission, flown)
+
+
+def _flown_by(loop: Loop) -> tuple[Mission, Flown] | None:
+    """What a simulated flight has flown; None where nothing was."""
+    from robochoc.ros.simulated import Flying
+
+    flown = loop.senses.flown() if isinstance(loop.senses, Flying) else None
+    return (loop.mission, flown) if loop.mission and flown else None

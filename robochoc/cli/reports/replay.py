@@ -1,0 +1,162 @@
+"""What `robochoc replay` says: the counts, and the first difference, for people and as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import msgspec
+
+from robochoc.formats import on_one_line
+from robochoc.journal.events import (
+    AnyEvent,
+    Concluded,
+    Decided,
+    Heard,
+    Received,
+    Sent,
+    Settled,
+)
+from robochoc.journal.journal import Journal
+from robochoc.replay import Contradiction, Difference, Replayed
+
+LONGEST = 400
+"""Characters of one message's content."""
+MOST = 20
+"""So many messages of a packet are shown, and so many robots that could not be followed."""
+
+
+def report(journal: Journal, replayed: Replayed) -> str:
+    """For people: a few lines, and the first difference if there is one."""
+    header = journal.header
+    lines = [f"{header.team}: {header.protocol}, runtime {header.runtime}, seed {header.seed}"]
+    for what, count in _counts(replayed).items():
+        lines.append(f"  {what:9} {count:>12,}")
+    lines += _shortfalls(replayed)
+    if replayed.difference is not None:
+        lines += _shown(replayed.difference)
+    elif replayed.contradictions:
+        lines.append("  different, though all steps are the same:" if replayed.steps else "  different:")
+        lines += _contradicted(replayed.contradictions)
+    elif not replayed.steps:
+        lines.append("  nothing was compared: it holds no step of any robot that could be played")
+    elif replayed.damage and not replayed.truncated:
+        lines.append("  what stands before the damage is the same; this is not the journal that was written")
+    else:
+        whole = replayed.ended and not (replayed.stopped or replayed.unfinished or replayed.damage)
+        lines.append("  the same" if whole else "  the same, as far as it goes")
+    return "\n".join(on_one_line(line) for line in lines)
+
+
+def result_json(journal: Journal, replayed: Replayed) -> str:
+    """The same as one JSON object."""
+    header = journal.header
+    told: dict[str, object] = {
+        "team": header.team,
+        "protocol": header.protocol,
+        "runtime": header.runtime,
+        "seed": header.seed,
+        "identical": replayed.identical,
+        **_counts(replayed),
+        "unfinished": replayed.unfinished,
+        "stopped": replayed.stopped,
+        "damage": replayed.damage,
+        "truncated": replayed.truncated,
+        "ended": replayed.ended,
+        "difference": replayed.difference,
+        "contradictions": replayed.contradictions,
+    }
+    return msgspec.json.format(msgspec.json.encode(told), indent=2).decode()
+
+
+def _counts(replayed: Replayed) -> dict[str, int]:
+    return {
+        "runs": replayed.runs,
+        "robots": replayed.robots,
+        "steps": replayed.steps,
+        "messages": replayed.messages,
+    }
+
+
+def _shortfalls(replayed: Replayed) -> Iterator[str]:
+    """What could not be played, and why."""
+    if replayed.damage:
+        yield f"  the journal {'ends early' if replayed.truncated else 'was altered'}: {replayed.damage}"
+    elif not replayed.ended:
+        yield "  the journal does not say how the run ended"
+    if replayed.unfinished:
+        yield f"  {replayed.unfinished:,} steps are there in part only"
+    for one in replayed.stopped[:MOST]:
+        yield f"  {one.robot} could be followed up to its step {one.step} in run {one.run}: {one.why}"
+    if len(replayed.stopped) > MOST:
+        yield f"  and {len(replayed.stopped) - MOST:,} more robots"
+
+
+def _shown(difference: Difference) -> Iterator[str]:
+    place = f"step {difference.step} of {difference.robot} in run {difference.run} ({difference.protocol})"
+    yield f"  different, first in {place}"
+    if difference.packet:
+        for sent in difference.packet[:MOST]:
+            yield f"    took in   {sent.type} from {sent.sender}: {_content(sent.content)}"
+        if len(difference.packet) > MOST:
+            yield f"    and {len(difference.packet) - MOST:,} more"
+    else:
+        yield "    it began"
+    yield f"    recorded  {_said(difference.recorded)}"
+    yield f"    replayed  {_said(difference.replayed)}"
+    names = _differing(difference.recorded, difference.replayed)
+    if names:
+        yield f"    differs   in {', '.join(names)}"
+    if difference.raised:
+        yield f"    then it raised {difference.raised}"
+
+
+def _contradicted(found: Sequence[Contradiction]) -> Iterator[str]:
+    """Yield lines for each claim of the journal that its steps contradict: what, recorded, replayed."""
+    for one in found:
+        yield f"    {one.what}"
+        yield f"      recorded  {_cut(msgspec.json.encode(one.recorded).decode())}"
+        yield f"      replayed  {_cut(msgspec.json.encode(one.replayed).decode())}"
+
+
+def _differing(recorded: AnyEvent | None, replayed: AnyEvent | None) -> list[str]:
+    """In what two events of one kind differ; of messages, the fields."""
+    if recorded is None or type(recorded) is not type(replayed):
+        return []
+    left, right = _fields(recorded), _fields(replayed)
+    return [name for name in left if msgspec.to_builtins(left[name]) != msgspec.to_builtins(right.get(name))]
+
+
+def _fields(event: object) -> dict[str, object]:
+    fields = msgspec.structs.asdict(event)  # type: ignore[arg-type]  # all events are structs
+    content = fields.pop("content", {})
+    return {**{name: value for name, value in fields.items() if name != "t"}, **content}
+
+
+def _said(event: AnyEvent | None) -> str:
+    """What a robot did."""
+    match event:
+        case Sent():
+            text = f"said {event.type} to {event.receiver}: {_content(event.content)}, {event.bytes:,} bytes"
+        case Received():
+            text = f"took in {event.type} from {event.sender}"
+        case Decided():
+            values = ", ".join(f"{name} = {value}" for name, value in event.assignment.items())
+            text = f"decided {_cut(values) or 'that it has no value'}"
+        case Heard():
+            text = f"heard of an assignment that costs {event.cost:g}: {_content(event.values)}"
+        case Concluded():
+            text = f"concluded {event.verdict}"
+        case Settled():
+            text = f"was done, after {event.checks:,} checks"
+        case _:
+            text = "nothing more" if event is None else type(event).__name__
+    clock = getattr(event, "clock", None)
+    return text if clock is None else f"{text} (clock {clock:,})"
+
+
+def _content(content: Mapping[str, object]) -> str:
+    return _cut(msgspec.json.encode(content).decode())
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."

@@ -1,0 +1,252 @@
+"""What the master and robots say to each other across machines. Letters (`letters.py`) carry these words.
+
+The master is the paper's: it registers robots, waits until all are there, orders the start, finds out when all is
+quiet, and stops all (Figure 3). Of robots' files it knows what their profiles say; protocol messages (`Said`) go from
+robot to robot, and it never sees them. What both runtimes with processes say alike stands in `control.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, NamedTuple
+
+import msgspec
+
+from robochoc.communication.control import Conclusion, Counters, Events, Failed, OfEpoch, Pause, Ready, Wave
+from robochoc.communication.network.profile import Profile, Ranges
+from robochoc.model.outcome import Metrics
+from robochoc.protocols.findings import Findings
+
+LATEST = 2**53
+"""The latest that a clock of constraint checks can be. Each says its own, and must not overflow another's."""
+
+
+class _Word(msgspec.Struct, frozen=True, tag=True, array_like=True):
+    pass
+
+
+# From a robot to the master
+
+
+class Register(_Word, frozen=True):
+    """I am there: this is what my file says to all. `visit` names this life of mine: who comes back is another."""
+
+    profile: Profile
+    visit: str
+
+
+class Joined(_Word, frozen=True):
+    """I, in the life `visit`, have read your welcome: said to each, for an answer may get lost.
+
+    `card` holds my keys of this run (`KeyCard`; empty: no filter needs any).
+    """
+
+    visit: str
+    card: bytes
+
+
+class Shown(_Word, frozen=True):
+    """The domains that you asked for."""
+
+    variables: dict[str, Ranges]
+
+
+class Exchanged(NamedTuple):
+    """Protocol messages with one other robot: `sent` to it, `received` from it, and the latest `clock` these had."""
+
+    sent: int = 0
+    received: int = 0
+    clock: int = 0
+
+
+class Account(OfEpoch, frozen=True):
+    """What the epoch has come to. `assigned`: I have values; in private runs `assignment` and findings stay empty.
+
+    `exchanged` counts the messages with each other robot, so that what one says is held against what another says.
+    """
+
+    assigned: bool
+    assignment: dict[str, int]
+    metrics: Metrics
+    findings: Findings
+    exchanged: dict[str, Exchanged] = msgspec.field(default_factory=dict)
+
+
+class Judged(NamedTuple):
+    """What all totally known constraints over the same `variables` that `holder` holds charge together."""
+
+    holder: str
+    variables: tuple[str, ...]
+    constraints: int
+    price: int | float
+
+
+class Checked(OfEpoch, frozen=True):
+    """What the constraints that I hold charge for the values that you told me; `allowed`: none is broken.
+
+    `held` is how many they are. Of these, `shared` are those that others may know too; `copies` are others' constraints
+    that I know.
+    """
+
+    allowed: bool
+    cost: int | float
+    held: int = 0
+    shared: tuple[Judged, ...] = ()
+    copies: tuple[Judged, ...] = ()
+
+
+class Objection(_Word, frozen=True):
+    """I have refused something: `who` has claimed to be allowed `what`."""
+
+    who: str
+    what: str
+    why: str
+
+
+class Gap(_Word, frozen=True):
+    """So many `letters` of `who` to me are lost for good."""
+
+    who: str
+    letters: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
+
+
+class Ask(_Word, frozen=True):
+    """To the Directory Facilitator, in SL0; answers have the same `number`.
+
+    `subscribe`: tell me now and whenever it changes what this search finds.
+    """
+
+    number: int
+    content: str
+    subscribe: bool = False
+
+
+class Sniff(_Word, frozen=True):
+    """May I have the journal of your run? The answer has the same `number`; it is asked for by `publication.py`."""
+
+    number: int
+
+
+class Bye(_Word, frozen=True):
+    """I have heard that the run is over."""
+
+
+# From the master to a robot
+
+
+class Welcome(_Word, frozen=True):
+    """You are registered, in your life `visit`, for the run `run`; messages go through these `filters`."""
+
+    visit: str
+    run: str
+    filters: tuple[str, ...]
+    observed: bool
+    private: bool
+
+
+class Denied(_Word, frozen=True):
+    """You are not registered."""
+
+    visit: str
+    why: str
+
+
+class Show(_Word, frozen=True):
+    """Parts of partially known constraints look at these variables of yours: show them."""
+
+    variables: tuple[str, ...]
+
+
+class Task(OfEpoch, frozen=True):
+    """What all robots know of each other (see `solver/agent_problem.py`), and how they are to search."""
+
+    protocol: str
+    order: tuple[str, ...]
+    interfaces: Mapping[str, tuple[str, ...]]
+    domains: Mapping[str, Ranges]
+    links: Mapping[str, tuple[str, ...]] | None
+    secretive: tuple[str, ...]
+    seed: int
+    settings: Mapping[str, str]
+    aside: float | None
+    cards: tuple[bytes, ...]
+
+
+class Search(OfEpoch, frozen=True):
+    """All robots are ready: begin."""
+
+
+class Judge(OfEpoch, frozen=True):
+    """These are the values that all who share constraints with you have decided on, and your own: check them."""
+
+    values: Mapping[str, int]
+
+
+class Revoked(_Word, frozen=True):
+    """Believe nothing that `name` says any more."""
+
+    name: str
+
+
+class Told(_Word, frozen=True):
+    """The Directory Facilitator's answer: a performative, and content in SL0."""
+
+    number: int
+    performative: str
+    content: str
+
+
+class Sniffable(_Word, frozen=True):
+    """You may have the journal of the run `run`; or not, because of `why`."""
+
+    number: int
+    run: str
+    why: str
+
+
+class Leave(_Word, frozen=True):
+    """The run is over. `failed`: it could not be completed, because of `why`; otherwise that is the verdict."""
+
+    why: str
+    failed: bool
+
+
+# From robot to robot
+
+
+class Said(OfEpoch, frozen=True):
+    """A protocol's message, as the filters have sealed it, with the sender's NCCC clock."""
+
+    clock: Annotated[int, msgspec.Meta(ge=0, le=LATEST)]
+    content: bytes
+
+
+class Copies(OfEpoch, frozen=True):
+    """The totally known constraints that I hold and you are in: your protocol wants you to know them.
+
+    `content` holds `SharedRecord`s, as the filters have sealed it.
+    """
+
+    content: bytes
+
+
+ToMaster = (
+    Register
+    | Joined
+    | Shown
+    | Ready
+    | Counters
+    | Conclusion
+    | Events
+    | Account
+    | Checked
+    | Failed
+    | Objection
+    | Gap
+    | Ask
+    | Sniff
+    | Bye
+)
+ToRobot = Welcome | Denied | Show | Task | Search | Wave | Pause | Judge | Revoked | Told | Sniffable | Leave
+ToPeer = Said | Copies
+Word = ToMaster | ToRobot | ToPeer

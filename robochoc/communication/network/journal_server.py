@@ -1,0 +1,202 @@
+"""The run's journal as the master gives it out while it grows, to those who have the right to sniff.
+
+Whoever follows a run asks for the bytes from `start` on, and gets a piece of bounded size; what it has not asked for
+waits in the journal's file. So a follower may come late, be slow, or stop: nothing is kept for it, nothing waits for
+it, and neither the master nor a robot is slowed. The router proves who asks (`access.py`). Threads may share it.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from typing import Annotated
+
+import msgspec
+
+from robochoc.communication.network.control_messages import Sniff, Sniffable
+from robochoc.communication.network.master_events import Chronicle
+from robochoc.journal.entries import BadJournal
+
+SNIFF = "sniff"
+"""What is granted or refused."""
+PIECE_BYTES = 60_000
+"""At most so much of the journal goes at once: what one batch of zenoh's holds, with what is around it."""
+ANSWERED_AT_MOST = 200
+"""Questions of one follower in a second; those beyond are not answered, and it asks again."""
+PRESENT_S = 2.0
+"""Whoever has not asked for so long does not follow any more, as far as the end of the run waits for it."""
+LARGEST = 2**53
+"""Bytes: no journal is as long."""
+_LARGEST_QUESTION = 200
+
+
+class Question(msgspec.Struct, frozen=True, array_like=True):
+    """The journal of `run` from byte `start` on, please."""
+
+    run: str
+    start: Annotated[int, msgspec.Meta(ge=0, le=LARGEST)]
+
+
+class Piece(msgspec.Struct, frozen=True, array_like=True):
+    """What the journal of `run` holds from byte `start` on, or a part of it; `over`: it ends there, for good."""
+
+    run: str
+    start: Annotated[int, msgspec.Meta(ge=0, le=LARGEST)]
+    content: Annotated[bytes, msgspec.Meta(max_length=PIECE_BYTES)]
+    over: bool
+
+
+class NotAnswered(Exception):  # noqa: N818 - named for what happens
+    """A question that gets no answer; the message says why, for the master's observer. Empty: nobody need know."""
+
+
+class Publication:
+    """The journal of one run, written to the file `descriptor` (for reading and writing), and given out from it.
+
+    It is a sink for blocks (`write`). `fresh` is called when somebody has asked for all that there is: it may write
+    what has not been written yet. Whoever opens the file closes it, after `close`.
+    """
+
+    def __init__(self, descriptor: int, fresh: Callable[[], None] = lambda: None) -> None:
+        self.run = ""
+        """The run whose journal it is, as letters name it; the master sets it."""
+        self.fresh = fresh
+        self.trouble = ""
+        """Why nothing is written, and so nothing given out, any more; empty: all is well."""
+        self._descriptor = descriptor
+        self._size = 0
+        self._over = self._closed = False
+        self._asked: dict[str, list[float]] = {}
+        self._behind: dict[str, float] = {}
+        """Who has not got the end yet, and when it has asked last."""
+        self._lock = threading.Lock()
+
+    def write(self, block: bytes) -> None:
+        """Append a block. Where that cannot be done, the run goes on, and who follows it is told (`trouble`)."""
+        done = 0
+        try:
+            while done < len(block) and not self.trouble:
+                done += os.pwrite(self._descriptor, memoryview(block)[done:], self._size + done)
+        except OSError as error:
+            self.trouble = f"the journal cannot be kept any more: {error.strerror}"
+        else:
+            self._size += done
+
+    def end(self) -> None:
+        """All has been written."""
+        self._over = True
+
+    def close(self) -> None:
+        """Answer nobody any more."""
+        with self._lock:
+            self._closed = True
+
+    @property
+    def lagging(self) -> bool:
+        """Whether somebody who follows the run has not got its end yet."""
+        now = time.monotonic()
+        with self._lock:
+            return not self._closed and any(now - asked < PRESENT_S for asked in self._behind.values())
+
+    def answer(self, name: str, content: bytes) -> bytes:
+        """The answer to the question `content` of `name`, who has the right to ask. Raises `NotAnswered`."""
+        self._count(name)
+        question = _question(content)
+        if question.run == self.run and question.start >= self._size and not self._over:
+            self.fresh()
+        over = self._over  # before the size is looked at: nothing is written after it
+        size = self._size
+        if question.start > size:
+            raise NotAnswered(f"the journal has {size:,} bytes, and byte {question.start:,} was asked for")
+        with self._lock:
+            if self._closed:
+                raise NotAnswered
+            content = os.pread(self._descriptor, min(PIECE_BYTES, size - question.start), question.start)
+            last = over and question.start + len(content) == size
+            if last:
+                self._behind.pop(name, None)
+            else:
+                self._behind[name] = time.monotonic()
+        return msgspec.msgpack.encode(Piece(self.run, question.start, content, last))
+
+    def _count(self, name: str) -> None:
+        now = time.monotonic()
+        with self._lock:
+            recent = [t for t in self._asked.get(name, ()) if now - t < 1]
+            if len(recent) < ANSWERED_AT_MOST:
+                recent.append(now)
+                self._asked[name] = recent
+                return
+        raise NotAnswered(f"more than {ANSWERED_AT_MOST} questions a second")
+
+
+def question(run: str, start: int) -> bytes:
+    """What whoever follows `run` asks for all from byte `start` on."""
+    return msgspec.msgpack.encode(Question(run, start))
+
+
+def piece_in(content: bytes) -> Piece:
+    """The piece in an answer. Raises `BadJournal`."""
+    try:
+        return msgspec.msgpack.decode(content, type=Piece)
+    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
+        raise BadJournal(f"no piece of one: {error}") from None
+
+
+def _question(content: bytes) -> Question:
+    if len(content) > _LARGEST_QUESTION:
+        raise NotAnswered(f"a question of {len(content):,} bytes")
+    try:
+        return msgspec.msgpack.decode(content, type=Question)
+    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
+        raise NotAnswered(f"it is malformed: {error}") from None
+
+
+class PublicationDesk:
+    """Where the master is asked for the journal of its `run`: by letter who may have it, then for piece after piece.
+
+    `publication` is None where it gives none out. `may` says who has the right now.
+    """
+
+    def __init__(self, run: str, may: Callable[[str], bool], chronicle: Chronicle) -> None:
+        self.publication: Publication | None = None
+        self._run = run
+        self._may = may
+        self._chronicle = chronicle
+        self._known: set[str] = set()
+
+    @property
+    def lagging(self) -> bool:
+        """Whether somebody has not got the end of the journal yet."""
+        return self.publication is not None and self.publication.lagging
+
+    def welcome(self, name: str, sniff: Sniff) -> Sniffable:
+        """What `name` is told who wants to sniff."""
+        why = self._why_not(name)
+        if why:
+            self._chronicle.refuse(name, SNIFF, why)
+        elif name not in self._known:
+            self._known.add(name)
+            self._chronicle.granted(name, SNIFF)
+        return Sniffable(sniff.number, self._run, why)
+
+    def answer(self, name: str, content: bytes) -> bytes | None:
+        """The answer to a question of `name`, as the router says it is; None: there is none."""
+        why = self._why_not(name)
+        if not why and self.publication:
+            try:
+                return self.publication.answer(name, content)
+            except (NotAnswered, OSError) as refused:
+                why = str(refused)
+        if why:
+            self._chronicle.refuse(name, SNIFF, why)
+        return None
+
+    def _why_not(self, name: str) -> str:
+        if self.publication is None:
+            return "this master gives its journal to nobody; it needs --sniffable"
+        if not self._may(name):
+            return f"it has no right to; say: robochoc authority enrol {name} --may sniff"
+        return self.publication.trouble

@@ -1,0 +1,83 @@
+"""What the master's observer is told: who comes and is lost, what is granted and refused, what robots tell."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import msgspec
+
+from robochoc.communication.network.plausibility import Doubt
+from robochoc.communication.network.quotas import EVENTS_A_SECOND, Allowance
+from robochoc.communication.network.refusals import Refusals
+from robochoc.communication.network.search_state import is_of
+from robochoc.journal.events import AnyEvent, Granted, Lost, Observer, Refused, Registered
+
+
+class Chronicle:
+    """Tells `observer`, if there is one. Refusals and grants may come from any thread."""
+
+    def __init__(self, observer: Observer | None) -> None:
+        self._observer = observer
+        self._began = time.monotonic()
+        self._events: dict[str, Allowance] = {}
+        self.refuse = Refusals(self._refused).note
+        """Told who was refused, what, and why."""
+
+    def begin(self) -> None:
+        """A search begins: times are since then from now on, as those of its robots are."""
+        self._began = time.monotonic()
+
+    def registered(self, robot: str) -> None:
+        """`robot` is there."""
+        self._tell(Registered(t=self._now, robot=robot))
+
+    def lost(self, robot: str, why: str) -> None:
+        """`robot` is lost."""
+        self._tell(Lost(t=self._now, robot=robot, why=why))
+
+    def granted(self, who: str, what: str) -> None:
+        """`who` was granted `what`."""
+        self._tell(Granted(t=self._now, who=who, what=what))
+
+    def relay(self, event: Granted | Refused) -> None:
+        """What the Authority tells, whose time is another."""
+        self._tell(msgspec.structs.replace(event, t=self._now))
+
+    def told(self, name: str, events: Sequence[AnyEvent]) -> None:
+        """What a robot tells of itself, as it is watched or wants to be; of others it may not tell."""
+        if not self._is_within_quota(name, len(events)):
+            self.refuse(name, "tell of events", f"more than {EVENTS_A_SECOND:,} a second")
+            return
+        for event in events:
+            if is_of(event, name):
+                self._tell(event)
+            else:
+                self.refuse(name, f"tell of {type(event).__name__}", "it is not about itself")
+
+    def doubted(self, doubts: Sequence[Doubt]) -> str:
+        """Of two robots each, one has not told the truth; returns all of it in words, after a semicolon."""
+        for doubt in doubts:
+            for name in doubt.between:
+                self.refuse(name, "its counts of messages", doubt.why)
+        return "".join(f"; {doubt.why}" for doubt in doubts)
+
+    def _is_within_quota(self, name: str, events: int) -> bool:
+        now = time.monotonic()
+        if name not in self._events:
+            self._events[name] = Allowance(EVENTS_A_SECOND, now)
+        allowance = self._events[name]
+        enough = allowance.has(events, now)
+        allowance.use(events if enough else 0)
+        return enough
+
+    def _refused(self, who: str, what: str, why: str) -> None:
+        self._tell(Refused(t=self._now, who=who, what=what, why=why))
+
+    @property
+    def _now(self) -> float:
+        return time.monotonic() - self._began
+
+    def _tell(self, event: AnyEvent) -> None:
+        if self._observer:
+            self._observer(event)

@@ -1,0 +1,251 @@
+"""The post: what zenoh does for one participant. It carries letters both ways, and tells who is there.
+
+Letters travel by zenoh's advanced publishers and subscribers, which number what they carry, keep it, and ask again for
+what an outage has swallowed; plain ones lose messages without a word. Nothing but this file and the router's imports
+zenoh. Its callbacks run in threads of its own, and only put what comes into `inbox`.
+"""
+
+from __future__ import annotations
+
+import base64
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from queue import Empty, SimpleQueue
+from types import TracebackType
+from typing import Self
+
+import zenoh
+import zenoh.ext
+
+from robochoc.authority.identity import Identity
+from robochoc.communication.network.access import ALL, letter_key, life_key, name_in
+from robochoc.communication.network.framing import MASTER
+from robochoc.communication.network.inbox import Arrived, Inbox, Missed, Presence, Woken
+from robochoc.communication.network.settings import LEASE_MS
+from robochoc.communication.network.zenoh_config import config
+from robochoc.communication.resources import require_descriptors
+
+RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}
+HEARTBEAT_S = 5.0
+"""How soon a receiver learns that the last letter is missing, at the latest; that of others it sees at the next letter.
+
+Each pair that has ever spoken has its own, at about 0.2 ms of CPU: 121 robots are some 4,000 pairs. What was sent in an
+outage does not wait for it: a receiver asks for that as soon as it sees the sender again.
+"""
+KEPT_LETTERS = 100_000
+_LATE_S = 1.0
+_FIRST_ATTEMPT_S, _LONGEST_ATTEMPT_S = 2.0, 10.0
+"""So long are attempts to connect; a busy router may take its time for a handshake."""
+
+
+DESCRIPTORS = 24
+"""Open files that a session may need: threads of zenoh's have some, too."""
+
+
+class CannotConnect(Exception):  # noqa: N818 - named for what happened
+    """There is no master at that address, or it does not let us in."""
+
+
+TEAM = (MASTER, ALL)
+"""Whom robots hear: the master by a subscriber of its own, and all others."""
+_Subscriber = tuple[zenoh.ext.AdvancedSubscriber[None], zenoh.ext.SampleMissListener[None]]
+Answering = Callable[[str, bytes], bytes | None]
+"""The answer to somebody's question; None: it gets none."""
+
+
+class Post:
+    """The connection of `identity` with the router at `endpoint` (`HOST:PORT`); a context manager.
+
+    It knows of the lives of those in `watch`, and gets the letters of those in `heard` (more: `hear`) into `inbox`.
+    `lease_ms` is how long a silent link counts as alive. Raises `CannotConnect` when there is no connection within
+    `patience_s`.
+    """
+
+    def __init__(
+        self,
+        endpoint: str,
+        identity: Identity,
+        *,
+        watch: Iterable[str] = (ALL,),
+        heard: Iterable[str] = TEAM,
+        inbox: Inbox | None = None,
+        patience_s: float = 10.0,
+        lease_ms: int = LEASE_MS,
+    ) -> None:
+        self.name = identity.name
+        self.inbox = inbox or Inbox()
+        self._publishers: dict[str, zenoh.ext.AdvancedPublisher] = {}
+        self._subscribers: dict[str, _Subscriber] = {}
+        self._session = _opened(endpoint, identity, patience_s, lease_ms)
+        self.hear(heard)
+        self._token = self._session.liveliness().declare_token(life_key(self.name))
+        self._watchers = [
+            self._session.liveliness().declare_subscriber(life_key(name), self._note_presence, history=True)
+            for name in watch
+        ]
+
+    def hear(self, senders: Iterable[str]) -> None:
+        """From now on take the letters of `senders`, too; what they have written before comes soon.
+
+        Each has a subscriber of its own, for zenoh believes what a packet says of its source and number. In one for
+        all, a sender can use the source of another, whose letters then count as old ones, or as missing. It is dear:
+        the router knows of every pair, so robots hear their neighbours by one (`ALL`) and the master by its own.
+        """
+        for sender in senders:
+            if sender not in self._subscribers:
+                self._subscribers[sender] = self._subscribed(sender)
+
+    def send(self, receiver: str, content: bytes) -> None:
+        """Put a letter on its way. While the link is down it waits here; afterwards it is sent, or asked for."""
+        publisher = self._publishers.get(receiver)
+        if publisher is None:
+            publisher = self._publishers[receiver] = zenoh.ext.declare_advanced_publisher(
+                self._session,
+                letter_key(receiver, self.name),
+                congestion_control=zenoh.CongestionControl.BLOCK,
+                cache=zenoh.ext.CacheConfig(KEPT_LETTERS),
+                sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=HEARTBEAT_S, sporadic_heartbeat=None),
+                publisher_detection=True,
+            )
+        publisher.put(content)
+
+    @property
+    def router(self) -> str:
+        """The router that there is a link to now; empty: there is none. One that was opened anew is another one."""
+        return next(map(str, self._session.info.routers_zid()), "")
+
+    def answer(self, key: str, answered: Answering) -> None:
+        """From now on answer questions on `key`, in a thread of zenoh's."""
+
+        def reply(query: zenoh.Query) -> None:
+            content = answered(name_in(str(query.key_expr)), query.payload.to_bytes() if query.payload else b"")
+            if content is not None:
+                query.reply(query.key_expr, content)
+
+        self._answering = self._session.declare_queryable(key, reply)
+
+    def ask(self, key: str, content: bytes, patience_s: float) -> bytes | None:
+        """What is answered to `content` on `key`; None: nothing is, within `patience_s`.
+
+        The answer yields to all that robots say, and is dropped if it does not get through at once.
+        """
+        replies: SimpleQueue[zenoh.Reply | None] = SimpleQueue()
+        handler = zenoh.handlers.Callback(replies.put, lambda: replies.put(None))
+        self._session.get(
+            key,
+            handler,
+            payload=content,
+            timeout=patience_s,
+            congestion_control=zenoh.CongestionControl.DROP,
+            priority=zenoh.Priority.BACKGROUND,
+        )
+        with suppress(Empty):
+            while reply := replies.get(timeout=patience_s + _LATE_S):
+                if reply.ok is not None:
+                    return reply.ok.payload.to_bytes()
+        return None
+
+    def wake(self) -> None:
+        """Have whoever waits at the inbox look up."""
+        self.inbox.put(Woken())
+
+    def close(self) -> None:
+        """End the connection. What zenoh has taken over is sent before."""
+        self._session.close()  # type: ignore[no-untyped-call]  # zenoh's stubs
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _subscribed(self, sender: str) -> _Subscriber:
+        """What hears `sender` alone (`ALL`: all that have no subscriber of their own), and that letters are lost.
+
+        zenoh tells of a gap just before the letter behind it, in the same thread (not `indirect`: that would be one of
+        Python's own for each). So a gap is put down to the sender of that letter, whom the router has proven, and not
+        to the source that the packet claims.
+        """
+        gap = 0
+
+        def note_miss(miss: zenoh.ext.Miss) -> None:
+            nonlocal gap
+            gap += miss.nb
+
+        def take(sample: zenoh.Sample) -> None:
+            nonlocal gap
+            lost, gap = gap, 0
+            of = name_in(str(sample.key_expr))
+            if sender == ALL and of in self._subscribers:
+                return
+            if lost:
+                self.inbox.put(Missed(of, lost))
+            self.inbox.put(Arrived(of, sample.payload.to_bytes()))
+
+        subscriber = zenoh.ext.declare_advanced_subscriber(
+            self._session,
+            letter_key(self.name, sender),
+            zenoh.handlers.Callback(take, indirect=False),
+            history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
+            recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+            subscriber_detection=True,
+        )
+        return subscriber, subscriber.sample_miss_listener(zenoh.handlers.Callback(note_miss, indirect=False))
+
+    # What zenoh's threads call
+
+    def _note_presence(self, sample: zenoh.Sample) -> None:
+        self.inbox.put(Presence(name_in(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT))
+
+
+def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Session:
+    """A session. zenoh does not hear Ctrl-C while it connects, so it is not left to that for long."""
+    if endpoint.startswith("["):
+        raise CannotConnect(
+            f"{endpoint}: zenoh cannot check whose IPv6 address that is; call the master by a host name"
+        )
+    require_descriptors(DESCRIPTORS)
+    until = time.monotonic() + patience_s
+    attempt_s = _FIRST_ATTEMPT_S
+    while True:
+        left = until - time.monotonic()
+        try:
+            return zenoh.open(client_config(endpoint, identity, min(attempt_s, left), lease_ms))
+        except zenoh.ZError as error:
+            if time.monotonic() >= until:
+                raise CannotConnect(
+                    f"no master answers at {endpoint}, or it does not let {identity.name} in"
+                ) from error
+        attempt_s = min(2 * attempt_s, _LONGEST_ATTEMPT_S)
+
+
+def client_config(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Config:
+    """How a participant connects: to that one router, by mutual TLS, and in no other way."""
+    texts = identity.texts
+    tls = {
+        "root_ca_certificate_base64": encoded(texts.ca),
+        "connect_private_key_base64": encoded(texts.key),
+        "connect_certificate_base64": encoded(texts.certificate),
+        "enable_mtls": True,
+        "verify_name_on_connect": True,
+    }
+    return config(
+        {
+            "mode": "client",
+            "listen/endpoints": [],
+            "connect/endpoints": [f"tls/{endpoint}"],
+            "connect/timeout_ms": max(1, int(patience_s * 1000)),
+            "connect/exit_on_failure": True,
+            "connect/retry": RETRY,
+            "transport/link/tls": tls,
+            "transport/link/tx/lease": lease_ms,
+        }
+    )
+
+
+def encoded(content: bytes) -> str:
+    """PEM as zenoh takes it where there is no file."""
+    return base64.b64encode(content).decode()

@@ -1,0 +1,1 @@
+"""The default runtime: one operating system process per robot, joined by multiprocessing queues."""

@@ -1,0 +1,144 @@
+"""The simulator: the whole team in one thread, deterministic from a seed.
+
+A schedule says which messages arrive next (`communication/simulator/schedule.py`). The search is over when it is empty
+and no robot has anything to say.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+from robochoc.communication.host import Host
+from robochoc.communication.run_result import Progress, RunResult
+from robochoc.communication.session import Epoch, Session
+from robochoc.communication.simulator.schedule import Schedule
+from robochoc.journal.events import Observer
+from robochoc.model.message import Envelope
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Team
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.agent_problem import NO_BRIEF, Brief, Part
+from robochoc.solver.compiled_team import CompiledTeam
+
+PROGRESS_EVERY = 256
+"""Packets between two reports of progress."""
+
+
+class Simulation(Session):
+    """One team in this thread. `observer` is told of all events, with the schedule's time.
+
+    `brief` is what robots are told beside the problem.
+    """
+
+    def __init__(
+        self,
+        team: Team | CompiledTeam,
+        protocol: type[Protocol],
+        schedule: Schedule,
+        *,
+        observer: Observer | None = None,
+        progress: Callable[[Progress], None] | None = None,
+        brief: Brief = NO_BRIEF,
+    ) -> None:
+        super().__init__(team)
+        self._protocol = protocol
+        self._schedule = schedule
+        self._observer = observer
+        self._progress = progress
+        self._quiet = True
+        self._checks = 0
+        self._verdict: Verdict | None = None
+        self._witness: str | None = None
+        parts = Epoch(self.compiled, brief=brief).parts(protocol)
+        self._hosts = {name: self._host(part) for name, part in parts.items()}
+
+    @property
+    def quiet(self) -> bool:
+        """See `Session.quiet`."""
+        return self._quiet
+
+    def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
+        """See `Session.search`; a limit on messages is looked at after each packet."""
+        began = time.monotonic()
+        if self._verdict is None:
+            self._play(began, timeout, messages)
+        simulated_s = self._schedule.elapsed_s
+        self._schedule.clear()
+        result = RunResult.of(
+            self._verdict or Verdict.UNKNOWN,
+            self._witness,
+            {name: host.protocol.assignment for name, host in self._hosts.items()},
+            [host.metrics() for host in self._hosts.values()],
+            time.monotonic() - began,
+        )
+        metrics = replace(result.metrics, simulated_s=simulated_s)
+        findings = {name: host.protocol.findings for name, host in self._hosts.items()}
+        return replace(result, metrics=metrics, findings=findings)
+
+    def change(self, epoch: Epoch) -> None:
+        """See `Session.change`."""
+        self.compiled = epoch.compiled
+        self._verdict = self._witness = None
+        before = self._hosts
+        self._hosts = {}
+        for name, part in epoch.parts(self._protocol).items():
+            if name in before and name not in epoch.fresh:
+                self._hosts[name] = before[name]
+                before[name].change(part, epoch.void)
+                self._note_verdict(before[name])
+            else:
+                self._hosts[name] = self._host(part)
+
+    def close(self) -> None:
+        """Nothing to leave behind."""
+
+    def _host(self, part: Part) -> Host:
+        host = Host.of(self._protocol, part)
+        if self._observer:
+            host.observe(self._observer, lambda: self._time(host.checks), self._time)
+        return host
+
+    def _play(self, began: float, timeout: float | None, messages: int | None) -> None:
+        """Every robot starts before any message arrives; then packet by packet."""
+        quiet, self._quiet = self._quiet, False
+        for host in self._hosts.values():
+            self._step(host, partial(host.start, quiet=quiet))
+        packets = 0
+        while self._verdict is None:
+            elapsed_s = time.monotonic() - began
+            if timeout is not None and elapsed_s > timeout:
+                return
+            if messages is not None and self._sent() >= messages:
+                return
+            if self._progress and packets % PROGRESS_EVERY == 0:
+                self._progress(Progress(self._sent(), elapsed_s))
+            packet = self._schedule.get()
+            if not packet:
+                self._verdict, self._quiet = Verdict.SOLUTION, True
+                return
+            host = self._hosts[packet[0].receiver]
+            self._step(host, partial(host.handle, packet))
+            packets += 1
+
+    def _step(self, host: Host, act: Callable[[], Sequence[Envelope]]) -> None:
+        """Let `host` act, and send what it says on its way."""
+        self._checks = host.checks
+        envelopes = act()
+        for envelope, checks in zip(envelopes, host.said_at, strict=True):
+            self._schedule.put(envelope, checks - self._checks)
+        self._schedule.done(host.name, host.clock, host.checks - self._checks)
+        self._note_verdict(host)
+
+    def _time(self, checks: int) -> float:
+        """The time when the robot that is at work had done so many checks."""
+        return self._schedule.time(checks - self._checks)
+
+    def _note_verdict(self, host: Host) -> None:
+        if host.protocol.verdict is not None:
+            self._verdict, self._witness = host.protocol.verdict, host.name
+
+    def _sent(self) -> int:
+        return sum(sum(host.sent.values()) for host in self._hosts.values())

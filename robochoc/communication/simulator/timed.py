@@ -1,0 +1,124 @@
+"""The schedule of a channel model: simulated time, in seconds, in which robots compute and messages travel by radio.
+
+Discrete events, in whole nanoseconds, so that sums are exact and a seed is a run. Time is counted as by Sultanik, Lass
+and Regli (2007, DCOPolis), who add up computing and communication; but computing is counted in constraint checks of a
+stated length, not in the processor's time, which no run repeats. NCCCs are what they are without delays: the clocks in
+envelopes stay untouched.
+"""
+
+from __future__ import annotations
+
+import heapq
+import random
+from collections.abc import Sequence
+from itertools import count
+
+from robochoc.communication.simulator.channel import NS_PER_S, ChannelModel
+from robochoc.communication.simulator.schedule import Schedule
+from robochoc.model.message import Envelope
+
+_SEND, _WAKE = 0, 1
+"""Kinds of events. At the same time, all that is ready is sent before any robot looks at its inbox."""
+
+
+class Timed(Schedule):
+    """All robots compute at the same time, and share the air as `channel` has it.
+
+    `now` is in nanoseconds. Ties are broken by the seed.
+
+    A robot takes in all that has arrived, and is busy for as long as its checks take. What it says it hands to its
+    radio at the check at which it says it, and computes on. Messages get the medium in the order in which they are
+    ready.
+    """
+
+    def __init__(self, seed: int, channel: ChannelModel) -> None:
+        self._chance = random.Random(seed)  # noqa: S311 - a schedule is no secret
+        self._channel = channel
+        self._count = count()
+        self.now = self._end_ns = 0
+        self._said: list[tuple[int, Envelope]] = []
+        self._busy_until: dict[str, int] = {}
+        self._free_at: dict[str, int] = {}
+        self._inboxes: dict[str, list[tuple[int, int, Envelope]]] = {}
+        self._last_arrival: dict[tuple[str, str], int] = {}
+        self._agenda: list[tuple[int, int, float, int, Envelope | str]] = []
+
+    @property
+    def elapsed_s(self) -> float:
+        """Simulated seconds until the last robot had finished."""
+        return self._end_ns / NS_PER_S
+
+    def put(self, envelope: Envelope, checks: int = 0) -> None:
+        """Keep `envelope` until all that its sender says is known; it is ready when it was said."""
+        self._said.append((self.now + checks * self._channel.check_ns, envelope))
+
+    def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: ARG002 - time is not the NCCC clock
+        """The robot has done so many checks since it began, and is free again."""
+        free = self.now + checks * self._channel.check_ns
+        self._end_ns = max(self._end_ns, free)
+        self._busy_until[robot] = free
+        lot = self._chance.random()
+        for ready, envelope in self._said:
+            self._note(ready, _SEND, lot, envelope)
+        self._said.clear()
+        if self._inboxes.get(robot):
+            self._wake(robot)
+
+    def get(self) -> Sequence[Envelope]:
+        """All that has reached the robot that gets to its inbox first."""
+        while self._agenda:
+            due, _, _, _, what = heapq.heappop(self._agenda)
+            if isinstance(what, Envelope):
+                self._transmit(due, what)
+                continue
+            inbox = self._inboxes[what]
+            if not inbox:
+                continue
+            if due < self._wakes(what):  # noted while it was still busy
+                self._wake(what)
+                continue
+            self.now = due
+            packet = []
+            while inbox and inbox[0][0] <= due:
+                packet.append(heapq.heappop(inbox)[2])
+            return packet
+        return ()
+
+    def clear(self) -> None:
+        """Lose all that is under way; nobody is busy, and time begins again."""
+        states = (self._busy_until, self._free_at, self._inboxes, self._last_arrival)
+        for state in states:
+            state.clear()
+        self._agenda.clear()
+        self._said.clear()
+        self.now = self._end_ns = 0
+
+    def time(self, checks: int) -> float:
+        """Simulated seconds, so many checks after what is going on has begun."""
+        return (self.now + checks * self._channel.check_ns) / NS_PER_S
+
+    def _transmit(self, ready: int, envelope: Envelope) -> None:
+        """Send when the medium is free; arrive never earlier than the message before it in the same channel."""
+        edge = (envelope.sender, envelope.receiver)
+        medium = "" if self._channel.shared else envelope.sender
+        crossing = self._channel.crossing(len(envelope.content), self._chance)
+        sent = max(ready, self._free_at.get(medium, 0)) + crossing.air
+        self._free_at[medium] = sent
+        arrival = max(sent + crossing.waiting + crossing.latency, self._last_arrival.get(edge, 0))
+        self._last_arrival[edge] = arrival
+        inbox = self._inboxes.setdefault(envelope.receiver, [])
+        first = not inbox or arrival < inbox[0][0]
+        heapq.heappush(inbox, (arrival, next(self._count), envelope))
+        if first:
+            self._wake(envelope.receiver)
+
+    def _wakes(self, robot: str) -> int:
+        """When `robot` gets to its inbox: something has arrived, and it is not busy."""
+        return max(self._inboxes[robot][0][0], self._busy_until.get(robot, 0))
+
+    def _wake(self, robot: str) -> None:
+        self._note(self._wakes(robot), _WAKE, self._chance.random(), robot)
+
+    def _note(self, due: int, kind: int, lot: float, what: Envelope | str) -> None:
+        """Into the agenda. Robots that are ready at the same time draw lots; what one says keeps its order."""
+        heapq.heappush(self._agenda, (due, kind, lot, next(self._count), what))

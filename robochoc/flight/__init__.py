@@ -1,0 +1,1 @@
+"""Where drones fly, whatever tells them: missions, routes, and the simulated quadrotor."""

@@ -1,0 +1,124 @@
+"""Who takes part: one craft per robot, or one per place where a robot decides about several.
+
+A craft's cell and level come from the first of these that fits: the coordinates of its topic under the assignment;
+the two numbers its name ends in (`Robot3.1`, `V3.1`), with its first value for the level; its first value alone.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product, zip_longest
+from math import prod
+
+from robochoc.model.expression import Expression, Undefined, evaluate, names
+from robochoc.model.problem import Assignment, Robot, Topic
+
+Cell = tuple[int, int]
+"""Row and column, or the x and y that a topic gives."""
+
+# Longer numbers are dates or serial numbers, not rows.
+_ROW_AND_COLUMN = re.compile(r"(?<![0-9])([0-9]{1,4})[._,:;-]([0-9]{1,4})$")
+
+_FARTHEST = 10**300
+"""Numbers beyond it, which no floating point can hold, are drawn there."""
+_MOST_DECISIONS = 1_000
+"""Of a robot whose places are all looked at before it decides."""
+
+
+@dataclass(frozen=True)
+class Craft:
+    """A drone before the layout: what is known of where it belongs. It flies when it has a level."""
+
+    name: str
+    cell: Cell | None = None
+    level: int | None = None
+    robot: str = ""
+    """Who decides about it; empty where only a variable is known."""
+    topic: Topic | None = None
+    """Where its decisions are published, if its file says so."""
+    decided_by: tuple[str, ...] = field(default=(), compare=False)
+    """The variables on which its place depends."""
+
+
+def numbers(name: str) -> Cell | None:
+    """The row and the column that a name such as `Robot3.1` ends in."""
+    found = _ROW_AND_COLUMN.search(name)
+    return (int(found[1]), int(found[2])) if found else None
+
+
+def lone_craft(variable: str, values: Assignment) -> Craft:
+    """The craft of `variable`, of whose robot nothing else is known."""
+    return _craft(variable, [variable], None, values)
+
+
+def crafts_of(robot: Robot, values: Assignment) -> list[Craft]:
+    """One craft per topic that has coordinates, or per variable that names a cell, or one for the robot."""
+    own = [variable.name for variable in robot.variables]
+    topics = [topic for topic in robot.topics if topic.x is not None and topic.y is not None]
+    if len(topics) > 1:
+        named = zip(_short_names(topics), topics, strict=True)
+        crew = [_craft(name, own, topic, values) for name, topic in named]
+    elif not topics and len(own) > 1 and all(numbers(name) for name in own):
+        topics = [topic for topic in robot.topics[: len(own)] if len(robot.topics) == len(own)]
+        named_topics = zip_longest(own, topics)
+        crew = [_craft(name, [name], topic, values) for name, topic in named_topics]
+    else:
+        topics = topics or [*robot.topics[:1]]
+        crew = [_craft(robot.name, own, topics[0] if topics else None, values)]
+    return [replace(craft, robot=robot.name) for craft in crew]
+
+
+def possible_crafts(robot: Robot) -> Iterator[Craft]:
+    """The crafts of `robot` for all that it might decide; none where that would be too much to look at."""
+    if 0 < prod(len(own.domain) for own in robot.variables) <= _MOST_DECISIONS:
+        names = [own.name for own in robot.variables]
+        for decided in product(*(own.domain for own in robot.variables)):
+            yield from crafts_of(robot, dict(zip(names, decided, strict=True)))
+
+
+def _craft(name: str, variables: Sequence[str], topic: Topic | None, values: Assignment) -> Craft:
+    """The craft `name`, whose cell is its topic's, or else the one that its own or its first variable's name says."""
+    cells = [_sent(topic, values) if topic else None, numbers(name), *(numbers(first) for first in variables[:1])]
+    known = [values[own] for own in variables if own in values]
+    level = None
+    if known:
+        height = _value(topic.z, values) if topic else None
+        level = _bounded(known[0]) if height is None else height
+    decided_by = _decided_by(topic, variables)
+    return Craft(name, next(filter(None, cells), None), level, topic=topic, decided_by=decided_by)
+
+
+def _decided_by(topic: Topic | None, variables: Sequence[str]) -> tuple[str, ...]:
+    """The variables in the coordinates that `topic` gives, and the one that is the level where it gives none."""
+    across = [topic.x, topic.y] if topic else []
+    height = topic.z if topic else None
+    given = [*(across if None not in across else []), height]
+    found = [name for expression in given if expression is not None for name in names(expression)]
+    return tuple(dict.fromkeys([*found, *(variables[:1] if height is None else [])]))
+
+
+def _sent(topic: Topic, values: Assignment) -> Cell | None:
+    x, y = _value(topic.x, values), _value(topic.y, values)
+    return None if x is None or y is None else (x, y)
+
+
+def _value(expression: Expression | None, values: Assignment) -> int | None:
+    """What `expression` comes to, or nothing: it may be undefined, or about variables without a value."""
+    if expression is None:
+        return None
+    try:
+        return _bounded(evaluate(expression, values))
+    except (Undefined, KeyError):
+        return None
+
+
+def _bounded(value: int) -> int:
+    return max(-_FARTHEST, min(value, _FARTHEST))
+
+
+def _short_names(topics: Sequence[Topic]) -> list[str]:
+    """`drone3.1` for `/drone3.1/waypoint3.1`, unless that is no name of its own."""
+    first = [topic.name.strip("/").partition("/")[0] for topic in topics]
+    return first if len(set(first)) == len(topics) else [topic.name for topic in topics]

@@ -1,0 +1,308 @@
+"""The simulated flight: quadrotors fly a mission's legs, in wind, with motors that fail and obstacles in the way.
+
+A drone stands at its home with its motors off until its plan takes it into the air, and stops them when it has landed.
+What may happen on the way:
+
+- A motor stops: the drone tumbles, its other motors are switched off once it is 60 degrees over (as autopilots' failure
+  detectors do), and it lies where it falls. It never flies again; later plans keep their distance from it.
+- An obstacle, a point, is where nobody expected it: nearer than `KEEP_M` to somebody's goal (or than the planned
+  distance, if that is more). Of these the planner knows nothing before one is seen; all others it avoids. Whoever is
+  about to come so near to one sees it from `SIGHT_M` away at the latest: what is to be kept, the way on which the
+  common clock stops (`quadrotor/course.py`), and `_LOOK_M` for tracking and for looking only at samples.
+- Somebody cannot follow: no leg waits for it longer than `SETTLING_S` after its plan is over.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from robochoc.flight.mission import Goal, Mission
+from robochoc.flight.quadrotor.airframe import Array
+from robochoc.flight.quadrotor.bounds import check_homes, check_length, check_near, check_ways, origin_of
+from robochoc.flight.quadrotor.conditions import LEAST_M, Conditions, Failure
+from robochoc.flight.quadrotor.course import STOP_S, Course
+from robochoc.flight.quadrotor.flown import SAMPLES_A_SECOND, Flown, Happening, Stage
+from robochoc.flight.quadrotor.nearest import Nearest
+from robochoc.flight.quadrotor.obstacles import Threat, threats
+from robochoc.flight.quadrotor.simulation import DT, Simulation
+from robochoc.flight.quadrotor.spots import gaps, nearest_two
+from robochoc.flight.quadrotor.targets import Hazards, Targets, check_apart, waits
+from robochoc.flight.reports import Blocked, OutOfOrder, Report
+from robochoc.flight.routes.motion import Limits
+from robochoc.flight.routes.timetable import NoWay, TooClose, plan
+
+__all__ = ["Conditions", "Failure", "Flight", "Flown", "Happening", "Nearest", "Stage", "fly"]
+
+DISTANCE_M = 0.5
+"""Between drones' middles, where nothing else is said and nobody's place is nearer to another's."""
+_SHARE = 0.8
+"""Of the nearest two homes or goals, where these are nearer."""
+LIMITS = Limits()
+KEEP_M = 0.5
+SIGHT_M = 1.5
+_LOOK_M = 0.2
+SETTLING_S = 5.0
+_LATE_S = 1.5
+"""Who is to land and is not right above its spot after that time lands where it is."""
+_STILL_S = 1.0
+"""Before the first leg all stand, and after the last one all hover."""
+_NEAR_M = 0.005
+_SLOW_M_S = 0.02
+_FAR_M = 0.05
+"""Who is further from where it is wanted has not finished the leg."""
+
+
+class Flight:
+    """Drones with these names that stand at `homes` (N, 3). Legs are flown as they are asked for.
+
+    They are flown around an origin of their own where homes are far away: floating point is fine there, too. `progress`
+    hears what is being done, in words, every simulated moment that is kept.
+
+    Raises `ValueError` where there are no drones or too many (`quadrotor/bounds.py`), the conditions name others, or
+    homes are too near for them.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        homes: Array,
+        conditions: Conditions,
+        progress: Callable[[str], None] | None = None,
+    ) -> None:
+        homes = np.array(homes, dtype=np.float64).reshape(-1, 3)
+        check_homes(names, homes)
+        conditions.check(names)
+        self.names = tuple(names)
+        self.conditions = conditions
+        self._progress = progress or (lambda _: None)
+        self._origin = origin_of(homes)
+        self._homes = homes - self._origin
+        self._ground = float(self._homes[:, 2].min())
+        self._distance = conditions.distance or _distance([self._homes])
+        check_apart("homes", self.names, {number: (x, y, z) for number, (x, y, z) in enumerate(homes)}, self._distance)
+        check_near(["an obstacle"] * len(conditions.obstacles), conditions.obstacles)
+        self._obstacles = np.array(conditions.obstacles, dtype=np.float64).reshape(-1, 3) - self._origin
+        self._known = np.zeros(len(self._obstacles), dtype=np.bool_)
+        self._seen_s = [0.0] * len(self._obstacles)
+        self._asked: dict[int, Goal] = {}
+        self._stages: list[Stage] = []
+        self._wall_s = 0.0
+        self._simulation = Simulation(self.names, self._homes, self._ground, conditions)
+        self._hovers = False
+
+    def fly(self, title: str, goals: Mapping[int, Goal], *, heed: bool = False) -> tuple[Report, ...]:
+        """One leg, from where everybody is, to these goals by drones' numbers; who has none stays.
+
+        With `heed` everybody stops and hovers as soon as somebody has something to report; this is returned, and the
+        goals are not reached. Raises `ValueError` where two goals are nearer to each other than the distance to keep,
+        somebody has too far to fly, or what lies there leaves no way.
+        """
+        began = time.perf_counter()
+        with np.errstate(all="ignore"):  # the simulation looks for numbers that are none
+            targets = self._targets(goals)
+            if not self._stages:
+                self._stay()
+            begins_s = self._simulation.now_s
+            reports = self._leg(targets, heed=heed)
+        self._stages.append(Stage(title, begins_s, self._simulation.now_s))
+        self._hovers = False
+        self._wall_s += time.perf_counter() - began
+        return reports
+
+    def flown(self) -> Flown:
+        """All that was flown until now, and a second of hovering."""
+        began = time.perf_counter()
+        if not self._hovers:
+            with np.errstate(all="ignore"):
+                self._stay()
+            self._hovers = True
+        simulation = self._simulation
+        times, positions, attitudes = simulation.record()
+        self._wall_s += time.perf_counter() - began
+        return Flown(
+            names=self.names,
+            times=times,
+            positions=positions + self._origin if self._origin.any() else positions,
+            attitudes=attitudes,
+            stages=tuple(self._stages),
+            happenings=tuple(simulation.happenings),
+            errors_m=self._errors(),
+            nearest=simulation.watch.nearest,
+            nearest_fallen=simulation.watch.nearest_fallen,
+            distance=self._distance,
+            obstacles=self.conditions.obstacles,
+            seen_s=tuple(self._seen_s),
+            wall_s=self._wall_s,
+        )
+
+    def _errors(self) -> Array:
+        errors = np.zeros(len(self.names))
+        for number, goal in self._asked.items():
+            errors[number] = float(np.sqrt(np.square(self._simulation.places[number] - goal.at).sum()))
+        errors[self._simulation.lost] = np.nan
+        return errors
+
+    def _stay(self) -> None:
+        for _ in range(round(_STILL_S / DT)):
+            self._simulation.advance()
+
+    def _targets(self, goals: Mapping[int, Goal]) -> Targets:
+        if strange := [number for number in goals if not 0 <= number < len(self.names)]:
+            raise ValueError(f"there are {len(self.names)} drones, from number 0 on, and no number {strange[0]}")
+        simulation = self._simulation
+        places = np.array([goal.at for goal in goals.values()]).reshape(-1, 3)
+        check_near([self.names[number] for number in goals], places)
+        if self.conditions.distance is None:
+            self._distance = min(self._distance, _distance([places]))
+        moved = [(x, y, z) for x, y, z in (places - self._origin).tolist()]
+        goals = {number: replace(goal, at=at) for (number, goal), at in zip(goals.items(), moved, strict=True)}
+        targets = Targets(self.names, goals, simulation.reference[:3].T, simulation.lost, self._distance)
+        self._asked.update(goals)
+        return targets
+
+    def _leg(self, targets: Targets, *, heed: bool) -> tuple[Report, ...]:
+        """Plan and fly; without `heed`, again and again as long as obstacles are found."""
+        simulation = self._simulation
+        told = len(simulation.broken)
+        wishes = targets.places.copy()
+        delays = waits(targets.goals, self._homes)
+        reports: list[Report] = []
+        while True:
+            course, watched = self._course(targets, wishes, delays)
+            seen = self._follow(course, watched, told if heed else None)
+            reports += seen
+            if heed or not seen:
+                break
+            wishes = simulation.reference[:3].T.copy()
+            delays = np.zeros_like(delays)
+        failed = [OutOfOrder(self.names[drone], why, at_s) for drone, why, at_s in simulation.broken[told:]]
+        if not (heed and (reports or failed)):
+            self._tell_unfinished()
+        return tuple(sorted([*reports, *failed], key=lambda report: report.at_s)) if heed else ()
+
+    def _course(self, targets: Targets, wishes: Array, delays: Array) -> tuple[Course, list[Threat]]:
+        """The plan from where everybody is wanted now, and whom it brings near to obstacles that nobody knows of."""
+        simulation = self._simulation
+        starts = simulation.reference[:3].T.copy()
+        check_ways(self.names, starts, targets.places)
+        keep = self._keep(targets.planned(starts))
+        ends = np.array([goal.at for goal in targets.goals.values()]).reshape(-1, 3)
+        known = self._known | (gaps(self._obstacles, ends) >= keep)
+        fallen = simulation.places[simulation.lost & ~simulation.falling]
+        points = np.vstack((fallen, self._obstacles[known]))
+        radii = np.concatenate((np.full(len(fallen), self._distance), np.full(int(known.sum()), keep)))
+        hazards = Hazards(points, radii)
+        for drone, what in targets.give_way(hazards, wishes, self._ground):
+            simulation.tell(drone, what)
+        planned = targets.planned(starts, hazards)
+        simulation.leave(planned - self._distance)
+        who = targets.who
+        self._progress(f"ways for {len(who)} drones are looked for")
+        try:
+            way = plan(
+                starts[who],
+                targets.places[who],
+                distance=planned,
+                standing=targets.standing(hazards, starts, planned),
+                waits=delays[who],
+                limits=LIMITS,
+                ground=self._ground,
+            )
+        except (TooClose, NoWay) as refused:
+            raise ValueError(self._told(refused, who)) from refused
+        check_length(len(self.names), simulation.now_s + way.duration_s)
+        course = Course(way, who, simulation.reference)
+        unknown = {int(number): self._obstacles[number] for number in np.flatnonzero(~known)}
+        return course, threats(course, unknown, keep)
+
+    def _told(self, refused: TooClose | NoWay, who: npt.NDArray[np.intp]) -> str:
+        """The same with the names of those that it is about: the plan knows only their places in `who`."""
+        numbers = refused.drones if isinstance(refused, NoWay) else (refused.first, refused.second)
+        named = [self.names[who[number]] if number < len(who) else "something that is in the way" for number in numbers]
+        if isinstance(refused, NoWay):
+            return f"there is no way for {', '.join(named)}: what is in the way encloses where they start or end"
+        ends = "start" if refused.where == "start" else "are to end"
+        return f"{' and '.join(named)} {ends} only {refused.distance_m:.3g} m from each other"
+
+    def _keep(self, planned: float) -> float:
+        """How far to stay from obstacles."""
+        return max(KEEP_M, planned)
+
+    def _follow(self, course: Course, watched: Sequence[Threat], told: int | None) -> list[Blocked]:
+        """Fly the course to its end, or to where it was stopped for what is seen.
+
+        Unless `told` is None, it is stopped as well once more than so many have broken down.
+        """
+        simulation = self._simulation
+        reports: list[Blocked] = []
+        waited = 0.0
+        while True:
+            late = waited > _LATE_S
+            simulation.advance(course, late=late)
+            if not simulation.is_sampled:
+                continue
+            self._progress(f"leg {len(self._stages) + 1}, {course.s:.1f} s of {course.plan.duration_s:.1f} s flown")
+            reports += self._look(course, watched)
+            if reports or (told is not None and len(simulation.broken) > told):
+                course.stop()
+            if course.over:
+                course.refer()
+                if reports and told is None:
+                    return reports
+                if simulation.settled(_NEAR_M, _SLOW_M_S) or waited > SETTLING_S:
+                    return reports
+                waited += 1 / SAMPLES_A_SECOND
+
+    def _look(self, course: Course, watched: Sequence[Threat]) -> list[Blocked]:
+        """Which obstacles are seen now that nobody knew of, and by whom."""
+        simulation = self._simulation
+        reports = []
+        for number, drone, until, keep in watched:
+            if self._known[number] or simulation.lost[drone] or course.s > until:
+                continue
+            gap = float(np.sqrt(np.square(simulation.places[drone] - self._obstacles[number]).sum()))
+            if gap <= max(SIGHT_M, keep + LIMITS.speed * STOP_S / 2 + _LOOK_M):
+                self._known[number] = True
+                self._seen_s[number] = simulation.now_s
+                place = self.conditions.obstacles[number]
+                simulation.tell(drone, f"sees an obstacle at ({', '.join(f'{x:g}' for x in place)})")
+                reports.append(Blocked(self.names[drone], place, simulation.now_s))
+        return reports
+
+    def _tell_unfinished(self) -> None:
+        apart = self._simulation.gaps()
+        worst = int(apart.argmax())
+        if apart[worst] > _FAR_M:
+            self._simulation.tell(worst, f"is {apart[worst]:.2f} m from where it is wanted as the leg ends")
+
+
+def fly(mission: Mission, conditions: Conditions | None = None, progress: Callable[[str], None] | None = None) -> Flown:
+    """Fly all legs of `mission`, one after the other, in `conditions` (None: calm, and nothing happens).
+
+    `progress` is `Flight`'s.
+
+    Raises `ValueError` where there is nobody to fly, the conditions do not fit the mission, or its places are too near.
+    """
+    conditions = conditions or Conditions()
+    names = [drone.name for drone in mission.drones]
+    homes = np.array([drone.home for drone in mission.drones], dtype=np.float64).reshape(-1, 3)
+    check_homes(names, homes)
+    if conditions.distance is None:
+        goals = [np.array([goal.at for goal in leg.goals.values()]).reshape(-1, 3) for leg in mission.legs]
+        for leg, places in zip(mission.legs, goals, strict=True):
+            check_near([names[number] for number in leg.goals], places)
+        conditions = replace(conditions, distance=_distance([homes, *goals]))
+    flight = Flight(names, homes, conditions, progress)
+    for leg in mission.legs:
+        flight.fly(leg.opened_by, leg.goals)
+    return flight.flown()
+
+
+def _distance(places: Sequence[Array]) -> float:
+    """What is kept where nobody says: `DISTANCE_M`, or less where two of the same (K, 3) are nearer to each other."""
+    return max(LEAST_M, min(DISTANCE_M, *(_SHARE * nearest_two(points) for points in places)))

@@ -1,0 +1,204 @@
+"""Where drones stand, fly to and step aside: a crew in a box of rows, columns and levels.
+
+Lengths are in cells: a drone is a little narrower than one. An axis says which value of the problem a cell stands for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count, product
+
+from robochoc.flight.crafts import Cell, Craft, numbers
+
+Point = tuple[float, float, float]
+
+_GAP = 2
+"""Cells between the box and the lines of drones beside it, the first of the line included."""
+_TALL = 6
+"""Levels that even a single drone's box may have before they are scaled."""
+_LEVELS = range(4, 13)
+"""Least and most levels of a box whose levels are scaled."""
+_TICKS = 15
+"""Most labels on an axis."""
+_FAR = 1000
+"""Positions beyond it are moved to begin at 1: a browser draws in single precision."""
+_TOO_CLOSE = 0.5
+_GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One side of the box: the values `first` to `last` lie evenly from cell `low` to cell `high`."""
+
+    name: str
+    low: int
+    high: int
+    first: int
+    last: int
+
+    @classmethod
+    def over(cls, name: str, values: Iterable[int], *, most: int, scaled: int) -> Axis:
+        """The axis that holds `values`: a cell for each of up to `most` numbers, or else `scaled` cells in all."""
+        found = [*values] or [1]
+        first, last = min(found), max(found)
+        if last - first < most:
+            low = first if abs(first) < _FAR else 1
+            return cls(name, low, low + last - first, first, last)
+        return cls(name, 1, scaled, first, last)
+
+    @property
+    def cells(self) -> int:
+        """How many cells long."""
+        return self.high - self.low + 1
+
+    def at(self, value: float) -> float:
+        """Where `value` lies."""
+        if self._is_even:
+            return float(self.low + value - self.first)
+        return self.low + (value - self.first) * (self.high - self.low) / (self.last - self.first)
+
+    def value(self, cell: float) -> float:
+        """What lies there: `at`, the other way round."""
+        if self._is_even:
+            return cell - self.low + self.first
+        return self.first + (cell - self.low) * (self.last - self.first) / (self.high - self.low)
+
+    @property
+    def _is_even(self) -> bool:
+        """Whether each value has a cell of its own."""
+        return self.cells == self.last - self.first + 1
+
+    @property
+    def middle(self) -> float:
+        """Half way from end to end."""
+        return (self.low + self.high) / 2
+
+    @property
+    def ground(self) -> float:
+        """One cell below the lowest."""
+        return self.low - 1.0
+
+    @property
+    def ticks(self) -> list[tuple[float, str]]:
+        """Positions to label, and what to write there: round values, not too many."""
+        span = self.last - self.first
+        step = next(digit * 10**power for power in count() for digit in (1, 2, 5) if span < _TICKS * digit * 10**power)
+        return [(self.at(value), str(value)) for value in range(-(-self.first // step) * step, self.last + 1, step)]
+
+
+@dataclass(frozen=True)
+class Field:
+    """The box, and for each craft of a crew the spot on the ground where it stands in the beginning."""
+
+    axes: tuple[Axis, Axis, Axis]
+    homes: tuple[Point, ...]
+
+    @property
+    def ground(self) -> float:
+        """The height on which drones stand: one cell below the lowest level."""
+        return self.axes[2].ground
+
+    def places(self, crew: Sequence[Craft]) -> list[Point | None]:
+        """Where each of `crew`, as many as have homes, flies to; nowhere without a level. No two meet."""
+        taken = _Taken()
+        around: dict[Point, Iterator[Point]] = {}
+        found: list[Point | None] = []
+        rows, columns, levels = self.axes
+        for craft, (x, y, _) in zip(crew, self.homes, strict=True):
+            place = None
+            if craft.level is not None:
+                here = (rows.at(craft.cell[0]), columns.at(craft.cell[1])) if craft.cell else (x, y)
+                middle = (*here, levels.at(craft.level))
+                spots = around.setdefault(middle, _spiral(middle))
+                place = next(spot for spot in spots if not taken.is_near(spot))
+                taken.add(place)
+            found.append(place)
+        return found
+
+    def edge(self, number: int) -> Iterator[Point]:
+        """Spots for `number` drones that step aside, in lines before the box."""
+        rows, columns, _ = self.axes
+        across = max(1, min(number, max(rows.cells, columns.cells) * 3 // 2))
+        for x, y in _lines(rows.middle - (across - 1) / 2, across, columns.low - _GAP, -1):
+            yield x, y, self.ground
+
+
+def field_of(crew: Sequence[Craft], others: Iterable[Craft] = ()) -> Field:
+    """The field for `crew`. Its axes also reach to `others`: where some of the crew may be at another time."""
+    others = [*others]
+    cells = _cells(crew)
+    axes = _axes(crew, others, [*cells, *(other.cell for other in others if other.cell)])
+    rows, columns, levels = axes
+    beside = _lines(rows.low, rows.cells, columns.high + _GAP, 1)
+    homes: list[Point] = []
+    taken = _Taken()
+    for x, y in cells:
+        home = (rows.at(x), columns.at(y), levels.ground)
+        homes.append((*next(beside), levels.ground) if taken.is_near(home) else home)
+        taken.add(homes[-1])
+    return Field(axes, tuple(homes))
+
+
+def _cells(crew: Sequence[Craft]) -> list[Cell]:
+    """The crafts' cells; those that have none get a square grid, behind the others if there are others."""
+    known = [craft.cell for craft in crew if craft.cell]
+    side = math.ceil(math.sqrt(len(crew) - len(known)))
+    x = min((x for x, _ in known), default=1)
+    y = max((y + _GAP for _, y in known), default=1)
+    grid = ((x + row, y + column) for row in range(side) for column in range(side))
+    return [craft.cell or next(grid) for craft in crew]
+
+
+def _axes(crew: Sequence[Craft], others: Sequence[Craft], cells: Sequence[Cell]) -> tuple[Axis, Axis, Axis]:
+    most = max(_LEVELS[-1], 3 * math.ceil(math.sqrt(len(crew))))
+    names = _axis_names(crew)
+    rows = Axis.over(names[0], (x for x, _ in cells), most=most, scaled=most)
+    columns = Axis.over(names[1], (y for _, y in cells), most=most, scaled=most)
+    side = max(rows.cells, columns.cells)
+    values = [craft.level for craft in (*crew, *others) if craft.level is not None]
+    if names[2] == "level" and all(1 <= value <= side for value in values):
+        return rows, columns, Axis(names[2], 1, side, 1, side)
+    scaled = min(max(side, _LEVELS[0]), _LEVELS[-1])
+    return rows, columns, Axis.over(names[2], values, most=max(_TALL, 2 * side), scaled=scaled)
+
+
+def _axis_names(crew: Sequence[Craft]) -> tuple[str, str, str]:
+    if all(craft.cell and craft.cell == numbers(craft.name) for craft in crew):
+        return "row", "column", "level"
+    return ("x", "y", "z") if any(craft.cell for craft in crew) else ("", "", "value")
+
+
+def _lines(x: float, across: int, y: int, step: int) -> Iterator[tuple[float, float]]:
+    """Spots beside the box: lines of `across`, the first at `y`, each from `x` on, the next `step` behind it."""
+    for number in count():
+        yield float(x + number % across), float(y + number // across * step)
+
+
+class _Taken:
+    """Points, sorted into boxes: who looks for those that are too close does not look at all."""
+
+    def __init__(self) -> None:
+        self._boxes: dict[tuple[int, ...], list[Point]] = {}
+
+    def add(self, point: Point) -> None:
+        """One more."""
+        self._boxes.setdefault(self._box(point), []).append(point)
+
+    def is_near(self, point: Point) -> bool:
+        """Whether one of them is too close to `point`."""
+        boxes = product(*((number - 1, number, number + 1) for number in self._box(point)))
+        return any(math.dist(point, other) < _TOO_CLOSE for box in boxes for other in self._boxes.get(box, ()))
+
+    @staticmethod
+    def _box(point: Point) -> tuple[int, ...]:
+        return tuple(math.floor(part / _TOO_CLOSE) for part in point)
+
+
+def _spiral(point: Point) -> Iterator[Point]:
+    """The point itself, then spots around it, further and further out, like a sunflower's seeds."""
+    x, y, z = point
+    for number in count():
+        turn, radius = number * _GOLDEN_ANGLE, _TOO_CLOSE * math.sqrt(number)
+        yield (x + radius * math.cos(turn), y + radius * math.sin(turn), z)

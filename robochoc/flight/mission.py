@@ -1,0 +1,204 @@
+"""What a team's decisions mean for its drones: who flies where, epoch by epoch.
+
+The paper's drones stand on the ground in the beginning (Figure 5) and are at the places that the solution says in the
+end (Figure 6). In between an epoch may have sent them elsewhere. Lengths are in metres, in a frame whose z is up; one
+unit of a topic's coordinates is `scale` metres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from robochoc.flight.crafts import Craft, crafts_of, lone_craft, numbers, possible_crafts
+from robochoc.flight.layout import Axis, Field, Point, field_of
+from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.model.priorities import natural
+from robochoc.model.problem import AddAgent, Assignment, Robot, Team, Topic
+
+UNIT_M = 1.0
+"""A unit of coordinates, where nobody says otherwise: drones are a little narrower."""
+VAST_M = 40.0
+"""A field is no longer than that, where nobody says how long."""
+_DENSE_M = 0.025
+"""A unit is no shorter, as long as a field that is `_FLOWN_M` long is not left: neighbours need some room."""
+_FLOWN_M = 1_000.0
+_FAR_BELOW = 40
+"""Levels."""
+
+
+@dataclass(frozen=True)
+class Drone:
+    """One that may fly. It stands at `home` in the beginning. Drones of a `group`, a row, look alike."""
+
+    name: str
+    robot: str
+    """Who decides about it; empty where only a variable is known."""
+    topic: Topic | None
+    """Where its robot's decisions are published."""
+    home: Point
+    group: int
+
+
+@dataclass(frozen=True)
+class Goal:
+    """Where a drone is to be: in the air, or on the ground, where it `lands`."""
+
+    at: Point
+    lands: bool = False
+
+
+@dataclass(frozen=True)
+class Leg:
+    """What an epoch asks of the drones, by their numbers; who is not named stays where it is."""
+
+    opened_by: str
+    verdict: Verdict
+    goals: Mapping[int, Goal]
+
+
+@dataclass(frozen=True)
+class Mission:
+    """All that a run has decided. `axes` are those of the box around all places, in cells (`layout.py`)."""
+
+    team: str
+    drones: tuple[Drone, ...]
+    legs: tuple[Leg, ...]
+    axes: tuple[Axis, Axis, Axis]
+    scale: float
+
+    @property
+    def ground(self) -> float:
+        """The height on which drones stand."""
+        return self.axes[2].value(self.axes[2].ground) * self.scale
+
+
+class Cast:
+    """The crew of a run whose epochs come one after the other: who they are, where they stand, what each epoch asks.
+
+    `robots` are all that ever take part, those that come later among them; or, where nothing but names is known,
+    `names` of variables and of robots. `first` says where they go first, `leaving` how many of them will leave (None:
+    any may), and the box reaches to `others`.
+    """
+
+    def __init__(
+        self,
+        robots: Iterable[Robot],
+        first: Assignment,
+        *,
+        names: Iterable[str] = (),
+        others: Iterable[Craft] = (),
+        leaving: int | None = None,
+        scale: float | None = None,
+    ) -> None:
+        self._robots = {robot.name: robot for robot in robots}
+        self._names = [*names]
+        crew = sorted(self._crafts(first), key=lambda craft: (natural(craft.name), craft.name))
+        self._places = {(craft.robot, craft.name): number for number, craft in enumerate(crew)}
+        self._crew = crew
+        self.field: Field = field_of(crew, others)
+        self.scale = _scale(self.field.axes) if scale is None else scale
+        self._edge = self.field.edge(len(crew) if leaving is None else leaving)
+        self._aside: dict[int, Point] = {}
+        self._seen: set[str] = set()
+        self.drones = tuple(map(self._drone, crew, self.field.homes))
+
+    def leg(self, epoch: Epoch, withdrawn: Iterable[str] = ()) -> Leg:
+        """What `epoch`, the next one, asks of the drones. Who is not there any more lands at the edge."""
+        values: Assignment = {} if epoch.verdict is Verdict.NO_SOLUTION else epoch.assignment
+        here = {*(epoch.robots if self._robots else values or self._seen)} - {*withdrawn}
+        gone = (self._seen | {*withdrawn}) - here
+        self._seen |= here
+        crew = [*self._crew]
+        for craft in self._crafts(values, here):
+            crew[self._places[craft.robot, craft.name]] = craft
+        places = self.field.places([craft if _owner(craft) in here else replace(craft, level=None) for craft in crew])
+        goals: dict[int, Goal] = {}
+        for number, (craft, place) in enumerate(zip(crew, places, strict=True)):
+            if place is not None:
+                goals[number] = Goal(self._metres(place))
+            elif _owner(craft) in gone:
+                goals[number] = Goal(self._metres(self._spot(number)), lands=True)
+        return Leg(epoch.opened_by, epoch.verdict, goals)
+
+    def mission(self, team: str, legs: Iterable[Leg]) -> Mission:
+        """The whole of it."""
+        return Mission(team, self.drones, tuple(legs), self.field.axes, self.scale)
+
+    def _crafts(self, values: Assignment, here: Container[str] | None = None) -> Iterator[Craft]:
+        """The crafts of everybody, or of those that are `here`."""
+        for name, robot in self._robots.items():
+            if here is None or name in here:
+                yield from crafts_of(robot, values)
+        for name in self._names:
+            if here is None or name in here:
+                yield lone_craft(name, values) if name in values else Craft(name, numbers(name))
+
+    def _drone(self, craft: Craft, home: Point) -> Drone:
+        group = craft.cell[0] if craft.cell else round(home[0])
+        return Drone(craft.name, craft.robot, craft.topic, self._metres(home), group)
+
+    def _spot(self, number: int) -> Point:
+        if number not in self._aside:
+            self._aside[number] = next(self._edge)
+        return self._aside[number]
+
+    def _metres(self, point: Point) -> Point:
+        x, y, z = (axis.value(cell) * self.scale for axis, cell in zip(self.field.axes, point, strict=True))
+        return x, y, z
+
+
+def mission_of(outcome: Outcome, team: Team | None = None, scale: float | None = None) -> Mission:
+    """What `outcome` asks of the drones. Without its `team`, all that is known are names.
+
+    `team` is as its files have it, before its scenario. `scale` is in metres a unit; without one, `UNIT_M`, or less
+    where the field would be vast.
+    """
+    epochs = outcome.epochs or (Epoch(outcome.verdict, team.order if team else (), assignment=outcome.assignment),)
+    decided = [epoch.assignment for epoch in epochs if epoch.verdict is not Verdict.NO_SOLUTION]
+    first: dict[str, int] = {}
+    for values in decided:
+        first = {**values, **first}
+    if team is not None:
+        robots, names = everybody(team), []
+        others = [craft for values in decided for robot in robots for craft in crafts_of(robot, values)]
+        others += _lowest(robots, others)
+    else:
+        robots, names = [], [*first, *outcome.withdrawn]
+        others = [lone_craft(name, values) for values in decided for name in values]
+    cast = Cast(robots, first, names=names, others=others, leaving=_leaving(epochs, outcome), scale=scale)
+    legs = [cast.leg(epoch) for epoch in epochs[:-1]]
+    return cast.mission(outcome.team, [*legs, cast.leg(epochs[-1], outcome.withdrawn)])
+
+
+def everybody(team: Team) -> list[Robot]:
+    """All robots that ever take part: those of the beginning, and those that the scenario adds."""
+    added = [change.robot for event in team.scenario for change in event.changes if isinstance(change, AddAgent)]
+    return [*{robot.name: robot for robot in (*team.robots, *added)}.values()]
+
+
+def _lowest(robots: Iterable[Robot], decided: Iterable[Craft]) -> list[Craft]:
+    """The lowest that anybody could be, unless that is far below all `decided`: the ground is the same for all runs."""
+    possible = [craft for robot in robots for craft in possible_crafts(robot) if craft.level is not None]
+    if not possible:
+        return []
+    lowest = min(possible, key=lambda craft: craft.level or 0)
+    highest = max((craft.level for craft in decided if craft.level is not None), default=0)
+    return [Craft("", level=lowest.level)] if highest - (lowest.level or 0) < _FAR_BELOW else []
+
+
+def _leaving(epochs: Sequence[Epoch], outcome: Outcome) -> int:
+    """About how many leave before the end: a robot may fly several drones."""
+    stay = {*epochs[-1].robots} - {*outcome.withdrawn}
+    return len({*outcome.withdrawn, *(name for epoch in epochs for name in epoch.robots)} - stay)
+
+
+def _owner(craft: Craft) -> str:
+    """By what a craft is known to be there: its robot, or its own name."""
+    return craft.robot or craft.name
+
+
+def _scale(axes: Sequence[Axis]) -> float:
+    longest = max(1, *(axis.last - axis.first for axis in axes))
+    dense = _DENSE_M if longest * _DENSE_M <= _FLOWN_M else 0.0
+    return min(UNIT_M, max(VAST_M / longest, dense))

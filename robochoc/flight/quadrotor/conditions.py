@@ -1,0 +1,67 @@
+"""What a flight meets with: the distance to keep, wind, motors that stop, obstacles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from robochoc.flight.layout import Point
+from robochoc.flight.quadrotor.airframe import ROTORS
+
+FASTEST_M_S = 200.0
+"""No wind on the ground is faster."""
+LEAST_M = 0.01
+"""No distance between drones is less: plans look at steps of time that are short enough for it."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """One of `drone`'s motors (0 front, 1 left, 2 back, 3 right) stops `at_s` seconds after the flight's beginning."""
+
+    drone: str
+    at_s: float
+    motor: int = 0
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Of a whole flight. The same conditions give the same flight.
+
+    `distance`, in metres between drones' middles, is kept by all plans; None: 0.5, or less where homes or goals are
+    nearer to each other. `wind` is its mean velocity and `gusts` the standard deviation of each of its components, in
+    m/s; `seed` is that of the gusts. `obstacles` are points; see `robochoc.flight.flight`. Raises `ValueError`.
+    """
+
+    distance: float | None = None
+    wind: Point = (0.0, 0.0, 0.0)
+    gusts: float = 0.0
+    seed: int = 0
+    failures: tuple[Failure, ...] = ()
+    obstacles: tuple[Point, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.distance is not None and not LEAST_M <= self.distance < math.inf:
+            told = f"a positive number of metres, {LEAST_M:g} at least, not {self.distance}"
+            raise ValueError(f"the distance between drones has to be {told}")
+        if not 0 <= self.gusts <= FASTEST_M_S:
+            raise ValueError(f"gusts have to be a number from 0 to {FASTEST_M_S:g} m/s, not {self.gusts}")
+        if max(map(abs, self.wind), default=0) > FASTEST_M_S:
+            told = ", ".join(f"{part:g}" for part in self.wind)
+            raise ValueError(f"a wind of ({told}) is faster than {FASTEST_M_S:g} m/s")
+        if self.seed < 0:
+            raise ValueError(f"a seed has to be a number from 0 on, not {self.seed}")
+        for what, point in (("wind", self.wind), *(("obstacle", place) for place in self.obstacles)):
+            if not all(map(math.isfinite, point)):
+                raise ValueError(f"the {what} has to be three finite numbers, x, y and z, not {point}")
+        for failure in self.failures:
+            if failure.motor not in range(ROTORS):
+                raise ValueError(f"drone {failure.drone} has motors 0 to {ROTORS - 1}, no motor {failure.motor}")
+            if not 0 <= failure.at_s < math.inf:
+                raise ValueError(f"a motor can stop from second 0 on, not at {failure.at_s}")
+
+    def check(self, names: Collection[str]) -> None:
+        """That all whose motors stop are among `names`. Raises `ValueError`."""
+        for failure in self.failures:
+            if failure.drone not in names:
+                raise ValueError(f"no drone is called {failure.drone!r}; there are: {', '.join(names)}")

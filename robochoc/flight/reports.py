@@ -1,0 +1,59 @@
+"""What robots report of their situation: the paper's "read the robot situation" (Section 4.2). Pure data.
+
+Places are in metres, in the mission's frame; `at_s` is the time of the report, in seconds since any epoch that all
+reports of a source share.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from robochoc.flight.layout import Point
+
+
+@dataclass(frozen=True)
+class Blocked:
+    """Something is in the way at `place`: nobody can be there."""
+
+    drone: str
+    place: Point
+    at_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Cleared:
+    """What was in the way at `place` is gone."""
+
+    drone: str
+    place: Point
+    at_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class OutOfOrder:
+    """The drone cannot fly any more."""
+
+    drone: str
+    why: str = ""
+    at_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Battery:
+    """What is left in the drone's battery: 1 is full, 0 is empty."""
+
+    drone: str
+    level: float
+    at_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the drone is."""
+
+    drone: str
+    place: Point
+    at_s: float = 0.0
+
+
+Report = Blocked | Cleared | OutOfOrder | Battery | Pose

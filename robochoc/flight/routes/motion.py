@@ -1,0 +1,158 @@
+"""How a drone moves along its path, and where all of them are at any time.
+
+Every straight piece of a path begins and ends at rest, in minimum-jerk motion: the polynomial of degree five whose
+velocity and acceleration are zero at both ends (Flash and Hogan, "The coordination of arm movements", 1985). So both
+are continuous over a whole path, and a controller can take them as its feed-forward.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robochoc.flight.routes.spacing import Array, norms
+
+_TOP_SPEED = 15 / 8
+"""The greatest speed of minimum-jerk motion over a unit of length in a unit of time: half way."""
+_TOP_ACCELERATION = 10 / math.sqrt(3)
+"""And its greatest acceleration."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a drone's motion never exceeds: `speed` in m/s, `acceleration` in m/s^2."""
+
+    speed: float = 2.0
+    acceleration: float = 2.0
+
+    def __post_init__(self) -> None:
+        if not (0 < self.speed < math.inf and 0 < self.acceleration < math.inf):
+            raise ValueError(f"limits are positive numbers, not {self.speed} m/s and {self.acceleration} m/s^2")
+
+    def durations(self, lengths: Array) -> Array:
+        """The shortest times (K,), in seconds, of motion over `lengths` (K,), from rest to rest."""
+        least: Array = np.maximum(
+            _TOP_SPEED * lengths / self.speed, np.sqrt(_TOP_ACCELERATION * lengths / self.acceleration)
+        )
+        return least
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Where all are at a time, and how they move: metres, m/s, m/s^2, each (N, 3)."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+class Route:
+    """One drone's way along a path (K + 1, 3), from rest to rest, counted from when it begins."""
+
+    def __init__(self, drone: int, path: Array, limits: Limits) -> None:
+        self.drone = drone
+        self.path = path
+        self._durations = limits.durations(norms(np.diff(path, axis=0)))
+        self._ends = np.cumsum(self._durations)
+        self.duration_s = float(self._ends[-1])
+
+    def sample(self, times: Array) -> Array:
+        """Where the drone is at `times` (T,): (T, 3)."""
+        piece = np.minimum(np.searchsorted(self._ends, times, side="right"), len(self._ends) - 1)
+        durations = self._durations[piece]
+        share = np.clip((times - self._ends[piece] + durations) / durations, 0, 1)
+        origin = self.path[piece]
+        points: Array = origin + (self.path[piece + 1] - origin) * _way(share)[:, None]
+        return points
+
+    def pieces(self, begins_s: float) -> tuple[Array, Array, Array, Array, Array]:
+        """Its straight pieces, begun at `begins_s`: when each begins and ends, how long it lasts, whence, whither."""
+        ends = begins_s + self._ends
+        begins = np.concatenate(([begins_s], ends[:-1]))
+        return begins, ends, self._durations, self.path[:-1], self.path[1:]
+
+
+@dataclass(frozen=True)
+class _Window:
+    """A time in which nobody begins or ends a piece: who moves, and where the others rest."""
+
+    begins_s: float
+    ends_s: float
+    resting: Array
+    drones: NDArray[np.intp]
+    began: Array
+    durations: Array
+    origins: Array
+    along: Array
+
+
+class Plan:
+    """Where everybody is from second 0 to `duration_s`. Made by `robochoc.flight.routes.timetable.plan`."""
+
+    def __init__(self, starts: Array, flights: Sequence[tuple[Route, float]]) -> None:
+        self._starts = starts.copy()
+        found = [(flight.drone, flight.pieces(begins)) for flight, begins in flights]
+        drones = np.repeat([drone for drone, _ in found], [len(pieces[0]) for _, pieces in found]).astype(np.intp)
+        joined = [np.concatenate([pieces[part] for _, pieces in found]) for part in range(5)] if found else _NONE
+        order = np.argsort(joined[0], kind="stable")
+        self._drones = drones[order]
+        self._begins, self._ends, self._durations, self._origins, self._goals = (part[order] for part in joined)
+        self._bounds: list[float] = np.unique(np.concatenate((self._begins, self._ends))).tolist()
+        self.duration_s: float = self._bounds[-1] if self._bounds else 0.0
+        self._window = self._window_at(0.0)
+
+    def at(self, s: float) -> Motion:
+        """Where everybody is at second `s` and how they move. Before 0 it is as at 0, and after the end as there."""
+        s = min(max(s, 0.0), self.duration_s)
+        window = self._window
+        if not window.begins_s <= s < window.ends_s:
+            self._window = window = self._window_at(s)
+        position = window.resting.copy()
+        velocity = np.zeros_like(position)
+        acceleration = np.zeros_like(position)
+        drones = window.drones
+        if len(drones):
+            share = (s - window.began) / window.durations
+            rest = 1 - share
+            both = share * rest
+            rate = 30 * both * both / window.durations
+            bend = 60 * both * (rest - share) / (window.durations * window.durations)
+            position[drones] = window.origins + window.along * _way(share)[:, None]
+            velocity[drones] = window.along * rate[:, None]
+            acceleration[drones] = window.along * bend[:, None]
+        return Motion(position, velocity, acceleration)
+
+    def _window_at(self, s: float) -> _Window:
+        place = bisect_right(self._bounds, s)
+        begins = self._bounds[place - 1] if place else -math.inf
+        ends = self._bounds[place] if place < len(self._bounds) else math.inf
+        resting = self._starts.copy()
+        done = self._ends <= begins
+        # Pieces are sorted by their beginning: of several of one drone the last one counts.
+        resting[self._drones[done]] = self._goals[done]
+        now = (self._begins <= begins) & ~done
+        origins = self._origins[now]
+        return _Window(
+            begins,
+            ends,
+            resting,
+            self._drones[now],
+            self._begins[now],
+            self._durations[now],
+            origins,
+            self._goals[now] - origins,
+        )
+
+
+_NONE = [np.empty(0), np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3))]
+
+
+def _way(share: Array) -> Array:
+    """The share of the length that is done after a `share` of the time."""
+    way: Array = share * share * share * (10 + share * (6 * share - 15))
+    return way

@@ -1,0 +1,293 @@
+"""In which order drones move, if one moves at a time: each path is clear of all that are at rest meanwhile.
+
+A drone goes to its goal when that is free and a path leads there (`paths.py`). Where all that are not there yet block
+each other (they swap places, say), one of them steps aside, near its place if that helps, else into the sky.
+
+It always ends: a drone steps aside near its place once and into the sky once, and then goes to its goal. If nobody can
+do even that, all begin anew with `_Emptied`: everybody, those that stay too, goes up, each to a place in the sky whose
+column is no other's, and then down to its goal. Who can go up does, so that there are ever fewer in the way of others:
+if it gets stuck, any other order does too. Down they go in the reverse of an order in which they could leave the goals.
+
+So a way is found if all could go up from their starts, and from their goals, one after the other. Without standing
+points they can: the way up from the topmost leads away from all others, and across one flies at a height at which
+nobody rests, a distance above all places and a distance below those who wait. With them it fails only where they, or
+drones between which nobody fits, enclose somebody: that is `NoWay`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count, product
+
+import numpy as np
+
+from robochoc.flight.routes.paths import Space
+from robochoc.flight.routes.spacing import Array, norms
+
+_Way = Callable[[Array, Array, Array], Array | None]
+
+
+class NoWay(ValueError):  # noqa: N818 - named for what was found
+    """No order of moves was found in which `drones` reach their goals: standing points enclose them."""
+
+    def __init__(self, drones: Sequence[int]) -> None:
+        self.drones = tuple(drones)
+        names = ", ".join(map(str, self.drones))
+        super().__init__(f"no way was found for drones {names} (standing points enclose where they start or end)")
+
+
+@dataclass(frozen=True)
+class Move:
+    """A drone goes along a path (K + 1, 3), from rest to rest."""
+
+    drone: int
+    path: Array
+    points: Array
+    """Where all others are at rest meanwhile: any other path that is clear of them would do as well."""
+
+
+def moves_between(starts: Array, goals: Array, standing: Array, space: Space, waits: Array) -> list[Move]:
+    """The moves, one after the other, that bring all from `starts` to `goals`; raises `NoWay`.
+
+    `space.sky` is two distances or more above all of them. Who waits less, or hinders fewer, comes first.
+    """
+    found = _Direct(starts, goals, standing, space, waits)
+    if not found.is_done():
+        found.moves = _Emptied(starts, goals, standing, space, waits).all_moves()
+    return found.moves
+
+
+class _Sequence:
+    """Where everybody rests between two moves, and the moves until then."""
+
+    def __init__(self, starts: Array, goals: Array, standing: Array, space: Space, waits: Array) -> None:
+        self.goals = goals
+        self.waits = waits
+        self.space = space
+        self.count = len(starts)
+        self.points = np.vstack((starts, standing))
+        """Who rests where: drones, and standing points after them."""
+        self.rests = self.points[: self.count]
+        self.moves: list[Move] = []
+        self.waiting: set[int] = set()
+        """Those in the sky."""
+
+    def others(self, drone: int) -> Array:
+        return np.delete(self.points, drone, axis=0)
+
+    def go(self, drone: int, path: Array) -> None:
+        self.moves.append(Move(drone, path, self.others(drone)))
+        self.points[drone] = path[-1]
+        self.waiting.discard(drone)
+
+    def goal_is_free(self, drone: int) -> bool:
+        return bool((norms(self.others(drone) - self.goals[drone]) >= self.space.least).all())
+
+    def to_goal(self, drone: int, ways: Iterable[_Way], *, low: bool = True) -> bool:
+        """Go there, if one of `ways` leads there; along the ground only if `low`."""
+        if not self.goal_is_free(drone):
+            return False
+        others = self.others(drone)
+        for way in ways:
+            path = way(self.rests[drone], self.goals[drone], others)
+            if path is not None and (low or not self.space.slides(path[:-1], path[1:]).any()):
+                self.go(drone, path)
+                return True
+        return False
+
+    def to_sky(self, drone: int) -> bool:
+        """Go up and wait there, a distance above the height at which one flies across."""
+        others = self.others(drone)
+        up = self.space.up(self.rests[drone], others)
+        if up is None:
+            return False
+        spot = self._spot(self.rests[drone])
+        if (up[-1, :2] == spot[:2]).all():
+            path = np.vstack((up[:-1], spot))
+        else:
+            path = np.vstack((up, [*spot[:2], self.space.sky], spot))
+        if not self.space.is_clear(path, others):
+            return False
+        self.go(drone, path)
+        self.waiting.add(drone)
+        return True
+
+    def _spot(self, start: Array) -> Array:
+        """The nearest place in the sky whose column is apart from those of all that wait there."""
+        taken = self.rests[[*self.waiting], :2]
+        spots = (start[:2] + offset for offset in _spiral(self.space.distance))
+        free = (spot for spot in spots if (norms(taken - spot) >= self.space.distance).all())
+        return np.array([*next(free), self.space.sky + self.space.distance])
+
+
+class _Direct(_Sequence):
+    """Who can goes to its goal; who blocks others steps aside."""
+
+    def __init__(self, starts: Array, goals: Array, standing: Array, space: Space, waits: Array) -> None:
+        super().__init__(starts, goals, standing, space, waits)
+        self.away = {int(drone) for drone in np.flatnonzero((starts != goals).any(axis=1))}
+        self._aside: set[int] = set()
+        self._next_look = [0] * self.count
+        self._top = space.sky - space.distance
+        active = [*self.away]
+        self._blocked = np.zeros((self.count, len(self.points)), dtype=bool)
+        """Whether the straight way of a drone (row) is blocked by somebody at rest (column)."""
+        self._would = np.zeros((self.count, self.count), dtype=bool)
+        """Whether it is blocked by somebody (column) who is at his goal."""
+        self._lengths = norms(goals - starts)
+        self._blocked[active] = space.near(starts[active], goals[active], self.points)
+        self._would[active] = space.near(starts[active], goals[active], goals)
+        self._blocked[active, active] = self._would[active, active] = False
+        self._blocked[space.slides(starts, goals), :] = True
+
+    def is_done(self) -> bool:
+        """Bring all to their goals; False if that is not possible."""
+        while self.away:
+            if not (
+                self._straight()
+                or self._by_lane()
+                or self._by_detour(self._unhindered())
+                or self._steps_aside()
+                or self._by_detour(self._ranks())
+                or self._goes_up()
+                or self._by_detour(self._ranks(), again=True)
+            ):
+                return False
+        return True
+
+    def go(self, drone: int, path: Array) -> None:
+        """Move, and see whose way that blocks or clears."""
+        super().go(drone, path)
+        here, goal = self.rests[drone], self.goals[drone]
+        self._blocked[:, drone] = False
+        others = [other for other in self.away if other != drone]
+        if others:
+            slides = self.space.slides(self.rests[others], self.goals[others])
+            near = self.space.near(self.rests[others], self.goals[others], here[None])[:, 0]
+            self._blocked[others, drone] = near | slides
+        if (here == goal).all():
+            self.away.discard(drone)
+        else:
+            for matrix, points in ((self._blocked, self.points), (self._would, self.goals)):
+                matrix[drone] = self.space.near(here[None], goal[None], points)[0]
+                matrix[drone, drone] = False
+            self._lengths[drone] = norms(goal - here)
+
+    def _ranks(self) -> list[int]:
+        """Those that are away: first who waits less, would block fewer, and has farther to go."""
+        away = sorted(self.away)
+        hinders = self._would[away].sum(axis=0)
+        return sorted(away, key=lambda drone: (self.waits[drone], hinders[drone], -self._lengths[drone], drone))
+
+    def _straight(self) -> bool:
+        before = len(self.moves)
+        for drone in self._ranks():
+            if not self._blocked[drone].any():
+                self.go(drone, np.array([self.rests[drone], self.goals[drone]]))
+        return len(self.moves) > before
+
+    def _by_lane(self) -> bool:
+        return any(self.to_goal(drone, (self.space.by_lane,)) for drone in self._ranks())
+
+    def _unhindered(self) -> list[int]:
+        """Those whose straight way is blocked by none that will go away by itself."""
+        return [drone for drone in self._ranks() if not self._blocked[drone, [*self.away]].any()]
+
+    def _by_detour(self, drones: Iterable[int], *, again: bool = False) -> bool:
+        """One of `drones` goes round something. Who found no way looks `again` when more have moved: it takes a while.
+
+        If nobody can do anything else they all do, and go along the ground where they have to.
+        """
+        for drone in drones:
+            if (again or len(self.moves) >= self._next_look[drone]) and self.goal_is_free(drone):
+                if self.to_goal(drone, (self.space.round, self.space.over), low=again):
+                    return True
+                self._next_look[drone] = len(self.moves) + 1 + len(self.away)
+        return False
+
+    def _steps_aside(self) -> bool:
+        """One of those that block most goes a little way from its place."""
+        away = sorted(self.away)
+        blocks = self._blocked[away].sum(axis=0)
+        ranks = sorted(self.away - self._aside, key=lambda drone: (-blocks[drone], -self.rests[drone][2], drone))
+        for drone in ranks:
+            self._aside.add(drone)
+            path = self._way_aside(drone)
+            if path is not None:
+                self.go(drone, path)
+                return True
+        return False
+
+    def _way_aside(self, drone: int) -> Array | None:
+        """To the nearest place that is nobody's, of those that are in the way of fewest."""
+        here, others = self.rests[drone], self.others(drone)
+        spots = here + _AROUND * self.space.distance
+        low = min(self.space.ground + self.space.distance, float(here[2]))
+        spots = spots[(spots[:, 2] >= low) & (spots[:, 2] <= self._top)]
+        spots = spots[~self.space.slides(np.broadcast_to(here, spots.shape), spots)]
+        rest = [other for other in self.away if other != drone]
+        taken = np.vstack((others, self.goals[rest]))
+        # A thousandth farther than needed: on the line between two places, say, rounding must not decide.
+        free = (norms(spots[:, None] - taken[None]) >= self.space.distance).all(axis=1)
+        spots = spots[free]
+        spots = spots[~self.space.near(np.broadcast_to(here, spots.shape), spots, others).any(axis=1)]
+        if not len(spots):
+            return None
+        blocked = self.space.near(self.rests[rest], self.goals[rest], spots).sum(axis=0)
+        return np.array([here, spots[blocked.argmin()]])
+
+    def _goes_up(self) -> bool:
+        ranks = sorted(self.away - self.waiting, key=lambda drone: (-self.rests[drone][2], drone))
+        been = {move.drone for move in self.moves if move.path[-1][2] > self.space.sky}
+        return any(self.to_sky(drone) for drone in ranks if drone not in been)
+
+
+class _Emptied(_Sequence):
+    """Everybody goes up, and then down to its goal, in the reverse of an order in which they could leave the goals."""
+
+    def all_moves(self) -> list[Move]:
+        """The moves; raises `NoWay`."""
+        standing = self.points[self.count :]
+        left = _Emptied(self.goals, self.goals, standing, self.space, self.waits)
+        left.empty()
+        self.empty()
+        for move in reversed(left.moves):
+            if not self.to_goal(move.drone, (self.space.by_lane, self.space.over)):
+                raise NoWay([move.drone])
+        return self.moves
+
+    def empty(self) -> None:
+        """All go up, the topmost of those that can first."""
+        drones = sorted(range(self.count), key=lambda drone: -self.rests[drone][2])
+        while drones:
+            for drone in drones:
+                if self.to_sky(drone):
+                    drones.remove(drone)
+                    break
+            else:
+                raise NoWay(sorted(drones))
+
+
+def _spiral(distance: float) -> Iterator[Array]:
+    """Offsets in plan, ring by ring, all of them farther and farther out."""
+    yield np.zeros(2)
+    for ring in count(1):
+        for step in range(6 * ring):
+            angle = math.pi * step / (3 * ring)
+            yield np.array([math.cos(angle), math.sin(angle)]) * (ring * distance)
+
+
+def _around() -> Array:
+    """Where one may step aside, in distances: up, or to eight sides, level or rising or sinking; the nearest first."""
+    # A little more than a whole distance: on the line between two places rounding must not decide.
+    radii = (1.001, 1.5, 2.0, 3.0)
+    sides = [(math.cos(step * math.pi / 4), math.sin(step * math.pi / 4)) for step in range(8)]
+    level = [np.array((x, y, 0.0)) for x, y in sides]
+    leans = [np.array((x, y, z)) / math.sqrt(2) for z, (x, y) in product((1, -1), sides)]
+    directions = [np.array((0.0, 0.0, 1.0)), *level, *leans, np.array((0.0, 0.0, -1.0))]
+    return np.array([radius * direction for radius in radii for direction in directions])
+
+
+_AROUND = _around()

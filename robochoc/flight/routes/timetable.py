@@ -1,0 +1,244 @@
+"""When drones fly, so that no two ever come nearer to each other than a distance.
+
+`moves.py` gives moves that are safe one after the other. Here they begin as early as they can, in that order of
+precedence: what is scheduled stays, the next move takes the first time at which it keeps the distance from everybody
+at all times, before it, during it, and at rest after it, for good. Such a time there always is: when all that are
+scheduled have ended, the others rest where the move's path was found clear of them. This is prioritized planning
+(Erdmann and Lozano-Perez, "On multiple moving objects", 1987) on fixed paths, which would otherwise be incomplete.
+
+Time is cut into steps, at which all moves begin. In a step everybody's motion is straight and even but for
+acceleration * step^2 / 8, which is added to the distance; but for that the nearest approach is exact. Paths that keep
+the distance from each other, or from where somebody rests, need no time, and no more than the distance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robochoc.flight.routes.motion import Limits, Motion, Plan, Route
+from robochoc.flight.routes.moves import Move, NoWay, moves_between
+from robochoc.flight.routes.paths import Space
+from robochoc.flight.routes.spacing import Array, Flags, TooClose, check_spacing, nearest, norms
+
+__all__ = ["Limits", "Motion", "NoWay", "Plan", "TooClose", "plan"]
+
+Steps = NDArray[np.int64]
+
+_STEP_S = 0.05
+_BULGE = 0.01
+"""How far two may deviate from even motion in a step, in distances, both together: the step is shorter if need be."""
+_CHUNK = 8
+"""Steps of a move that are looked at together, by the box around them."""
+_PORTION = 4096
+_PATIENCE_S = 1.0
+"""Who would wait longer looks for another lane, and takes it if it is there that much sooner."""
+_LANES = 4
+"""At so many."""
+_FOREVER = 2**62
+
+
+def plan(
+    starts: Array,
+    goals: Array,
+    *,
+    distance: float,
+    standing: Array | None = None,
+    waits: Array | None = None,
+    limits: Limits | None = None,
+    ground: float = 0.0,
+) -> Plan:
+    """How N drones fly from `starts` (N, 3) to `goals` (N, 3), never nearer to each other than `distance`.
+
+    They keep it from the `standing` points (M, 3) too. Drone i does not begin before second `waits[i]`; who has the
+    same start and goal stays there, unless `moves.py` finds no other way. Nobody flies below `ground`, but for starts
+    and goals that are there. The result is the same each time. Lengths are in metres.
+
+    Raises `TooClose` if two starts, or two goals, or one of them and a standing point, are nearer than `distance`;
+    `NoWay` where standing points enclose a start or a goal; ValueError for arguments that make no sense.
+    """
+    starts, goals = _points(starts, "starts"), _points(goals, "goals")
+    standing = np.empty((0, 3)) if standing is None else _points(standing, "standing")
+    waits = np.zeros(len(starts)) if waits is None else np.asarray(waits, dtype=float)
+    if len(goals) != len(starts) or waits.shape != (len(starts),):
+        raise ValueError(
+            f"{len(starts)} starts, {len(goals)} goals and waits of shape {waits.shape} do not go together"
+        )
+    if not (0 < distance < math.inf and math.isfinite(ground) and np.isfinite(waits).all()):
+        raise ValueError(f"distance {distance}, ground {ground} and all waits must be finite, the distance positive")
+    check_spacing(starts, standing, distance, "start")
+    check_spacing(goals, standing, distance, "goal")
+    heights = np.concatenate((starts[:, 2], goals[:, 2], standing[:, 2], [ground]))
+    space = Space(distance, ground, float(heights.max()) + 2 * distance)
+    table = _Timetable(starts, space, limits or Limits(), waits)
+    for move in moves_between(starts, goals, standing, space, waits):
+        table.add(move)
+    return table.plan()
+
+
+def _points(rows: Array, name: str) -> Array:
+    points = np.array(rows, dtype=float)
+    if not points.size:
+        points = points.reshape(0, 3)
+    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():  # noqa: PLR2004 - x, y, z
+        raise ValueError(f"{name} are rows of three finite numbers, not an array of shape {points.shape}")
+    return points
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """A move in the timetable: where it is at each step (S + 1, 3), from the step at which it begins."""
+
+    flight: Route
+    samples: Array
+    begins: int
+
+    @property
+    def steps(self) -> int:
+        return len(self.samples) - 1
+
+    @property
+    def ends(self) -> int:
+        return self.begins + self.steps
+
+    @cached_property
+    def chunks(self) -> Array:
+        """The samples by chunks (C, _CHUNK + 1, 3); each begins where the one before ends; NaN where there are none."""
+        count = -(-self.steps // _CHUNK)
+        padded = np.full((count * _CHUNK + 1, 3), np.nan)
+        padded[: len(self.samples)] = self.samples
+        chunks: Array = padded[_CHUNK * np.arange(count)[:, None] + np.arange(_CHUNK + 1)]
+        return chunks
+
+
+class _Timetable:
+    """The moves that are scheduled, and where everybody rests in between."""
+
+    def __init__(self, starts: Array, space: Space, limits: Limits, waits: Array) -> None:
+        self._starts = starts
+        self._space = space
+        self._limits = limits
+        self._step = min(_STEP_S, math.sqrt(4 * _BULGE * space.distance / limits.acceleration))
+        self._enough = space.distance + limits.acceleration * self._step**2 / 4
+        self._first: list[int] = np.ceil(np.maximum(waits, 0) / self._step).astype(int).tolist()
+        self._entries: list[_Entry] = []
+        self._drones = np.empty(0, dtype=np.int64)
+        self._latest = 0
+        self._corners = np.empty((2, 0, 3))
+        """Of the boxes around all paths: the lowest, and the highest."""
+        # Where somebody rests: the drone, the point, from which step, to which step.
+        self._resting = np.arange(len(starts))
+        self._places = starts.copy()
+        self._from = np.zeros(len(starts), dtype=np.int64)
+        self._to = np.full(len(starts), _FOREVER)
+        self._last_rest = [*range(len(starts))]
+
+    def add(self, move: Move) -> None:
+        """Schedule it at the first step at which it is safe, by another lane if that is much sooner."""
+        earliest = max(self._first[move.drone], int(self._from[self._last_rest[move.drone]]))
+        entry = self._entry(move.drone, move.path, earliest)
+        patience = math.ceil(_PATIENCE_S / self._step)
+        if entry.begins > earliest + patience:
+            for path in islice(self._space.lanes(move.path[0], move.path[-1], move.points), _LANES):
+                other = self._entry(move.drone, path, earliest)
+                if other.ends + patience < entry.ends:
+                    entry = other
+        self._enter(entry)
+
+    def plan(self) -> Plan:
+        """All of it, in seconds."""
+        return Plan(self._starts, [(entry.flight, entry.begins * self._step) for entry in self._entries])
+
+    def _entry(self, drone: int, path: Array, earliest: int) -> _Entry:
+        """A move along `path`, as early as it can."""
+        flight = Route(drone, path, self._limits)
+        steps = max(1, math.ceil(flight.duration_s / self._step))
+        entry = _Entry(flight, flight.sample(self._step * np.arange(steps + 1, dtype=np.float64)), earliest)
+        if earliest >= self._latest:
+            return entry
+        taken = np.zeros(self._latest + 1, dtype=bool)
+        self._mark_rests(taken, entry)
+        self._mark_goal(taken, entry)
+        self._mark_moves(taken, entry)
+        return replace(entry, begins=earliest + int(taken[earliest:].argmin()))
+
+    def _enter(self, entry: _Entry) -> None:
+        drone, path = entry.flight.drone, entry.flight.path
+        self._entries.append(entry)
+        self._drones = np.append(self._drones, drone)
+        self._latest = max(self._latest, entry.ends)
+        self._corners = np.concatenate((self._corners, [[path.min(axis=0)], [path.max(axis=0)]]), axis=1)
+        self._to[self._last_rest[drone]] = entry.begins
+        self._last_rest[drone] = len(self._places)
+        self._resting = np.append(self._resting, drone)
+        self._places = np.vstack((self._places, path[-1]))
+        self._from = np.append(self._from, entry.ends)
+        self._to = np.append(self._to, _FOREVER)
+
+    def _mark_rests(self, taken: Flags, entry: _Entry) -> None:
+        """When it would come too near to somebody at rest, on its way or at its end."""
+        path, samples = entry.flight.path, entry.samples
+        near = self._space.near(path[:-1], path[1:], self._places).any(axis=0) & (self._resting != entry.flight.drone)
+        for rest in np.flatnonzero(near):
+            begins, ends = int(self._from[rest]), int(self._to[rest])
+            apart = samples - self._places[rest]
+            steps = np.flatnonzero(nearest(apart[:-1], apart[1:]) < self._enough)
+            for run in np.split(steps, np.flatnonzero(np.diff(steps) > 1) + 1):
+                if len(run):
+                    taken[max(0, begins - int(run[-1])) : max(0, ends - int(run[0]))] = True
+            if norms(apart[-1]) < self._space.least:
+                taken[: max(0, ends - entry.steps)] = True
+
+    def _mark_goal(self, taken: Flags, entry: _Entry) -> None:
+        """When it would be at its goal before somebody has passed there."""
+        goal = entry.flight.path[-1:]
+        for other in self._near(entry.flight.drone, goal):
+            path = other.flight.path
+            if self._space.near(path[:-1], path[1:], goal).any():
+                apart = other.samples - goal
+                near = np.flatnonzero(nearest(apart[:-1], apart[1:]) < self._enough)
+                if len(near):
+                    taken[: max(0, other.begins + int(near[-1]) + 1 - entry.steps)] = True
+
+    def _mark_moves(self, taken: Flags, entry: _Entry) -> None:
+        """When it would come too near to somebody who moves at the same time."""
+        others = self._near(entry.flight.drone, entry.flight.path)
+        if not others:
+            return
+        mine, theirs = entry.chunks, np.concatenate([other.chunks for other in others])
+        begins = np.concatenate([other.begins + _CHUNK * np.arange(len(other.chunks)) for other in others])
+        apart = _box_gaps(_boxes(mine), _boxes(theirs))
+        for pairs in _portions(np.argwhere(apart < self._enough)):
+            a, b = mine[pairs[:, 0]], theirs[pairs[:, 1]]
+            gap = nearest(a[:, :-1, None] - b[:, None, :-1], a[:, 1:, None] - b[:, None, 1:])
+            pair, my, their = np.nonzero(gap < self._enough)
+            steps = begins[pairs[pair, 1]] + their - pairs[pair, 0] * _CHUNK - my
+            taken[steps[steps >= 0]] = True
+
+    def _near(self, drone: int, path: Array) -> list[_Entry]:
+        """The moves of others that the boxes around the paths do not keep apart."""
+        box = np.array([[path.min(axis=0)], [path.max(axis=0)]])
+        near = (_box_gaps(box, self._corners)[0] < self._space.least) & (self._drones != drone)
+        return [self._entries[number] for number in np.flatnonzero(near)]
+
+
+def _boxes(chunks: Array) -> Array:
+    """The lowest and the highest corner (2, C, 3) of the box around each chunk."""
+    return np.array([np.fmin.reduce(chunks, axis=1), np.fmax.reduce(chunks, axis=1)])
+
+
+def _box_gaps(first: Array, second: Array) -> Array:
+    """How far boxes (2, A, 3) are from others (2, B, 3): (A, B)."""
+    (low, high), (lows, highs) = first[:, :, None], second[:, None]
+    return norms(np.maximum(np.maximum(lows - high, low - highs), 0))
+
+
+def _portions(pairs: Steps) -> Iterator[Steps]:
+    """So many at a time that they do not fill the memory."""
+    return (pairs[first : first + _PORTION] for first in range(0, len(pairs), _PORTION))

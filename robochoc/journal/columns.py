@@ -1,0 +1,295 @@
+"""What a block of a journal holds: its entries in columns, as msgpack (docs/journal.md).
+
+Most entries are of four kinds. What entries of these have in common stands side by side, as that is packed best; all
+others are written as they are. A block is read without those before it.
+"""
+
+from __future__ import annotations
+
+import sys
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import accumulate
+from math import isfinite
+from operator import sub
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+from robochoc.journal.entries import Line
+from robochoc.journal.events import Decided, Received, Sent, Settled
+
+SENT, RECEIVED, SETTLED, DECIDED, OTHER = range(5)
+"""What `_Block.kinds` says of each entry."""
+NANOSECONDS = 1_000_000_000
+_DOUBLE = 8
+_LARGEST = 2**63
+
+_Index = Annotated[int, Meta(ge=0)]
+
+
+class BadBlock(ValueError):  # noqa: N818 - named for what was found
+    """What a block holds is no entries."""
+
+
+class _Block(msgspec.Struct, array_like=True, forbid_unknown_fields=True, frozen=True, kw_only=True):
+    """Columns, each in the order of the entries. Texts stand once, in `words`; elsewhere is their place in it.
+
+    A shape is a message's type and the names of its fields, their `values` stand one after the other. `actors` are
+    the senders, receivers, or robots whose entries they are, `partners` the others of messages.
+    """
+
+    words: list[str]
+    shapes: list[Annotated[list[_Index], Meta(min_length=1)]]
+    kinds: bytes
+    scale: Literal[0, 1, 1_000_000_000]
+    times: list[int] | bytes
+    clocks: list[int]
+    actors: list[_Index]
+    partners: list[_Index]
+    says: list[_Index]
+    values: list[Any]
+    sizes: list[int]
+    checks: list[int]
+    assignments: list[dict[str, int]]
+    others: list[Line]
+
+
+class _Numbers(dict[Any, int]):
+    """Numbers things from 0 on, in the order in which they are first asked for."""
+
+    def __missing__(self, thing: object) -> int:
+        self[thing] = number = len(self)
+        return number
+
+
+_encode = msgspec.msgpack.Encoder().encode
+_json = msgspec.json.Encoder().encode
+
+
+def columns_of(entries: Iterable[Line], *, exact: bool) -> bytes:
+    """What a block of `entries` holds. Unless `exact`, times are rounded to the nanosecond: clocks know no more.
+
+    Raises `TypeError`, `ValueError`, `OverflowError` or `RecursionError` for what `entries_of` would not read again:
+    robots on other machines may tell of anything, and what follows must not be lost with it.
+    """
+    columns = _Columns()
+    columns.take(entries)
+    columns.check()
+    return columns.packed(exact=exact)
+
+
+class _Columns:
+    """Columns that grow."""
+
+    def __init__(self) -> None:
+        self.words, self.shapes = _Numbers(), _Numbers()
+        self.kinds = bytearray()
+        self.times: list[float] = []
+        self.clocks: list[int] = []
+        self.actors: list[int] = []
+        self.partners: list[int] = []
+        self.says: list[int] = []
+        self.values: list[Any] = []
+        self.sizes: list[int] = []
+        self.checks: list[int] = []
+        self.checked: list[int] = []
+        self.assignments: list[dict[str, int]] = []
+        self.others: list[Line] = []
+
+    def take(self, entries: Iterable[Line]) -> None:
+        """Add `entries`. This loop is what a journal costs the run, so it asks for exact types, and calls little."""
+        kinds, times, clocks, actors = self.kinds.append, self.times.append, self.clocks.append, self.actors.append
+        partners, says, words, shapes = self.partners.append, self.says.append, self.words, self.shapes
+        values, sizes = self.values.extend, self.sizes.append
+        checked: dict[str, int] = {}
+        for entry in entries:
+            if type(entry) is Sent:
+                kinds(SENT)
+                actors(words[entry.sender])
+                partners(words[entry.receiver])
+                content = entry.content
+                says(shapes[entry.type, *content])
+                values(content.values())
+                sizes(entry.bytes)
+            elif type(entry) is Received:
+                kinds(RECEIVED)
+                actors(words[entry.receiver])
+                partners(words[entry.sender])
+                says(shapes[entry.type,])
+            elif type(entry) is Settled:
+                kinds(SETTLED)
+                actors(words[entry.robot])
+                self.checks.append(entry.checks - checked.get(entry.robot, 0))
+                checked[entry.robot] = entry.checks
+                self.checked.append(entry.checks)
+            elif type(entry) is Decided:
+                kinds(DECIDED)
+                actors(words[entry.robot])
+                self.assignments.append(entry.assignment)
+            else:
+                kinds(OTHER)
+                self.others.append(entry)
+                continue
+            times(entry.t)
+            clocks(entry.clock)
+
+    def check(self) -> None:
+        """Raise where there is something that cannot be read again."""
+        _json(self.values)
+        _whole(self.clocks)
+        _whole(self.checked)
+        _finite(entry.t for entry in self.others)
+
+    def packed(self, *, exact: bool) -> bytes:
+        """All of it, as msgpack."""
+        shapes = [[self.words[word] for word in shape] for shape in self.shapes]  # which may add words
+        scale, times = _scaled(self.times, exact=exact)
+        return _encode(
+            _Block(
+                words=list(self.words),
+                shapes=shapes,
+                kinds=bytes(self.kinds),
+                scale=scale,
+                times=times,
+                clocks=_steps(self.clocks),
+                actors=self.actors,
+                partners=self.partners,
+                says=self.says,
+                values=self.values,
+                sizes=self.sizes,
+                checks=self.checks,
+                assignments=self.assignments,
+                others=self.others,
+            )
+        )
+
+
+def _scaled(times: Iterable[float], *, exact: bool) -> tuple[Literal[0, 1, 1_000_000_000], list[int] | bytes]:
+    """Times as a scale and the steps between whole numbers of 1 / scale, or (0) as the doubles that they are."""
+    times = array("d", times)
+    if all(map(float.is_integer, times)):
+        return 1, _steps(map(int, times))
+    if not exact and all(map(isfinite, times)):
+        return 1_000_000_000, _steps([round(t * NANOSECONDS) for t in times])
+    doubles = array("d", [t if isfinite(t) else 0.0 for t in times])  # what a stranger's clock says may be no number
+    if sys.byteorder == "big":
+        doubles.byteswap()
+    return 0, doubles.tobytes()
+
+
+def _steps(numbers: Iterable[int]) -> list[int]:
+    """Each number less the one before it."""
+    numbers = list(numbers)
+    return list(map(sub, numbers, [0, *numbers]))
+
+
+_decode = msgspec.msgpack.Decoder(_Block).decode
+
+
+def entries_of(content: bytes) -> list[Line]:
+    """The entries of a block that holds `content`. Raises `BadBlock` where that is anything but what is written."""
+    try:
+        block = _decode(content)
+        _json(block.values)  # msgpack can hold what no message can: keys that are no text, extensions
+        return list(_Entries(block))
+    except (msgspec.MsgspecError, TypeError, ValueError, OverflowError, RecursionError, LookupError) as error:
+        raise BadBlock(str(error)) from error
+
+
+class _Entries:
+    """The entries of a block, one after the other. Raises `ValueError` or `LookupError` where columns do not fit."""
+
+    def __init__(self, block: _Block) -> None:
+        sent, received, settled, decided, others = map(block.kinds.count, range(5))
+        timed = len(block.kinds) - others
+        _fit(block.actors, timed)
+        _fit(block.clocks, timed)
+        _fit(block.partners, sent + received)
+        _fit(block.says, sent + received)
+        _fit(block.sizes, sent)
+        _fit(block.checks, settled)
+        _fit(block.assignments, decided)
+        _fit(block.others, others)
+        if sent + received + settled + decided != timed:
+            raise ValueError("there are kinds of entries that are not known")
+        self._block = block
+        self._shapes = [_named(shape, block.words) for shape in block.shapes]
+        self._times, self._clocks = _times(block), _whole(accumulate(block.clocks))
+        _fit(self._times, timed)
+        _finite((*self._times, *(entry.t for entry in block.others)))
+
+    def __iter__(self) -> Iterator[Line]:
+        block, shapes, words = self._block, self._shapes, self._block.words
+        times, clocks = iter(self._times), iter(self._clocks)
+        actors, partners, says = iter(block.actors), iter(block.partners), iter(block.says)
+        sizes, checks, values = iter(block.sizes), iter(block.checks), iter(block.values)
+        assignments, others = iter(block.assignments), iter(block.others)
+        checked: dict[str, int] = {}
+        left = len(block.values)
+        for kind in block.kinds:
+            if kind == OTHER:
+                yield next(others)
+                continue
+            t, clock, actor = next(times), next(clocks), words[next(actors)]
+            if kind == SENT:
+                word, fields = shapes[next(says)]
+                receiver = words[next(partners)]
+                left -= len(fields)
+                content = dict(zip(fields, values, strict=False))  # `values` goes on with the next message's
+                yield Sent(
+                    t=t, sender=actor, receiver=receiver, type=word, content=content, bytes=next(sizes), clock=clock
+                )
+            elif kind == RECEIVED:
+                word, _ = shapes[next(says)]
+                yield Received(t=t, sender=words[next(partners)], receiver=actor, type=word, clock=clock)
+            elif kind == SETTLED:
+                (so_far,) = _whole([checked.get(actor, 0) + next(checks)])
+                checked[actor] = so_far
+                yield Settled(t=t, robot=actor, clock=clock, checks=so_far)
+            else:
+                yield Decided(t=t, robot=actor, assignment=next(assignments), clock=clock)
+        if left:
+            raise ValueError("messages have more or fewer fields than there are values")
+
+
+def _fit(column: Sequence[object], count: int) -> None:
+    if len(column) != count:
+        raise ValueError(f"a column has {len(column)} places, not {count}")
+
+
+def _named(shape: Sequence[int], words: Sequence[str]) -> tuple[str, tuple[str, ...]]:
+    """A message's type, and the names of its fields."""
+    name, *fields = (words[place] for place in shape)
+    if len({*fields}) < len(fields):
+        raise ValueError(f"a message of type {name!r} has two fields of one name")
+    return name, tuple(fields)
+
+
+def _times(block: _Block) -> Sequence[float]:
+    """The times of the entries of the four kinds, in the runtime's unit."""
+    if isinstance(block.times, bytes):
+        if block.scale:
+            raise ValueError("times are doubles, but have a scale")
+        doubles = array("d")
+        doubles.frombytes(block.times)
+        if sys.byteorder == "big":
+            doubles.byteswap()
+        return doubles
+    if not block.scale:
+        raise ValueError("times are whole numbers, but have no scale")
+    return [number / block.scale for number in accumulate(block.times)]
+
+
+def _finite(times: Iterable[float]) -> None:
+    if not all(map(isfinite, times)):
+        raise ValueError("a time is no number")
+
+
+def _whole(numbers: Iterable[int]) -> list[int]:
+    """`numbers`, all of 64 bits. Raises `ValueError`."""
+    numbers = list(numbers)
+    if numbers and not (min(numbers) >= -_LARGEST and max(numbers) < _LARGEST):
+        raise ValueError("a count is too large")
+    return numbers

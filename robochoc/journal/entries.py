@@ -1,0 +1,45 @@
+"""What stands in a journal: a header, the events of a run, and how it ended; and what may be wrong with it."""
+
+from __future__ import annotations
+
+import msgspec
+
+from robochoc.journal.events import AnyEvent, Event
+from robochoc.model.outcome import Outcome
+
+VERSION = 2
+"""Of what entries mean. Raised when one is added, or gets another meaning; readers refuse what they do not know."""
+STAMPED_LATE = 1
+"""In this version the `clock` of what was said was that of the end of the step; and it came after what was decided."""
+READ = (STAMPED_LATE, VERSION)
+"""Versions that are read."""
+
+
+class BadJournal(ValueError):  # noqa: N818 - named for what was found
+    """The file is no journal, or one of another version, or nothing of it can be read."""
+
+
+class Header(Event, frozen=True, kw_only=True, tag="Journal"):
+    """What was run, and the version of this format."""
+
+    t: float = 0
+    team: str
+    protocol: str
+    runtime: str
+    seed: int
+    order: str | tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
+    """The priority order, by name or as the list of robots; left out where it was the files'."""
+    channel: str | msgspec.UnsetType = msgspec.UNSET
+    """The channel model, where there was one: then the times of the search's events are in simulated seconds."""
+    version: int = VERSION
+
+
+class Ended(Event, frozen=True, kw_only=True):
+    """How it ended; absent in the journal of a run that broke off."""
+
+    t: float = 0
+    outcome: Outcome
+
+
+Line = AnyEvent | Header | Ended
+"""One entry."""

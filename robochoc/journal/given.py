@@ -1,0 +1,179 @@
+"""What robots are given when a run begins: a team as an event, for who plays the run again, and back.
+
+Robots travel as the XML files that they could have come from. What such a file cannot say stands beside them: the
+priority order, variables that neighbours see though nothing in the robot's own file says so, and domains that a
+scenario has emptied. Two things are not kept, as no robot looks at them: what definitions and domains are called
+(where two of a file have one name, one gets another), and which lines of which file they came from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import replace
+
+import msgspec
+
+from robochoc.formats import InvalidInput, robot_in, robot_xml
+from robochoc.formats.names import is_name
+from robochoc.journal.events import Given
+from robochoc.model.problem import INFINITE, Constraint, Domain, Relation, Robot, Team, Variable
+from robochoc.solver.agent_problem import NO_BRIEF, Brief
+from robochoc.solver.explanation import Void
+
+NOTHING_VOID = Void(frozenset(), frozenset())
+_STAND_IN = (range(1),)
+"""What is written for an empty domain, as a file has none."""
+
+
+class BadGiven(ValueError):  # noqa: N818 - named for what was found
+    """What robots are said to have been given is no team."""
+
+
+class TeamWriter:
+    """Says what robots are given, of their files only what is new since it said so last."""
+
+    def __init__(self) -> None:
+        self._robots: dict[str, Robot] = {}
+        self._files: dict[str, str] = {}
+
+    def given(
+        self,
+        team: Team,
+        brief: Brief = NO_BRIEF,
+        void: Void = NOTHING_VOID,
+        *,
+        fresh: Collection[str] = (),
+        quiet: bool = True,
+    ) -> Given:
+        """What `team`, in its order, is given; `why` in it tells why a robot cannot be written."""
+        event = Given(
+            t=0,
+            order=team.order,
+            robots={},
+            seed=brief.seed,
+            settings=dict(brief.settings),
+            aside=brief.aside,
+            fresh=tuple(sorted(fresh)),
+            void_keys=tuple(sorted(void.keys)),
+            void_agents=tuple(sorted(void.agents)),
+            quiet=quiet,
+            shown={robot.name: robot.shown for robot in team.robots if robot.shown},
+            empty=tuple(name for name, variable in team.variables.items() if not variable.domain),
+        )
+        try:
+            files = {robot.name: self._file(robot) for robot in team.robots}
+        except ValueError as error:
+            return msgspec.structs.replace(event, why=str(error))
+        news = {name: file for name, file in files.items() if self._files.get(name) != file}
+        self._robots.update((robot.name, robot) for robot in team.robots)
+        self._files.update(news)
+        return msgspec.structs.replace(event, robots=news)
+
+    def _file(self, robot: Robot) -> str:
+        """The robot's file; an equal robot's is not written again."""
+        if self._robots.get(robot.name) == robot:
+            return self._files[robot.name]
+        try:
+            return robot_xml(_writable(robot)).decode()
+        except ValueError as error:
+            raise ValueError(f"{robot.name} cannot be written: {error}") from error
+
+
+class TeamReader:
+    """Reads what `TeamWriter` says, one event after the other."""
+
+    def __init__(self, name: str = "") -> None:
+        self._name = name
+        self._robots: dict[str, Robot] = {}
+
+    def team(self, given: Given) -> Team:
+        """The team, in its order. Raises `BadGiven`."""
+        if given.why:
+            raise BadGiven(f"what the robots were given could not be written: {given.why}")
+        for name, content in given.robots.items():
+            try:
+                self._robots[name] = robot_in(content.encode(), name)
+            except (InvalidInput, UnicodeEncodeError) as invalid:
+                raise BadGiven(f"what {name} was given cannot be read: {invalid}") from invalid
+        missing = [name for name in given.order if name not in self._robots]
+        if missing:
+            raise BadGiven(f"nothing says what {missing[0]} was given")
+        empty = set(given.empty)
+        robots = tuple(_as_given(self._robots[name], given.shown.get(name, ()), empty) for name in given.order)
+        team = Team(self._name, robots)
+        _check(team)
+        return team
+
+
+def brief_of(given: Given) -> Brief:
+    """What all robots were told beside the problem."""
+    return Brief(given.seed, given.settings, given.aside)
+
+
+def void_of(given: Given) -> Void:
+    """What of the epoch before does not stand."""
+    return Void(frozenset(given.void_keys), frozenset(given.void_agents))
+
+
+def _as_given(robot: Robot, shown: tuple[str, ...], empty: Collection[str]) -> Robot:
+    """`robot` with what its file cannot say."""
+    if not (shown or any(variable.name in empty for variable in robot.variables)):
+        return robot
+    return replace(robot, shown=shown, variables=_with_domain(robot, empty, ()))
+
+
+def _with_domain(robot: Robot, names: Collection[str], ranges: tuple[range, ...]) -> tuple[Variable, ...]:
+    """The variables of `robot`, those in `names` with the domain `ranges`."""
+    return tuple(
+        replace(variable, domain=Domain(variable.domain.name, ranges)) if variable.name in names else variable
+        for variable in robot.variables
+    )
+
+
+# What a file can say
+
+
+def _writable(robot: Robot) -> Robot:
+    """`robot` as a file can say it: no domain is empty. Raises `ValueError`."""
+    for name in (robot.name, *(variable.name for variable in robot.variables)):
+        if not is_name(name):
+            raise ValueError(f"{name!r} cannot be a name in a file")
+    empty = [variable.name for variable in robot.variables if not variable.domain]
+    if empty:
+        robot = replace(robot, variables=_with_domain(robot, empty, _STAND_IN))
+    for constraint in _constraints(robot):
+        _check_costs(constraint)
+    return robot
+
+
+def _constraints(robot: Robot) -> Iterable[Constraint]:
+    yield from robot.private
+    yield from robot.shared
+    for child in robot.children:
+        yield from child.constraints
+
+
+def _check_costs(constraint: Constraint) -> None:
+    """Raise `ValueError` for a cost that comes back from a file as another number: 5.0 as 5, which is sent shorter."""
+    definition = constraint.definition
+    costs = (*definition.costs, definition.default_cost) if isinstance(definition, Relation) else (constraint.cost,)
+    for cost in costs:
+        if type(cost) is float and cost != INFINITE:
+            raise ValueError(f"the cost {cost} of {constraint.name} is no integer")
+
+
+# What strangers say
+
+
+def _check(team: Team) -> None:
+    """Raise `BadGiven` where files that are right by themselves do not go together: nothing else looks at it again."""
+    if len(team.order) != len(set(team.order)):
+        raise BadGiven("a robot stands twice in the order")
+    if len(team.owner) != sum(len(robot.variables) for robot in team.robots):
+        raise BadGiven("a variable belongs to two robots")
+    for robot in team.robots:
+        names = [*(one.name for one in robot.parents), *(one.name for one in robot.children)]
+        names += [name for constraint in _constraints(robot) for name in constraint.variables]
+        strangers = [name for name in names if name not in team and name not in team.owner]
+        if strangers:
+            raise BadGiven(f"{robot.name} was given something on {strangers[0]}, which is not in the team")

@@ -1,0 +1,65 @@
+"""The journal: all events of a run, in a compact file that can be read while it is written, and after a crash.
+
+The first entry says what was run, the last one how it ended. Statistics, pictures and golden tests are computed from
+it; robots do not know that it is kept. The file is described in docs/journal.md; its text form is one JSON object a
+line.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+
+from robochoc.journal.entries import VERSION, BadJournal, Ended, Header, Line
+from robochoc.journal.events import AnyEvent, Began, Sent, Settled
+from robochoc.journal.reader import Follower, Journal, in_order, is_journal, lines_of, read_journal
+from robochoc.journal.recorder import JournalFile, Recorder, Sink, improvements
+from robochoc.model.outcome import Metrics
+
+__all__ = [
+    "VERSION",
+    "BadJournal",
+    "Ended",
+    "Follower",
+    "Header",
+    "Journal",
+    "JournalFile",
+    "Line",
+    "Recorder",
+    "Sink",
+    "improvements",
+    "in_order",
+    "is_journal",
+    "lines_of",
+    "metrics_of",
+    "read_journal",
+]
+
+
+def metrics_of(events: Iterable[AnyEvent]) -> Metrics:
+    """What the events say of messages, bytes, NCCCs and checks. Wall-clock time is not in them: 0."""
+    total = Metrics()
+    messages: Counter[str] = Counter()
+    size = largest = ncccs = 0
+    checks: dict[str, int] = {}
+
+    def run() -> Metrics:
+        return Metrics(dict(messages), size, ncccs, sum(checks.values()), largest=largest)
+
+    for event in events:
+        match event:
+            case Began():
+                total += run()
+                messages.clear()
+                checks.clear()
+                size = largest = ncccs = 0
+            case Sent():
+                messages[event.type] += 1
+                size += event.bytes
+                largest = max(largest, event.bytes)
+            case Settled():
+                ncccs = max(ncccs, event.clock)
+                checks[event.robot] = event.checks
+            case _:
+                pass
+    return total + run()

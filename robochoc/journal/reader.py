@@ -1,0 +1,312 @@
+"""Reading journals: those that are whole, those that broke off, and those that are still being written."""
+
+from __future__ import annotations
+
+import gc
+import io
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import pairwise
+from math import isfinite
+from operator import attrgetter
+from typing import BinaryIO, Protocol, cast
+
+import msgspec
+
+from robochoc.journal.blocks import MAGIC, Damaged, Truncated, Unframer
+from robochoc.journal.columns import BadBlock, entries_of
+from robochoc.journal.entries import READ, BadJournal, Ended, Header, Line
+from robochoc.journal.events import AnyEvent, Began
+from robochoc.model.outcome import Outcome
+
+MOST_ENTRIES = 30_000_000
+"""`read_journal` keeps no more: about 10 million messages, of which each takes a kilobyte of memory."""
+LONGEST_LINE = 256 * 2**20
+"""No line of the text form is longer, in bytes."""
+_PIECE = 2**20
+_TEXT = b'{"event":"Journal"'
+
+
+@dataclass(frozen=True)
+class Journal:
+    """A journal that has been read. `outcome` is None when the run broke off.
+
+    `damage` says why it ends early, and where: after a crash, or in a file that was altered. None: it is whole. The
+    events are those before the damage. `truncated`: only the end is missing, as after a crash; nothing was altered.
+    """
+
+    header: Header
+    events: tuple[AnyEvent, ...]
+    outcome: Outcome | None
+    damage: str | None = None
+    truncated: bool = False
+
+
+def is_journal(content: bytes) -> bool:
+    """Whether `content` begins as a journal does, in either form."""
+    return content.startswith((MAGIC, _TEXT))
+
+
+def read_journal(content: bytes) -> Journal:
+    """Read what `Recorder` has written, or the lines that `lines_of` gives.
+
+    Within a run, from one `Began` to the next, events are put in the order of their times; those of equal times stay
+    in the order in which they came, which is each robot's own (`Improved` were written last, and so come after all of
+    their time). Raises `BadJournal` where not even the header can be read.
+    """
+    with _without_cycles():
+        follower = Follower(io.BytesIO(content))
+        lines = follower.read(MOST_ENTRIES)
+        damage = follower.damage
+        truncated = False
+        if len(lines) > MOST_ENTRIES:
+            damage = f"it has more than {MOST_ENTRIES:,} entries, of which the first are read"
+            truncated = True
+            del lines[MOST_ENTRIES:]
+        elif damage is None:
+            rest, damage = follower.finish()
+            truncated = follower.truncated
+            lines += rest
+        first, last = lines[0], lines[-1]
+        if not isinstance(first, Header):  # the follower has seen to it
+            raise BadJournal("it has no header")
+        outcome = last.outcome if isinstance(last, Ended) else None
+        events = cast("list[AnyEvent]", lines[1:-1] if outcome else lines[1:])  # so has it here
+        return Journal(first, tuple(in_order(events)), outcome, damage, truncated)
+
+
+def in_order(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
+    """Events of a journal, as they were written; each run's come in the order of their times, `Began` first."""
+    events = list(events)
+    begun = [place for place, event in enumerate(events) if type(event) is Began]
+    by_time = attrgetter("t")
+    yield from sorted(events[: begun[0] if begun else None], key=by_time)
+    for start, end in pairwise([*begun, len(events)]):
+        yield events[start]
+        yield from sorted(events[start + 1 : end], key=by_time)
+
+
+def lines_of(journal: Journal) -> Iterator[bytes]:
+    """The text form of a journal: one JSON object a line."""
+    encode = msgspec.json.Encoder().encode
+    yield encode(journal.header) + b"\n"
+    for event in journal.events:
+        yield encode(event) + b"\n"
+    if journal.outcome:
+        yield encode(Ended(outcome=journal.outcome)) + b"\n"
+
+
+class Follower:
+    """Reads a journal, of either form, while it is written.
+
+    `file` is not closed. Where it can be, it is read at an offset of the follower's own (`os.pread`), so it may be one
+    that another process appends to through the same descriptor.
+    """
+
+    damage: str | None = None
+    """Why nothing more will be read, and where; None: nothing is wrong so far."""
+    truncated: bool = False
+    """Whether the damage is that the end is missing, and no other."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._source = _source(file)
+        self._form: _Form | None = None
+        self._began = self._over = False
+
+    def read(self, most: int | None = None) -> list[Line]:
+        """The entries that have become whole since the last call, in the file's order; the first is the `Header`.
+
+        Stops after the block with which there are more than `most`. Raises `BadJournal` when it turns out that the
+        file is no journal.
+        """
+        lines: list[Line] = []
+        while self.damage is None and (most is None or len(lines) <= most):
+            found = self._next()
+            if found is None:
+                break
+            lines += found
+        return lines
+
+    def finish(self) -> tuple[list[Line], str | None]:
+        """No more will be written: what is left, and the damage, if any. Raises `BadJournal`."""
+        if self._form is None:
+            raise BadJournal("it is empty")
+        lines: list[Line] = []
+        if self.damage is None:
+            try:
+                lines += self._fitting(self._form.rest())
+            except Damaged as damaged:
+                self._break_off(damaged)
+        if not self._began:
+            raise BadJournal("it ends before its header")
+        return lines, self.damage
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the journal says how the run ended: nothing will follow."""
+        return self._over
+
+    def _next(self) -> Sequence[Line] | None:
+        """The next entries; None: there are none yet."""
+        while True:
+            try:
+                if self._form and (lines := self._form.next()) is not None:
+                    return self._fitting(lines)
+            except Damaged as damaged:
+                self._break_off(damaged)
+                return None
+            piece = self._source()
+            if not piece:
+                return None
+            if self._form is None:
+                self._form = _Blocks() if piece[:1] == MAGIC[:1] else _Text()
+            self._form.feed(piece)
+
+    def _break_off(self, damaged: Damaged) -> None:
+        if not self._began:
+            raise BadJournal(str(damaged)) from damaged
+        self.damage = f"{self._place}: more follows the end" if self._over else str(damaged)
+        self.truncated = isinstance(damaged, Truncated) and not self._over
+
+    @property
+    def _place(self) -> str:
+        return self._form.place if self._form else ""
+
+    def _fitting(self, lines: Sequence[Line]) -> Sequence[Line]:
+        """`lines`, if they may follow those before: a header, events, an end. Raises `BadJournal`, `Damaged`."""
+        if self._began and not self._over and {*map(type, lines)}.isdisjoint((Header, Ended)):
+            return lines  # nearly always, and there may be millions
+        began, over = self._began, self._over
+        for line in lines:
+            if over:
+                raise Damaged(f"{self._place}: more follows the end")
+            if isinstance(line, Header) == began:
+                if began:
+                    raise Damaged(f"{self._place}: a second header")
+                raise BadJournal(f"{self._place}: expected the header of a journal")
+            if isinstance(line, Header) and line.version not in READ:
+                known = " and ".join(map(str, READ))
+                raise BadJournal(f"its entries are of version {line.version}, and this robochoc reads {known}")
+            began, over = True, isinstance(line, Ended)
+        self._began, self._over = began, over
+        return lines
+
+
+def _source(file: BinaryIO) -> Callable[[], bytes]:
+    """What reads the next piece of `file`."""
+    place = 0
+
+    def at_an_offset() -> bytes:
+        nonlocal place
+        piece = os.pread(descriptor, _PIECE, place)
+        place += len(piece)
+        return piece
+
+    try:
+        descriptor = file.fileno()
+        os.pread(descriptor, 0, 0)
+    except (OSError, AttributeError):  # it is in memory, or a pipe
+        return lambda: file.read(_PIECE)
+    return at_an_offset
+
+
+class _Form(Protocol):
+    """One of the two forms of journals."""
+
+    def feed(self, piece: bytes) -> None:
+        """Here are the next bytes."""
+
+    def next(self) -> Sequence[Line] | None:
+        """The next entries; None: they are not whole yet. Raises `BadJournal`, `Damaged`."""
+
+    def rest(self) -> Sequence[Line]:
+        """The entries that are whole if nothing follows. Raises `BadJournal`, `Damaged`."""
+
+    @property
+    def place(self) -> str:
+        """Where the last entries stood."""
+
+
+class _Blocks:
+    """The binary form."""
+
+    def __init__(self) -> None:
+        self._unframer = Unframer()
+        self.feed = self._unframer.feed
+        self.place = ""
+
+    def next(self) -> Sequence[Line] | None:
+        self.place = self._unframer.place
+        content = self._unframer.next()
+        if content is None:
+            return None
+        try:
+            return entries_of(content)
+        except BadBlock as bad:
+            raise Damaged(f"{self.place}: a block holds no entries: {bad}") from bad
+
+    def rest(self) -> Sequence[Line]:
+        if self._unframer.rest:
+            raise Truncated(self._unframer.rest)
+        return ()
+
+
+class _Text:
+    """The text form: one JSON object a line."""
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+        self._searched = self._lines = 0
+        self._decode = msgspec.json.Decoder(Line).decode
+
+    @property
+    def place(self) -> str:
+        return f"line {self._lines}"
+
+    def feed(self, piece: bytes) -> None:
+        self._buffer += piece
+
+    def next(self) -> Sequence[Line] | None:
+        end = self._buffer.find(b"\n", self._searched)
+        if end < 0:
+            self._searched = len(self._buffer)
+            if self._searched > LONGEST_LINE:
+                raise Damaged(f"line {self._lines + 1}: it is longer than {LONGEST_LINE:,} bytes")
+            return None
+        line = self._buffer[:end]
+        del self._buffer[: end + 1]
+        self._searched = 0
+        return self._decoded(line)
+
+    def rest(self) -> Sequence[Line]:
+        try:
+            return self._decoded(self._buffer) if self._buffer else ()
+        except Damaged as cut:
+            raise Truncated(str(cut)) from cut
+
+    def _decoded(self, line: bytearray) -> Sequence[Line]:
+        self._lines += 1
+        try:
+            entry = self._decode(line)
+        except UnicodeDecodeError as error:
+            raise Damaged(f"{self.place}: it is not UTF-8") from error
+        except (msgspec.MsgspecError, RecursionError) as error:
+            raise Damaged(f"{self.place}: {error}") from error
+        if not isfinite(entry.t):
+            raise Damaged(f"{self.place}: its time is no number")
+        return (entry,)
+
+
+@contextmanager
+def _without_cycles() -> Iterator[None]:
+    """Millions of entries come into being, none goes: the collector would look at all of them again and again."""
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()

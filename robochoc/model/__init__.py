@@ -1,0 +1,1 @@
+"""The problem as data: teams, robots, domains, constraints, expressions, changes, orders, outcomes."""

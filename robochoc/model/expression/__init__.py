@@ -1,0 +1,30 @@
+"""Functional expressions: what a predicate says, as a tree (FORMAT.md, "Functional expressions"; Figure 2).
+
+The vocabulary is XCSP 2.1's. A text is parsed by hand and type-checked, never handed to `eval`; what is computed
+stays within 64 bits, so that no expression can eat the machine. `evaluate` walks the tree and `compiled` builds
+closures: two independent implementations of the same meaning, and the tests hold them against each other.
+
+All arguments of an operator are evaluated, whatever the others are; only `if` chooses. Booleans are 0 and 1.
+"""
+
+from robochoc.model.expression.closures import compiled
+from robochoc.model.expression.operators import ALIASES, OPERATORS, evaluate
+from robochoc.model.expression.parser import ExpressionError, parse
+from robochoc.model.expression.tree import Apply, Constant, Expression, Name, Type, Undefined, names, text
+
+__all__ = [
+    "ALIASES",
+    "OPERATORS",
+    "Apply",
+    "Constant",
+    "Expression",
+    "ExpressionError",
+    "Name",
+    "Type",
+    "Undefined",
+    "compiled",
+    "evaluate",
+    "names",
+    "parse",
+    "text",
+]

@@ -1,0 +1,119 @@
+"""Expressions as Python functions, for whoever checks a constraint a million times.
+
+It shares nothing with `operators`: that both agree is tested, and so each vouches for the other.
+"""
+
+from __future__ import annotations
+
+import math
+import operator as arithmetic
+from collections.abc import Callable, Sequence
+
+from robochoc.model.expression.tree import BOUND, Apply, Constant, Expression, Name, Undefined
+
+Closure = Callable[[Sequence[int]], int]
+
+
+def compiled(expression: Expression, names: Sequence[str]) -> Closure:
+    """`expression` as a function of the values of `names`, in their order: what `evaluate` says, but faster.
+
+    The function raises `Undefined` where `evaluate` does. Raises `ValueError` when a name is not in `names`.
+    """
+    match expression:
+        case Constant(value):
+            return lambda _values: value
+        case Name(name):
+            return arithmetic.itemgetter(names.index(name))
+        case Apply("if", (condition, then, otherwise)):
+            test, yes, no = (compiled(part, names) for part in (condition, then, otherwise))
+            return lambda values: yes(values) if test(values) else no(values)
+        case Apply(operator, arguments):
+            return _CLOSURES[operator](*(compiled(argument, names) for argument in arguments))
+
+
+def _within(value: int) -> int:
+    if abs(value) > BOUND:
+        raise Undefined
+    return value
+
+
+def _add(*terms: Closure) -> Closure:
+    def total(values: Sequence[int]) -> int:
+        result = 0
+        for term in terms:
+            result = _within(result + term(values))
+        return result
+
+    return total
+
+
+def _mul(*factors: Closure) -> Closure:
+    def product(values: Sequence[int]) -> int:
+        result = 1
+        for factor in [factor(values) for factor in factors]:
+            result = _within(result * factor)
+        return result
+
+    return product
+
+
+def _div(left: Closure, right: Closure) -> Closure:
+    def quotient(values: Sequence[int]) -> int:
+        dividend, divisor = left(values), right(values)
+        if not divisor:
+            raise Undefined
+        floor, rest = divmod(dividend, divisor)
+        return _within(floor + 1 if rest and floor < 0 else floor)
+
+    return quotient
+
+
+def _mod(left: Closure, right: Closure) -> Closure:
+    def rest(values: Sequence[int]) -> int:
+        dividend, divisor = left(values), right(values)
+        if not divisor:
+            raise Undefined
+        size = abs(dividend) % abs(divisor)
+        return size if dividend >= 0 else -size
+
+    return rest
+
+
+def _pow(left: Closure, right: Closure) -> Closure:
+    def power(values: Sequence[int]) -> int:
+        base, exponent = left(values), right(values)
+        if exponent < 0:
+            raise Undefined
+        if base in {0, 1, -1}:
+            return int(base ** min(exponent, 2 - exponent % 2))
+        if exponent * math.log2(abs(base)) > BOUND.bit_length():
+            raise Undefined
+        return _within(base**exponent)
+
+    return power
+
+
+_CLOSURES: dict[str, Callable[..., Closure]] = {
+    "neg": lambda x: lambda values: _within(-x(values)),
+    "abs": lambda x: lambda values: _within(abs(x(values))),
+    "add": _add,
+    "sub": lambda x, y: lambda values: _within(x(values) - y(values)),
+    "mul": _mul,
+    "div": _div,
+    "mod": _mod,
+    "pow": _pow,
+    "min": lambda *terms: lambda values: min([term(values) for term in terms]),
+    "max": lambda *terms: lambda values: max([term(values) for term in terms]),
+    "dist": lambda x, y: lambda values: _within(abs(x(values) - y(values))),
+    "eq": lambda x, y: lambda values: 1 if x(values) == y(values) else 0,
+    "ne": lambda x, y: lambda values: 1 if x(values) != y(values) else 0,
+    "lt": lambda x, y: lambda values: 1 if x(values) < y(values) else 0,
+    "le": lambda x, y: lambda values: 1 if x(values) <= y(values) else 0,
+    "gt": lambda x, y: lambda values: 1 if x(values) > y(values) else 0,
+    "ge": lambda x, y: lambda values: 1 if x(values) >= y(values) else 0,
+    "not": lambda x: lambda values: 1 - x(values),
+    "and": lambda *terms: lambda values: 1 if all([term(values) for term in terms]) else 0,  # noqa: C419 - all of them
+    "or": lambda *terms: lambda values: 1 if any([term(values) for term in terms]) else 0,  # noqa: C419 - all of them
+    "xor": lambda x, y: lambda values: 1 if x(values) != y(values) else 0,
+    "iff": lambda x, y: lambda values: 1 if x(values) == y(values) else 0,
+}

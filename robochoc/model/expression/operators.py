@@ -1,0 +1,101 @@
+"""The operators of XCSP 2.1, in one table, and what an expression made of them is worth."""
+
+from __future__ import annotations
+
+import operator as arithmetic
+from collections.abc import Callable, Mapping
+from functools import reduce
+from typing import NamedTuple
+
+from robochoc.model.expression.tree import BOUND, Apply, Constant, Expression, Name, Type, Undefined
+
+
+def _bounded(value: int) -> int:
+    if -BOUND <= value <= BOUND:
+        return value
+    raise Undefined
+
+
+def _quotient(dividend: int, divisor: int) -> int:
+    """Truncated toward zero."""
+    if divisor == 0:
+        raise Undefined
+    size = abs(dividend) // abs(divisor)
+    return size if (dividend < 0) == (divisor < 0) else -size
+
+
+def _remainder(dividend: int, divisor: int) -> int:
+    """With the dividend's sign."""
+    return dividend - divisor * _quotient(dividend, divisor)
+
+
+def _power(base: int, exponent: int) -> int:
+    """Checked before it is computed: a power grows faster than memory."""
+    if exponent < 0:
+        raise Undefined
+    if abs(base) > 1 and exponent >= BOUND.bit_length():
+        raise Undefined
+    return int(base**exponent)
+
+
+class Operator(NamedTuple):
+    """A row of the table: types of the arguments and of the result, and the meaning that `evaluate` computes."""
+
+    takes: tuple[Type, ...]
+    gives: Type
+    meaning: Callable[..., int]
+    variadic: bool = False
+    """Two or more arguments: `meaning` folds them from the left."""
+    infix: str = ""
+    """The sign whose two operands it takes as its own when they are its only argument: `minus(i-j)`."""
+
+
+_I, _B = Type.INTEGER, Type.BOOLEAN
+
+OPERATORS: dict[str, Operator] = {
+    "neg": Operator((_I,), _I, arithmetic.neg),
+    "abs": Operator((_I,), _I, abs),
+    "add": Operator((_I, _I), _I, arithmetic.add, variadic=True, infix="+"),
+    "sub": Operator((_I, _I), _I, arithmetic.sub, infix="-"),
+    "mul": Operator((_I, _I), _I, arithmetic.mul, variadic=True, infix="*"),
+    "div": Operator((_I, _I), _I, _quotient),
+    "mod": Operator((_I, _I), _I, _remainder),
+    "pow": Operator((_I, _I), _I, _power),
+    "min": Operator((_I, _I), _I, min, variadic=True),
+    "max": Operator((_I, _I), _I, max, variadic=True),
+    "dist": Operator((_I, _I), _I, lambda x, y: abs(x - y), infix="-"),
+    "eq": Operator((_I, _I), _B, arithmetic.eq),
+    "ne": Operator((_I, _I), _B, arithmetic.ne),
+    "lt": Operator((_I, _I), _B, arithmetic.lt),
+    "le": Operator((_I, _I), _B, arithmetic.le),
+    "gt": Operator((_I, _I), _B, arithmetic.gt),
+    "ge": Operator((_I, _I), _B, arithmetic.ge),
+    "not": Operator((_B,), _B, arithmetic.not_),
+    "and": Operator((_B, _B), _B, arithmetic.and_, variadic=True),
+    "or": Operator((_B, _B), _B, arithmetic.or_, variadic=True),
+    "xor": Operator((_B, _B), _B, arithmetic.xor),
+    "iff": Operator((_B, _B), _B, arithmetic.eq),
+    "if": Operator((_B, _I, _I), _I, lambda condition, then, otherwise: then if condition else otherwise),
+}
+ALIASES = {"neq": "ne", "minus": "sub", "plus": "add"}
+"""The paper's names for some of them."""
+
+
+def evaluate(expression: Expression, environment: Mapping[str, int]) -> int:
+    """The value of `expression` where names have the values of `environment`; Booleans are 0 and 1.
+
+    Raises `Undefined` on a division by zero, a negative exponent, and a result beyond +-2**63.
+    """
+    match expression:
+        case Constant(value):
+            return value
+        case Name(name):
+            return environment[name]
+        case Apply("if", (condition, then, otherwise)):
+            return evaluate(then if evaluate(condition, environment) else otherwise, environment)
+        case Apply(operator, arguments):
+            values = [evaluate(argument, environment) for argument in arguments]
+            meaning = OPERATORS[operator].meaning
+            if len(values) == 1:
+                return _bounded(int(meaning(*values)))
+            return reduce(lambda left, right: _bounded(int(meaning(left, right))), values)

@@ -1,0 +1,306 @@
+"""From text to tree: tokens, recursive descent, types."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
+
+from robochoc.model.expression.operators import ALIASES, OPERATORS, Operator
+from robochoc.model.expression.tree import Apply, Constant, Expression, Name, Type, text
+
+MAX_TEXT = 64 * 1024
+MAX_DEPTH = 64
+MAX_NODES = 10_000
+MAX_DIGITS = 18
+
+
+class ExpressionError(ValueError):
+    """The text is not an expression: what is wrong, where (an offset into the text), and what to do about it."""
+
+    def __init__(self, message: str, position: int, hint: str = "") -> None:
+        super().__init__(f"{message}, at character {position + 1}" + (f" ({hint})" if hint else ""))
+        self.message = message
+        self.position = position
+        self.hint = hint
+
+
+def parse(text: str, names: Collection[str], wanted: Type) -> Expression:
+    """Read a functional expression over `names` that yields a `wanted` value.
+
+    Reads XCSP 2.1's functional form, and what Figure 2 writes besides: an argument list in parentheses of its own,
+    infix `+ - *`, and `minus(i-j)` (FORMAT.md, "Functional expressions"). Raises `ExpressionError`.
+    """
+    if len(text) > MAX_TEXT:
+        raise ExpressionError(
+            f"the expression has {len(text)} characters", MAX_TEXT, f"{MAX_TEXT} are allowed: split the predicate"
+        )
+    return _Parser(text, names).whole(wanted)
+
+
+class _Token(NamedTuple):
+    text: str
+    position: int
+
+
+class _Parsed(NamedTuple):
+    """A part of the text that has been understood."""
+
+    expression: Expression
+    type: Type
+    position: int
+    depth: int = 1
+    infix: str = ""
+    """The sign, where the part is an infix term outside parentheses."""
+    operands: tuple[_Parsed, ...] = ()
+
+
+_TOKEN = re.compile(r"\s*(?:([A-Za-z_][A-Za-z0-9_.]*|[0-9]+|[-+*(),])|(\S))")
+_INFIX = {operator.infix: name for name, operator in OPERATORS.items() if operator.infix and name != "dist"}
+
+
+class _Parser:
+    """Recursive descent: sum = product {+- product}; product = atom {* atom}; atom = integer, name, call or (sum)."""
+
+    def __init__(self, text: str, names: Collection[str]) -> None:
+        self._names = names
+        self._tokens = _tokens(text)
+        self._closing = _parentheses(self._tokens)
+        self._next = 0
+        self._nodes = 0
+
+    def whole(self, wanted: Type) -> Expression:
+        parsed = self._sum(1)
+        if self._peek().text == ",":
+            raise ExpressionError(
+                "a list where one expression should stand", self._peek().position, "use and(..., ...)"
+            )
+        if self._peek().text:
+            raise ExpressionError(
+                f"'{_shortened(self._peek().text)}' after the end of the expression",
+                self._peek().position,
+                "put an operator between the terms, or delete the rest",
+            )
+        _check_type(parsed, wanted, "the expression")
+        return parsed.expression
+
+    def _sum(self, level: int) -> _Parsed:
+        left = self._product(level)
+        while self._peek().text in {"+", "-"}:
+            sign = self._take()
+            left = self._combined(sign, left, self._product(level))
+        return left
+
+    def _product(self, level: int) -> _Parsed:
+        left = self._atom(level)
+        while self._peek().text == "*":
+            sign = self._take()
+            left = self._combined(sign, left, self._atom(level))
+        return left
+
+    def _combined(self, sign: _Token, left: _Parsed, right: _Parsed) -> _Parsed:
+        for operand in (left, right):
+            _check_type(operand, Type.INTEGER, f"an operand of '{sign.text}'")
+        return self._applied(_INFIX[sign.text], (left, right), left.position)._replace(
+            infix=sign.text, operands=(left, right)
+        )
+
+    def _atom(self, level: int) -> _Parsed:
+        if level > MAX_DEPTH:
+            raise _too_deep(self._peek().position)
+        token = self._take()
+        if token.text == "(":
+            return self._parenthesised(level)._replace(infix="", operands=(), position=token.position)
+        if token.text == "-":
+            return self._negative(token)
+        if token.text.isdecimal():
+            return self._integer(token, 1)
+        if token.text in {"", ")", ",", "+", "*"}:
+            what = f"'{token.text}'" if token.text else "the end"
+            raise ExpressionError(
+                f"{what} where a term should stand", token.position, "add an integer, a name or a call"
+            )
+        if self._peek().text == "(":
+            return self._call(token, level)
+        if token.text not in self._names:
+            known = f"known are {_listed(self._names)}" if self._names else "none is known here"
+            raise ExpressionError(
+                f"unknown name '{_shortened(token.text)}'", token.position, _nearest(token.text, self._names) or known
+            )
+        self._count(token.position)
+        return _Parsed(Name(token.text), Type.INTEGER, token.position)
+
+    def _parenthesised(self, level: int) -> _Parsed:
+        parsed = self._sum(level + 1)
+        closing = self._take()
+        if closing.text == ",":
+            raise ExpressionError(
+                "a list in parentheses where one term should stand",
+                closing.position,
+                "parentheses of its own are for the whole argument list of a function: and((a, b))",
+            )
+        if closing.text != ")":
+            raise ExpressionError(f"'{_shortened(closing.text)}' where ')' should stand", closing.position, "close it")
+        return parsed
+
+    def _negative(self, sign: _Token) -> _Parsed:
+        if not self._peek().text.isdecimal():
+            raise ExpressionError("'-' before something else than an integer", sign.position, "write neg(...)")
+        return self._integer(self._take(), -1)._replace(position=sign.position)
+
+    def _integer(self, token: _Token, sign: int) -> _Parsed:
+        if len(token.text) > MAX_DIGITS:
+            raise ExpressionError(
+                f"an integer of {len(token.text)} digits", token.position, f"{MAX_DIGITS} digits are allowed"
+            )
+        self._count(token.position)
+        return _Parsed(Constant(sign * int(token.text)), Type.INTEGER, token.position)
+
+    def _call(self, name: _Token, level: int) -> _Parsed:
+        resolved = ALIASES.get(name.text, name.text)
+        if resolved not in OPERATORS:
+            known = [*OPERATORS, *ALIASES]
+            hint = _nearest(name.text, known) or f"known are {' '.join(known)}"
+            raise ExpressionError(f"unknown operator '{_shortened(name.text)}'", name.position, hint)
+        operator = OPERATORS[resolved]
+        arguments = self._arguments(level)
+        if len(arguments) == 1 < len(operator.takes):
+            arguments = _operands(name, operator, arguments[0])
+        _check_arity(name, operator, len(arguments))
+        wanted = itertools.chain(operator.takes, itertools.repeat(operator.takes[-1]))
+        for number, (argument, type_) in enumerate(zip(arguments, wanted, strict=False), start=1):
+            _check_type(argument, type_, f"argument {number} of '{name.text}'")
+        return self._applied(resolved, arguments, name.position)
+
+    def _arguments(self, level: int) -> tuple[_Parsed, ...]:
+        """What stands between a function's parentheses; parentheses around the whole list are no more than that."""
+        closing = self._closing[self._next] + 1
+        pairs = 0
+        while self._closing.get(self._next) == closing - 1:
+            closing -= 1
+            self._next += 1
+            pairs += 1
+        arguments = []
+        if self._peek().text != ")":
+            arguments.append(self._sum(level + 1))
+        while self._peek().text == ",":
+            self._next += 1
+            arguments.append(self._sum(level + 1))
+        for _ in range(pairs):
+            token = self._take()
+            if token.text != ")":
+                raise ExpressionError(
+                    f"'{_shortened(token.text)}' where ',' or ')' should stand",
+                    token.position,
+                    "separate arguments by ','",
+                )
+        return tuple(arguments)
+
+    def _applied(self, operator: str, arguments: tuple[_Parsed, ...], position: int) -> _Parsed:
+        depth = 1 + max(argument.depth for argument in arguments)
+        if depth > MAX_DEPTH:
+            raise _too_deep(position)
+        self._count(position)
+        expression = Apply(operator, tuple(argument.expression for argument in arguments))
+        return _Parsed(expression, OPERATORS[operator].gives, position, depth)
+
+    def _count(self, position: int) -> None:
+        self._nodes += 1
+        if self._nodes > MAX_NODES:
+            raise ExpressionError(
+                "the expression is too long",
+                position,
+                f"{MAX_NODES} operators and terms are allowed: split the predicate",
+            )
+
+    def _peek(self) -> _Token:
+        return self._tokens[self._next]
+
+    def _take(self) -> _Token:
+        token = self._tokens[self._next]
+        if token.text:
+            self._next += 1
+        return token
+
+
+def _tokens(text: str) -> list[_Token]:
+    """The tokens of `text`; the last is empty and stands for its end."""
+    tokens = []
+    for match in _TOKEN.finditer(text):
+        if match[2]:
+            raise ExpressionError(
+                f"unexpected character {match[2]!r}",
+                match.start(2),
+                "expressions are made of names, integers and ( ) , + - *",
+            )
+        tokens.append(_Token(match[1], match.start(1)))
+    return [*tokens, _Token("", len(text))]
+
+
+def _parentheses(tokens: Sequence[_Token]) -> dict[int, int]:
+    """Where each opening parenthesis, by its index among the tokens, is closed."""
+    closing: dict[int, int] = {}
+    opened: list[int] = []
+    for index, token in enumerate(tokens):
+        if token.text == "(":
+            opened.append(index)
+        elif token.text == ")":
+            if not opened:
+                raise ExpressionError("')' that closes nothing", token.position, "delete it, or open it with '('")
+            closing[opened.pop()] = index
+    if opened:
+        raise ExpressionError("'(' that is never closed", tokens[opened[-1]].position, "add the missing ')'")
+    return closing
+
+
+def _operands(name: _Token, operator: Operator, only: _Parsed) -> tuple[_Parsed, ...]:
+    """The arguments of a function that wants two and was given one infix term: `minus(i-j)`."""
+    if only.infix and only.infix == operator.infix:
+        return only.operands
+    shown = _shortened(text(only.expression))
+    raise ExpressionError(
+        f"'{name.text}' takes {_takes(operator)}, not 1", name.position, f"write {name.text}({shown}, ...)"
+    )
+
+
+def _check_arity(name: _Token, operator: Operator, given: int) -> None:
+    enough = given >= len(operator.takes) if operator.variadic else given == len(operator.takes)
+    if not enough:
+        arguments = ", ".join("abc"[: len(operator.takes)])
+        raise ExpressionError(
+            f"'{name.text}' takes {_takes(operator)}, not {given}", name.position, f"write {name.text}({arguments})"
+        )
+
+
+def _takes(operator: Operator) -> str:
+    number = len(operator.takes)
+    return f"{number} argument{'s' * (number > 1)}{' or more' * operator.variadic}"
+
+
+def _check_type(parsed: _Parsed, wanted: Type, what: str) -> None:
+    if parsed.type is wanted:
+        return
+    hint = "compare it: eq ne lt le gt ge" if wanted is Type.BOOLEAN else "make a number of it: if(..., 1, 0)"
+    shown = _shortened(text(parsed.expression))
+    raise ExpressionError(f"{what} should be {wanted}, and '{shown}' is {parsed.type}", parsed.position, hint)
+
+
+def _too_deep(position: int) -> ExpressionError:
+    hint = f"{MAX_DEPTH} levels are allowed; write a long sum as add(a, b, ...)"
+    return ExpressionError("the expression is nested too deeply", position, hint)
+
+
+def _nearest(word: str, known: Collection[str]) -> str:
+    import difflib  # noqa: PLC0415 - start-up: only mistakes need it
+
+    close = difflib.get_close_matches(word[:32], list(itertools.islice(known, 100)), n=1)
+    return f"did you mean '{close[0]}'?" if close else ""
+
+
+def _listed(known: Collection[str]) -> str:
+    return _shortened(" ".join(itertools.islice(known, 20)))
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= 40 else f"{text[:37]}..."  # noqa: PLR2004 - characters of a message

@@ -1,0 +1,312 @@
+"""Total priority orders, and teams turned around to follow them (`robochoc solve --order`).
+
+The files of a team say who ranks above whom; how fast a protocol is depends on it. The static orders are those that
+Dechter and Meiri compare ("Experimental evaluation of preprocessing algorithms for constraint satisfaction
+problems", AIJ 68, 1994, Section 3: minimum width, maximum degree, depth-first search), and dom/deg (Bessiere and
+Regin, "MAC and combined heuristics: two reasons to forsake FC (and CBJ?) on hard problems", CP 1996).
+
+Nothing here reads or writes: a team goes in, the same problem comes out with other links.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from enum import StrEnum
+from random import Random
+from typing import assert_never
+
+from robochoc.model.priorities import natural, priority_order
+from robochoc.model.problem import Child, Constraint, Model, Parent, Predicate, Relation, Robot, Team
+
+Graph = Mapping[str, frozenset[str]]
+"""The neighbours of each robot."""
+
+
+class Order(StrEnum):
+    """Orders by name; ties are broken by natural name order. `given` is the order of the files."""
+
+    GIVEN = "given"
+    LEXICOGRAPHIC = "lexicographic"
+    MAX_DEGREE = "max-degree"
+    MIN_WIDTH = "min-width"
+    DOM_DEG = "dom-deg"
+    DFS = "dfs"
+    RANDOM = "random"
+
+
+class CannotTurn(Exception):  # noqa: N818 - it is an answer, not a fault
+    """The team cannot follow the order; says why in one sentence."""
+
+
+def in_order(team: Team, order: Order | Sequence[str] | None, seed: int = 0) -> Team:
+    """`team` in the order called, or listed as, `order`; None: as it is. Raises `CannotTurn`."""
+    if order is None:
+        return team
+    return reordered(team, order_of(team, order, seed) if isinstance(order, Order) else order)
+
+
+def order_of(team: Team, order: Order, seed: int = 0) -> tuple[str, ...]:
+    """The names of `team`'s robots in the order called `order`, highest priority first. `seed` is for `random`."""
+    graph = neighbours(team)
+    match order:
+        case Order.GIVEN:
+            names = team.order
+        case Order.LEXICOGRAPHIC:
+            names = _lexicographic(graph)
+        case Order.MAX_DEGREE:
+            names = _max_degree(graph)
+        case Order.MIN_WIDTH:
+            names = _min_width(graph)
+        case Order.DOM_DEG:
+            names = _dom_deg(graph, team)
+        case Order.DFS:
+            names = _depth_first(graph)
+        case Order.RANDOM:
+            names = _random(graph, seed)
+        case never:
+            assert_never(never)
+    return names
+
+
+def favourable(team: Team) -> Team:
+    """`team` in an order that soon shows who has to step aside, if it can be turned around."""
+    try:
+        return in_order(team, Order.DOM_DEG)
+    except CannotTurn:
+        return team
+
+
+def neighbours(team: Team) -> Graph:
+    """For each robot those that share a constraint with it, and those that the files link to it without one."""
+    near: dict[str, set[str]] = {robot.name: set() for robot in team.robots}
+    for robot in team.robots:
+        groups = [_owners(team, constraint) for constraint in robot.shared]
+        groups += [{robot.name, parent.name} for parent in robot.parents]
+        for group in groups:
+            for name in group:
+                near[name] |= group - {name}
+    return {name: frozenset(others) for name, others in near.items()}
+
+
+# The orders
+
+
+def _lexicographic(graph: Graph) -> tuple[str, ...]:
+    """`Robot2.1` before `Robot10.1`."""
+    return tuple(sorted(graph, key=natural))
+
+
+def _max_degree(graph: Graph) -> tuple[str, ...]:
+    """Those with the most neighbours first."""
+    return tuple(sorted(graph, key=lambda name: (-len(graph[name]), natural(name))))
+
+
+def _min_width(graph: Graph) -> tuple[str, ...]:
+    """Made from its end: who has the fewest neighbours among those that are left comes last, and leaves.
+
+    Freuder, "A sufficient condition for backtrack-free search", JACM 29, 1982: no order has a smaller width (the
+    most neighbours that a robot has above it).
+    """
+    place = {name: number for number, name in enumerate(_lexicographic(graph))}
+    left = {name: set(others) for name, others in graph.items()}
+    backwards = []
+    while left:
+        last = min(left, key=lambda name: (len(left[name]), -place[name]))
+        backwards.append(last)
+        for other in left.pop(last):
+            left[other].discard(last)
+    return tuple(reversed(backwards))
+
+
+def _depth_first(graph: Graph) -> tuple[str, ...]:
+    """The order in which a depth-first search meets the robots: the pseudo-tree it induces is that search's tree.
+
+    It begins with the robot that has the most neighbours, goes on to the neighbour that has the most, and begins
+    again in each part of the team that is not linked to those before. Pseudo-trees: Freuder and Quinn, "Taking
+    advantage of stable sets of variables in constraint satisfaction problems", IJCAI 1985.
+    """
+    by_degree = _max_degree(graph)
+    place = {name: number for number, name in enumerate(by_degree)}
+    met: dict[str, None] = {}
+    for root in by_degree:
+        walk = [iter([root])]
+        while walk:
+            name = next((name for name in walk[-1] if name not in met), None)
+            if name is None:
+                walk.pop()
+            else:
+                met[name] = None
+                walk.append(iter(sorted(graph[name], key=place.__getitem__)))
+    return tuple(met)
+
+
+def _dom_deg(graph: Graph, team: Team) -> tuple[str, ...]:
+    """The smallest domain per neighbour first, those without neighbours last.
+
+    The domain is the declared one: of a robot with several variables, all combinations of their values. What its
+    private constraints leave of it is known only when it has been compiled.
+    """
+    from fractions import Fraction  # noqa: PLC0415 - start-up: no other order needs it
+
+    size = {robot.name: math.prod(len(variable.domain) for variable in robot.variables) for robot in team.robots}
+
+    def key(name: str) -> tuple[bool, Fraction, object]:
+        degree = len(graph[name])
+        return not degree, Fraction(size[name], degree or 1), natural(name)
+
+    return tuple(sorted(graph, key=key))
+
+
+def _random(graph: Graph, seed: int) -> tuple[str, ...]:
+    """Each order is as likely as any other. Uses `Random.random` alone, which Python promises never to change."""
+    chance = Random(seed)  # noqa: S311 - an order, not a secret
+    lots = {name: chance.random() for name in _lexicographic(graph)}
+    return tuple(sorted(lots, key=lambda name: (lots[name], natural(name))))
+
+
+# The team, turned around
+
+
+def reordered(team: Team, names: Sequence[str]) -> Team:
+    """`team` with the priorities of `names` (all its robots, the highest first): the same constraints and solutions.
+
+    Each totally known constraint stands with the robot of its scope that is now the lowest, and the others are that
+    robot's parents. Links that are there for no constraint stay, turned where they have to be. Children are told
+    what their constraints need, and what the files have them told beyond that where the link was not turned. So the
+    team is what its author would have written with these priorities in mind. `Team.robots` follows `names`, which
+    may say more than the links do: robots that are not linked may stand in any order.
+
+    Raises `CannotTurn` where a partially known constraint (PKC) would have to be held the other way round, and for a
+    team with a scenario; `ValueError` unless `names` are the robots' names, each once.
+    """
+    if sorted(names) != sorted(team.order):
+        raise ValueError(f"the order must name each robot of {team.name} once")
+    if tuple(names) == team.order:
+        return team
+    if team.dynamic:
+        raise CannotTurn(f"{team.name} has a scenario.xml, which speaks of its links: it is solved in its given order")
+    return _Turned(team, names).team()
+
+
+class _Turned:
+    """A team on its way to other priorities: who holds what, and who is whose parent."""
+
+    def __init__(self, team: Team, names: Sequence[str]) -> None:
+        self._old = team
+        self._rank = {name: place for place, name in enumerate(names)}
+        self._held: dict[str, list[Constraint]] = {name: [] for name in names}
+        for robot in team.robots:
+            for constraint in robot.shared:
+                self._held[self._holder(robot, constraint)].append(constraint)
+        self._needed_before = {robot.name: _needed(team, robot.name, robot.shared) for robot in team.robots}
+        self._needed = {name: _needed(team, name, held) for name, held in self._held.items()}
+        self._parents = {name: set(needed) for name, needed in self._needed.items()}
+        for parent, child in self._lasting_links():
+            higher, lower = sorted((parent, child), key=self._rank.__getitem__)
+            self._parents[lower].add(higher)
+        self._children: dict[str, set[str]] = {name: set() for name in names}
+        for name, above in self._parents.items():
+            for parent in above:
+                self._children[parent].add(name)
+        # Readers of the files see the links only, and a constraint stands under the lowest parent that they see.
+        self._seen = {name: place for place, name in enumerate(priority_order(self._parents))}
+
+    def team(self) -> Team:
+        """The team that has been turned."""
+        return replace(self._old, robots=tuple(map(self._robot, self._rank)))
+
+    def _holder(self, robot: Robot, constraint: Constraint) -> str:
+        """Who holds `constraint`, which `robot` has held so far."""
+        if constraint.model is Model.PKC:
+            return robot.name
+        return max(_owners(self._old, constraint), key=self._rank.__getitem__)
+
+    def _lasting_links(self) -> Iterator[tuple[str, str]]:
+        """Parent and child of each link that must stay, whoever holds the totally known constraints."""
+        for robot in self._old.robots:
+            needed = self._needed_before[robot.name]
+            for parent in robot.parents:
+                below = _child(self._old[parent.name], robot.name)
+                parts = [one for one in (*parent.constraints, *below.constraints) if one.model is Model.PKC]
+                if parts and self._rank[robot.name] < self._rank[parent.name]:
+                    raise CannotTurn(
+                        f"{robot.name} shares a partially known constraint (PKC, {parts[0].name}) with its parent"
+                        f" {parent.name}; such links are not turned: choose an order with {parent.name} before it"
+                    )
+                told = set(below.variables)
+                if parts or parent.name not in needed or told - needed[parent.name]:
+                    yield parent.name, robot.name
+
+    def _robot(self, name: str) -> Robot:
+        old = self._old[name]
+        under: dict[str, list[Constraint]] = defaultdict(list)
+        for constraint in self._definable(old, self._held[name]):
+            others = _owners(self._old, constraint) - {name}
+            under[max(others, key=self._seen.__getitem__)].append(constraint)
+        parents = {parent.name: parent for parent in old.parents}
+        children = {child.name: child for child in old.children}
+        return replace(
+            old,
+            parents=tuple(
+                replace(parents.get(parent, Parent(parent)), constraints=tuple(under[parent]))
+                for parent in self._listed(parents, self._parents[name])
+            ),
+            children=tuple(
+                self._told(old, children.get(child, Child(child)))
+                for child in self._listed(children, self._children[name])
+            ),
+        )
+
+    def _listed(self, before: Mapping[str, object], now: set[str]) -> list[str]:
+        """The names in `now`: those that were listed before in that order, and then the new ones by priority."""
+        return [*(name for name in before if name in now), *sorted(now - before.keys(), key=self._rank.__getitem__)]
+
+    def _told(self, robot: Robot, child: Child) -> Child:
+        """`child`, with the variables of `robot` that it is told from now on."""
+        needs_now = self._needed[child.name].get(robot.name, set())
+        needed_before = self._needed_before[child.name].get(robot.name, set())
+        kept = [name for name in child.variables if name in needs_now or name not in needed_before]
+        own = [variable.name for variable in robot.variables if variable.name in needs_now]
+        return replace(child, variables=tuple(dict.fromkeys([*kept, *own])))
+
+    def _definable(self, robot: Robot, held: Sequence[Constraint]) -> Iterator[Constraint]:
+        """The constraints in `held`; definitions that come from another file give way where two have one name."""
+        stay = set(map(id, robot.shared))
+        parts = (constraint for child in robot.children for constraint in child.constraints)
+        own = (*robot.private, *parts, *(constraint for constraint in held if id(constraint) in stay))
+        known = {constraint.definition.name: constraint.definition for constraint in own}
+        for constraint in held:
+            if id(constraint) in stay:
+                yield constraint
+            else:
+                yield replace(constraint, definition=_unlike(constraint.definition, known), line=0)
+
+
+def _unlike(definition: Relation | Predicate, known: dict[str, Relation | Predicate]) -> Relation | Predicate:
+    """`definition`, under the first of its name, name_2, ... that means nothing else in `known`; and puts it there."""
+    named, number = definition, 1
+    while known.setdefault(named.name, named) != named:
+        number += 1
+        named = replace(definition, name=f"{definition.name}_{number}")
+    return known[named.name]
+
+
+def _child(parent: Robot, name: str) -> Child:
+    return next(child for child in parent.children if child.name == name)
+
+
+def _owners(team: Team, constraint: Constraint) -> set[str]:
+    return {team.owner[variable] for variable in constraint.variables}
+
+
+def _needed(team: Team, name: str, held: Sequence[Constraint]) -> dict[str, set[str]]:
+    """For each other robot its variables in the constraints that `name` holds."""
+    needed: dict[str, set[str]] = defaultdict(set)
+    for constraint in held:
+        for variable in constraint.variables:
+            if team.owner[variable] != name:
+                needed[team.owner[variable]].add(variable)
+    return dict(needed)

@@ -1,1 +1,0 @@
-"""Watching from outside: events, the journal, metrics, and the checker. Protocols do not know."""

@@ -1,0 +1,233 @@
+"""A look at what a robot knows at one moment, in words. Looking changes nothing, and no check is counted for it.
+
+Protocols that are known are understood: agent views, nogood stores, partial assignments, contexts and bounds. Of any
+other, attributes of these names and shapes are, and the rest is shown by what it is made of (`glance.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from itertools import islice
+from typing import Any
+
+from robochoc.model.message import Message, Value
+from robochoc.model.priorities import natural
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.afc import AFC
+from robochoc.protocols.awc import AWC, NogoodList
+from robochoc.protocols.bounding import BoundingProtocol
+from robochoc.protocols.disfc import DisFC
+from robochoc.protocols.nogood import NogoodStore
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.sbt import SBT
+from robochoc.replay.glance import glance
+from robochoc.replay.phrases import CountedPhrases, Phrases, as_value, cut
+from robochoc.solver.agent_problem import Part
+from robochoc.solver.compiled import LocalProblem
+
+MOST_VALUES = 60
+"""Own values that are shown, beside the present one."""
+MOST_NOGOODS = 60
+MOST_SEEN = 200
+"""Robots whose values are shown."""
+MOST_ELSE = 40
+ALWAYS = "what holds whatever the others take"
+VIEWS = ("view", "cpa", "path", "assignments", "context")
+"""Attributes in which protocols keep what they know of others' values."""
+_KNOWN = {"problem", "order", "outbox", "value", "verdict", "chance", "settings", "store", "nogoods", "allowed"}
+"""Attributes that are shown elsewhere, or say nothing."""
+
+_EMPTY = {"nothing", "none"}
+
+
+class Look:
+    """Looks at one robot, which knows `part` of the problem."""
+
+    def __init__(self, part: Part) -> None:
+        self._part = part
+        self._problem = LocalProblem(part)  # one of its own: what is checked here counts for nobody
+        self._own = Phrases(part.interfaces)
+        self.agent = part.robot.name
+        self._ranks = {name: rank for rank, name in enumerate(part.order)}
+        self._heard: dict[str, Message] = {}
+        self._told: dict[str, Value] = {}
+
+    def hear(self, sender: str, message: Message) -> None:
+        """The robot has taken this in: what others have said is all that is known of them, where no view is kept."""
+        self._heard[sender] = message
+        value = as_value(getattr(message, "value", None))
+        width = len(self._part.interfaces.get(sender, ()))
+        if value is not None and len(value) == width and not hasattr(message, "lhs"):
+            self._told[sender] = value
+
+    def view(self, protocol: Protocol) -> list[tuple[str, str]]:
+        """Who is known to have which value, or has said what last."""
+        others = self._others(protocol)
+        known = self._known(protocol)
+        if isinstance(protocol, DisFC):
+            pairs = {name: others.value(name, (number,)) for name, number in protocol.view.items()}
+        elif known is not None:
+            pairs = {name: others.told(name, value) for name, value in known.items()}
+        else:
+            pairs = {name: self.said(name, message) or type(message).__name__ for name, message in self._heard.items()}
+            pairs |= {name: self._own.told(name, value) for name, value in self._told.items()}
+        shown = [(name, pairs[name]) for name in sorted(pairs, key=self._rank)[:MOST_SEEN]]
+        more = len(pairs) - len(shown)
+        return [*shown, ("", f"and {more:,} more")] if more else shown
+
+    def _rank(self, robot: str) -> tuple[int, object]:
+        """In the priority order; those who are not in it come last."""
+        rank = self._ranks.get(robot)
+        return (0, rank) if rank is not None else (1, natural(robot))
+
+    def said(self, sender: str, message: Message, receiver: str = "") -> str:
+        """What `sender` has said, to this robot if to no other `receiver`."""
+        fields = {name: getattr(message, name) for name in message.__struct_fields__}
+        value, lhs = as_value(fields.get("value")), fields.get("lhs")
+        if value is not None and isinstance(lhs, Mapping):
+            held = self._own.all(self._pairs(lhs, ()))
+            against = self._own.against(receiver or self.agent, value)
+            return f"while {held}: {against}" if held else f"{against}, whatever the others take"
+        if value is not None:
+            fields["value"] = self._own.told(sender, value)
+        elif "value" in fields and fields["value"] is None:
+            fields["value"] = "steps aside"
+        for name in VIEWS:
+            if isinstance(fields.get(name), Mapping | list | tuple):
+                fields[name] = self._own.all(self._pairs(fields[name], self._part.order)) or "nobody has any value"
+        told = {name: thing if isinstance(thing, str) else glance(thing) for name, thing in fields.items()}
+        return cut(", ".join(text if name == "value" else f"{name}: {text}" for name, text in told.items()))
+
+    def domain(self, protocol: Protocol) -> list[tuple[str, str | None]]:
+        """Each own value, and what rules it out (None: nothing that is known)."""
+        count = len(protocol.problem.values)
+        places = list(range(min(count, MOST_VALUES)))
+        if protocol.value is not None and protocol.value >= len(places):
+            places.append(protocol.value)
+        shown = [(self.own_value(protocol, index), self.against(protocol, index)) for index in places]
+        more = count - len(places)
+        return [*shown, (f"and {more:,} more", None)] if more else shown
+
+    def own_value(self, protocol: Protocol, index: int) -> str:
+        """The value at `index`, with what it costs where anything does."""
+        text = self._own.told(self.agent, protocol.problem.values[index])
+        if isinstance(protocol, BoundingProtocol):
+            return f"{text} (LB {glance(protocol.lower[index])}, UB {glance(protocol.upper[index])})"
+        if protocol.traits.costs:
+            cost = self._problem.cost(index, self._seen(protocol))
+            return f"{text} (costs {glance(cost)})" if cost < INFINITE else text
+        return text
+
+    def against(self, protocol: Protocol, index: int) -> str | None:
+        """What rules the value at `index` out, as far as the robot knows (None: nothing)."""
+        found = self.ruling(protocol, index)
+        return None if found is None else found[0]
+
+    def ruling(self, protocol: Protocol, index: int) -> tuple[str, Collection[str]] | None:
+        """The same, with the robots whose values do so."""
+        store = vars(protocol).get("store")
+        if isinstance(store, NogoodStore):
+            lhs = store[index]
+            return None if lhs is None else (self._others(protocol).all(lhs) or ALWAYS, lhs)
+        broken = self._problem.explained(index, self._seen(protocol))
+        if broken is not None:
+            lhs, key = broken
+            return f"{self._own.all(lhs) or 'its own constraints'}, by {cut(key.partition(':')[2])}", lhs
+        tried = isinstance(protocol, AFC | SBT) and protocol.value is not None and index < protocol.value
+        return ("a try: nobody below could go on with it", ()) if tried else None
+
+    def nogoods(self, protocol: Protocol) -> list[str]:
+        """The nogoods that are kept: while V1.1 = 2: V2.1 != 3."""
+        found = [
+            f"while {lhs}: {against}" if lhs else f"{against}, whatever the others take"
+            for lhs, against in islice(self._nogoods(protocol), MOST_NOGOODS + 1)
+        ]
+        return [*found[:MOST_NOGOODS], "and more"] if len(found) > MOST_NOGOODS else found
+
+    def more(self, protocol: Protocol) -> dict[str, str]:
+        """Everything else that the protocol keeps; of ours what is not only for itself, and not empty."""
+        ours = type(protocol).__module__.startswith("robochoc.")
+        skipped = {*_KNOWN, carefully(lambda: self._view_in(protocol), "")}
+        told: dict[str, str] = {}
+        if type(protocol.order) is not PriorityOrder:
+            told["order"] = glance(protocol.order)
+        if protocol.verdict is not None:
+            told["verdict"] = str(protocol.verdict)
+        for name, thing in vars(protocol).items():
+            if name in skipped or (ours and name.startswith("_")) or len(told) == MOST_ELSE:
+                continue
+            shown = glance(thing)
+            if not (ours and shown in _EMPTY):
+                told.setdefault(name.lstrip("_"), shown)
+        return told
+
+    # What is known of others
+
+    def _others(self, protocol: Protocol) -> Phrases:
+        """How others' values are said: some protocols never tell them, but number them."""
+        return CountedPhrases(self._part.interfaces) if isinstance(protocol, DisFC) else self._own
+
+    def _view_in(self, protocol: Protocol) -> str:
+        """The attribute that holds what is known of others' values; empty where there is none."""
+        return next((name for name in VIEWS if isinstance(vars(protocol).get(name), Mapping | list | tuple)), "")
+
+    def _known(self, protocol: Protocol) -> dict[str, Value] | None:
+        """The values of others that the protocol believes in; None where it keeps none of the kind."""
+        name = self._view_in(protocol)
+        if not name:
+            return None
+        return self._pairs(vars(protocol)[name], protocol.order.names)
+
+    def _pairs(self, kept: Mapping[str, object] | Sequence[object], order: Sequence[str]) -> dict[str, Value]:
+        """The values in `kept`, which are by name, or those of the first robots in `order`."""
+        pairs = kept.items() if isinstance(kept, Mapping) else zip(order, kept, strict=False)
+        found = {who: value for who, thing in pairs if (value := _value_in(thing)) is not None}
+        return {who: value for who, value in found.items() if who in self._part.interfaces}
+
+    def _seen(self, protocol: Protocol) -> dict[str, Value]:
+        """What of that rules values out, as constraints can be asked about it; what others have said will do.
+
+        In AWC it is only what robots of higher priority have taken.
+        """
+        known = vars(protocol)["_higher"] if isinstance(protocol, AWC) else self._known(protocol)
+        if known is None:
+            known = self._told
+        widths = self._part.interfaces
+        return {name: value for name, value in known.items() if len(value) == len(widths.get(name, ()))}
+
+    def _nogoods(self, protocol: Protocol) -> list[tuple[str, str]]:
+        kept = vars(protocol)
+        store, known = kept.get("store"), kept.get("nogoods")
+        values = protocol.problem.values
+        if isinstance(store, NogoodStore):
+            others = self._others(protocol)
+            return [
+                (others.all(lhs), self._own.against(self.agent, values[index]))
+                for index in range(len(values))
+                if (lhs := store[index]) is not None
+            ]
+        if isinstance(known, NogoodList):
+            return [self._awc(dict(nogood)) for nogood in vars(known)["_known"]]
+        return []
+
+    def _awc(self, nogood: dict[str, Value]) -> tuple[str, str]:
+        own = nogood.pop(self.agent, ())
+        lhs = sorted(nogood.items(), key=lambda pair: self._part.order.index(pair[0]))
+        return self._own.all(lhs), self._own.against(self.agent, own)
+
+
+def carefully(look: Callable[[], Any], otherwise: Any) -> Any:  # noqa: ANN401 - whatever is looked at
+    """What `look` finds; `otherwise`, if the protocol is not what it seemed to be: a user's may keep anything."""
+    try:
+        return look()
+    except Exception:  # noqa: BLE001 - see above
+        return otherwise
+
+
+def _value_in(thing: object) -> Value | None:
+    """A value, alone or with what it costs, or how often it has changed."""
+    value = as_value(thing)
+    if value is None and isinstance(thing, Sequence) and thing and not isinstance(thing, str | bytes):
+        value = as_value(thing[0])
+    return value

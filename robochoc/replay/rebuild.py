@@ -1,0 +1,209 @@
+"""Who plays: the robots of each run, made of what they were given then."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import NamedTuple
+
+from robochoc.communication.host import BadSettings, Host
+from robochoc.communication.session import Epoch
+from robochoc.journal.events import Given, Lost
+from robochoc.journal.given import BadGiven, TeamReader, brief_of, void_of
+from robochoc.journal.journal import Header
+from robochoc.model.change import BadChange, changed_by, still_showing, without
+from robochoc.model.orders import CannotTurn, Order, order_of, reordered
+from robochoc.model.problem import Robot, Team
+from robochoc.protocols.protocol import DynamicProtocol, Protocol
+from robochoc.replay.steps import Run
+from robochoc.run.registry import UnknownProtocol, speaker, spoken
+from robochoc.solver.ace import AceProcess
+from robochoc.solver.agent_problem import Brief, Part
+from robochoc.solver.cache import SolutionCache
+from robochoc.solver.compile import CompileFailed, Compiler, CompileTimeout, Limits
+from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
+from robochoc.solver.domain import CompiledDomain, TooManySolutions
+from robochoc.solver.encoding import Unsupported
+from robochoc.solver.failures import SolverLost, SolverMissing, SolverTimeout
+from robochoc.verification.objective import aside_cost
+
+_UNCOMPILED = (
+    TooManySolutions,
+    CompileTimeout,
+    CompileFailed,
+    SolverMissing,
+    SolverLost,
+    SolverTimeout,
+    Unsupported,
+    BadSettings,
+)
+"""What stands in the way of robots that have to be compiled, or set, first."""
+
+
+class CannotReplay(Exception):  # noqa: N818 - named for what was found
+    """The run cannot be played again; says why, and what would help. `broken`: it is the journal's fault."""
+
+    def __init__(self, why: str, *, broken: bool = False) -> None:
+        super().__init__(why)
+        self.broken = broken
+
+
+class Means(NamedTuple):
+    """What a replay may use.
+
+    `team` is the one in the files, for runs whose journals do not say what robots were given; `protocols` are, by
+    their classes' names, to be used rather than those that are installed. `settings` are what was set of the protocol,
+    where the journal does not say. `limits`, `cache` and `solver` are for
+    robots whose private constraints need a solver (`solver/compile.py`).
+    """
+
+    team: Team | None = None
+    protocols: Mapping[str, type[Protocol]] = MappingProxyType({})
+    settings: Mapping[str, str] = MappingProxyType({})
+    limits: Limits | None = None
+    cache: SolutionCache | None = None
+    solver: AceProcess | None = None
+
+
+class Ensemble(NamedTuple):
+    """The robots of one run, ready to begin: the protocol, their hosts, and what each of them knows.
+
+    Those in `mindful` go on with what they found out in the epoch before. `compiled` is what they were made of.
+    """
+
+    protocol: type[Protocol]
+    hosts: Mapping[str, Host]
+    parts: Mapping[str, Part]
+    quiet: bool
+    mindful: Collection[str]
+    compiled: CompiledTeam
+
+
+class Cast:
+    """Makes the robots of one run after the other; those that go on from one epoch to the next are the same.
+
+    `only` names those that are to play (None: all).
+    """
+
+    def __init__(self, header: Header | None, means: Means, only: Collection[str] | None = None) -> None:
+        self._header = header
+        self._means = means
+        self._only = only
+        self._reader = TeamReader(header.team if header else "")
+        self._hosts: dict[str, Host] = {}
+        self._before: Mapping[str, CompiledRobot] = {}
+        self._lost: set[str] = set()
+
+    def enter(self, run: Run) -> Ensemble:
+        """The robots of `run`. Raises `CannotReplay`."""
+        protocol = self._protocol(run)
+        try:
+            epoch = self._epoch(run, protocol)
+            parts = epoch.parts(protocol)
+            goes_on = run.began is not None and isinstance(run.began.epoch, int)
+            before = self._hosts if goes_on else {}
+            self._hosts = {name: _host(protocol, part, before.get(name), epoch) for name, part in parts.items()}
+        except BadGiven as why:
+            raise CannotReplay(str(why), broken=True) from why
+        except _UNCOMPILED as why:
+            raise CannotReplay(str(why)) from why
+        self._lost.update(event.robot for event in run.events if isinstance(event, Lost))
+        kept = issubclass(protocol, DynamicProtocol)
+        mindful = [name for name in parts if kept and name in before and name not in epoch.fresh]
+        quiet = run.given is None or run.given.quiet
+        return Ensemble(protocol, self._hosts, parts, quiet, mindful, epoch.compiled)
+
+    def _protocol(self, run: Run) -> type[Protocol]:
+        """The class that the run names; of a master's journal, the header's."""
+        asked = self._header.protocol if self._header else None
+        if run.began is None:
+            return self._named(asked or "")
+        name = run.began.protocol
+        if name in self._means.protocols:
+            return self._means.protocols[name]
+        found = speaker(name, filter(None, [asked]))
+        if found is not None:
+            return found[1]
+        hint = "install the package that it came from (robochoc protocols shows what there is)"
+        raise CannotReplay(f"no protocol whose class is called {name!r} is installed; {hint}")
+
+    @staticmethod
+    def _named(name: str) -> type[Protocol]:
+        try:
+            return spoken(name)
+        except UnknownProtocol as unknown:
+            raise CannotReplay(str(unknown)) from unknown
+
+    def _epoch(self, run: Run, protocol: type[Protocol]) -> Epoch:
+        if run.given is not None and not (run.given.why and self._means.team):
+            return self._as_given(run.given)
+        return self._as_filed(run, protocol)
+
+    def _as_given(self, given: Given) -> Epoch:
+        compiled = self._compiled(self._reader.team(given))
+        return Epoch(compiled, void_of(given), frozenset(given.fresh), brief_of(given))
+
+    def _as_filed(self, run: Run, protocol: type[Protocol]) -> Epoch:
+        """What the files say, for a run whose journal does not; robots that were lost before are left out."""
+        if self._means.team is None:
+            raise CannotReplay(
+                "the journal does not say what the robots were given, as that of a run across machines;"
+                " name the folder with the team's files: --team DIR"
+            )
+        if run.began is not None and isinstance(run.began.epoch, int):
+            raise CannotReplay("the journal does not say what the robots were given when their problem changed")
+        try:
+            filed = self._ordered(changed_by(self._means.team, events=0))
+            team = self._left(filed)
+        except (CannotTurn, BadChange, ValueError) as why:
+            raise CannotReplay(f"the team cannot be brought into the order of the run: {why}") from why
+        seed = self._header.seed if self._header else 0
+        asked = self._header.protocol if self._header else None
+        if asked is None or self._named(asked) is protocol:
+            return Epoch(self._compiled(team), brief=Brief(seed, self._means.settings))
+        there = [robot for robot in filed.robots if run.given is not None or robot.name in team]
+        aside = aside_cost(replace(filed, robots=tuple(there))) if protocol.traits.costs else None
+        return Epoch(self._compiled(team), brief=Brief(seed, aside=aside))
+
+    def _ordered(self, team: Team) -> Team:
+        """Return `team` in the order of the run. Raises `CannotTurn`, `ValueError`."""
+        order = self._header.order if self._header else None
+        if isinstance(order, str):
+            order = order_of(team, Order(order), self._header.seed if self._header else 0)
+        if isinstance(order, tuple):
+            return reordered(team, order)
+        return team
+
+    def _left(self, team: Team) -> Team:
+        """Return `team` without the robots that were lost before. On a network the others show what they did show."""
+        left = without(team, [name for name in self._lost if name in team])
+        on_network = self._header is not None and self._header.runtime == "network"
+        return still_showing(left, team) if on_network else left
+
+    def _compiled(self, team: Team) -> CompiledTeam:
+        """Return `team` with those compiled who play; what did not change is not compiled again."""
+        means = self._means
+
+        def compile_robot(robot: Robot) -> CompiledDomain:
+            known = self._before.get(robot.name)
+            return known.domain if known and known.robot == robot else compiler.compile(robot).domain
+
+        with Compiler(means.limits, means.cache, solver=means.solver) as compiler:
+            compiled = CompiledTeam(team, compile_robot, self._only)
+        self._before = {**self._before, **compiled.robots}
+        return compiled
+
+
+def _host(protocol: type[Protocol], part: Part, before: Host | None, epoch: Epoch) -> Host:
+    """The robot of `part`: the one that was there before, if it goes on, or a new one. Raises `CannotReplay`."""
+    name = part.robot.name
+    try:
+        if before is None or name in epoch.fresh:
+            return Host.of(protocol, part)
+        before.change(part, epoch.void)
+    except _UNCOMPILED:
+        raise
+    except Exception as error:  # a protocol that is being written, or a journal that is not what it says
+        raise CannotReplay(f"{name} could not begin: {type(error).__name__}: {error}") from error
+    return before

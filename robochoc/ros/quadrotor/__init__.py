@@ -1,1 +1,0 @@
-"""Simulated quadrotors: bodies, motors, control, wind, and what they meet. `robochoc.ros.flight` flies them."""

@@ -1,0 +1,116 @@
+"""Protocols by name, as installed packages offer them under the entry point group `robochoc.protocols`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import cast
+
+from robochoc.protocols.first_fit import FirstFit
+from robochoc.protocols.protocol import DynamicProtocol, Protocol, Settings
+from robochoc.protocols.traits import Traits
+from robochoc.run.defaults import FIRST_FIT, MINIMISES
+from robochoc.system.entry_points import EntryPoint
+from robochoc.system.installed import all_in, loaded, missing, named, names_in
+
+GROUP = "robochoc.protocols"
+
+
+class UnknownProtocol(LookupError):  # noqa: N818 - named for what was asked for
+    """No installed package offers a protocol of that name, or what it offers cannot be used."""
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What a package offers as a protocol: the class that `entry` stands for, or why there is none."""
+
+    entry: EntryPoint
+    protocol: type[Protocol] | None
+    broken: str = ""
+    """Why it cannot be used; empty when it can."""
+
+    @property
+    def name(self) -> str:
+        """What the protocol is called."""
+        return self.entry.name
+
+    @property
+    def place(self) -> str:
+        """Module and class, as the package names them: `robochoc.protocols.abt:ABT`."""
+        return self.entry.value
+
+    @property
+    def package(self) -> str:
+        """Name and version of the package."""
+        return f"{self.entry.dist.name} {self.entry.dist.version}" if self.entry.dist else "unknown"
+
+
+def protocol_names() -> tuple[str, ...]:
+    """The names of all protocols that are installed, ours and others', sorted."""
+    return names_in(GROUP)
+
+
+def offers() -> tuple[Offer, ...]:
+    """All that installed packages offer, by name; what cannot be used too, with the reason."""
+    return tuple(_offer(entry, namesakes) for entry, namesakes in all_in(GROUP))
+
+
+def offer_named(name: str) -> Offer:
+    """What is offered as `name`. Raises `UnknownProtocol`, which names those there are."""
+    found = named(GROUP, name)
+    if not found:
+        raise UnknownProtocol(missing(GROUP, "protocol", name))
+    return _offer(found[0], found)
+
+
+def protocol_named(name: str) -> type[Protocol]:
+    """The class of the protocol called `name`. Raises `UnknownProtocol`, which names those there are."""
+    offer = offer_named(name)
+    if offer.protocol is None:
+        raise UnknownProtocol(f"{offer.place}, installed as protocol {name!r}, {offer.broken}")
+    return offer.protocol
+
+
+def spoken(name: str) -> type[Protocol]:
+    """Like `protocol_named`, of all that robots can be told to speak: also what only says who steps aside."""
+    return FirstFit if name == FIRST_FIT else protocol_named(name)
+
+
+def speaker(class_name: str, likely: Iterable[str] = ()) -> tuple[str, type[Protocol]] | None:
+    """Name and class of the protocol whose class is called `class_name`, as journals have it; `likely` names first.
+
+    None: nothing that is installed is called that.
+    """
+    for name in (*likely, FIRST_FIT, MINIMISES):
+        with suppress(UnknownProtocol):
+            protocol = spoken(name)
+            if protocol.__name__ == class_name:
+                return name, protocol
+    for offer in offers():
+        if offer.protocol is not None and offer.protocol.__name__ == class_name:
+            return offer.name, offer.protocol
+    return None
+
+
+def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> Offer:
+    found = loaded(entry, namesakes, _fault)
+    return Offer(entry, cast("type[Protocol] | None", found.what), found.broken)
+
+
+def _fault(loaded: object) -> str:
+    """Why `loaded` cannot be used as a protocol; empty when it can."""
+    if not (isinstance(loaded, type) and issubclass(loaded, Protocol)):
+        return "is no subclass of Protocol"
+    if loaded.__abstractmethods__:
+        return f"does not define {' and '.join(sorted(loaded.__abstractmethods__))}"
+    if not hasattr(loaded, "messages"):
+        return "does not declare its messages"
+    declared: tuple[object, object] = (loaded.traits, loaded.settings)
+    traits, settings = declared
+    if not (isinstance(traits, Traits) and isinstance(settings, Settings)):
+        wrong = "settings that are no Settings" if isinstance(traits, Traits) else "traits that are no Traits"
+        return f"declares {wrong}"
+    if traits.dynamic is not issubclass(loaded, DynamicProtocol):
+        return "is to be dynamic if it is a DynamicProtocol, and only then"
+    return ""

@@ -1,0 +1,202 @@
+"""Follow a run of a master elsewhere: have its journal, block by block, from the first one on."""
+
+from __future__ import annotations
+
+import secrets
+import time
+from collections.abc import Callable
+from queue import Empty
+from typing import NamedTuple
+
+from robochoc.authority.identity import Identity
+from robochoc.communication.network.access import journal_key
+from robochoc.communication.network.control_messages import Sniff, Sniffable
+from robochoc.communication.network.framing import MASTER, Letters, Refused
+from robochoc.communication.network.inbox import Arrived
+from robochoc.communication.network.journal_server import piece_in, question
+from robochoc.communication.network.refusals import LONGEST
+from robochoc.communication.network.transport import Post
+from robochoc.journal.blocks import Damaged, Unframer
+from robochoc.journal.entries import BadJournal
+from robochoc.run.networked.address import Place
+from robochoc.run.networked.consult import ANSWER_S, ASK_AGAIN_S, NoAnswer
+
+LOOK_S = 0.1
+"""How often it is asked for what is new."""
+PIECE_S = 1.0
+"""How long an answer may take; whatever does not come is asked for again."""
+_NUMBER_BITS = 32
+
+
+class WholeBlocks(Unframer):
+    """Passes on of a journal's bytes, as they come, what has become whole blocks, each of which follows the last."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._held = bytearray()
+        self._passed = 0
+
+    def take(self, content: bytes) -> bytes:
+        """What is whole with `content`, and was not passed on yet. Raises `BadJournal` and `Damaged`."""
+        self._held += content
+        self.feed(content)
+        while self.next() is not None:
+            pass
+        size = self._place - self._passed
+        whole = bytes(self._held[:size])
+        del self._held[:size]
+        self._passed = self._place
+        return whole
+
+
+class Followed(NamedTuple):
+    """How it ended: the run did and all is here (`over`), or there is no more to be had, because of `why`."""
+
+    over: bool
+    why: str
+
+
+STOPPED = Followed(over=False, why="stopped")
+
+
+def receive(
+    place: Place,
+    identity: Identity,
+    sink: Callable[[bytes], object],
+    *,
+    patience_s: float = 10.0,
+    stopped: Callable[[], bool] = lambda: False,
+    granted: Callable[[], None] = lambda: None,
+) -> Followed:
+    """Give the run's journal to `sink`, whole blocks in their order, until the run or the master ends.
+
+    Each block's checksum, which includes that of the block before it, is checked before it is passed on. `granted`
+    is called when the master has agreed, `stopped` asked now and then whether to stop. Raises `CannotConnect` and, when
+    the master does not agree, `NoAnswer`.
+    """
+    with Post(str(place), identity, watch=(), patience_s=patience_s) as post:
+        sniffer = _Sniffer(place, post)
+        run = sniffer.admitted(max(ANSWER_S, patience_s), stopped)
+        if run is None:
+            return STOPPED
+        granted()
+        return sniffer.follow(Arriving(place, run, sink), patience_s, stopped)
+
+
+class Arriving:
+    """The journal of `run` of the master at `place`, as far as it is here; `sink` gets what of it is good."""
+
+    def __init__(self, place: Place, run: str, sink: Callable[[bytes], object]) -> None:
+        self._place = place
+        self._run = run
+        self._blocks = WholeBlocks()
+        self._sink = sink
+        self._start = 0
+        self.idle = False
+        """Whether there was nothing new."""
+
+    @property
+    def question(self) -> bytes:
+        """What to ask for next."""
+        return question(self._run, self._start)
+
+    def take(self, content: bytes) -> Followed | None:
+        """Take in an answer; how it ended, if it did."""
+        try:
+            piece = piece_in(content)
+            if piece.run != self._run:
+                return Followed(over=False, why=f"the master at {self._place} was started anew")
+            if piece.start != self._start:  # an answer to an earlier question
+                return None
+            whole = self._blocks.take(piece.content)
+        except (BadJournal, Damaged) as bad:
+            return Followed(over=False, why=f"what the master at {self._place} sends is no journal: {bad}")
+        if whole:
+            self._sink(whole)
+        self._start += len(piece.content)
+        self.idle = not piece.content
+        if not piece.over:
+            return None
+        missing = self._blocks.rest
+        return Followed(not missing, f"the run is over, but of its journal {missing}" if missing else "the run is over")
+
+
+class _Sniffer:
+    """One who asks the master at `place`, by its `post`."""
+
+    def __init__(self, place: Place, post: Post) -> None:
+        self._place = place
+        self._name = post.name
+        self._post = post
+        self._letters = Letters(post.name)
+        self._number = secrets.randbits(_NUMBER_BITS)
+
+    def admitted(self, patience_s: float, stopped: Callable[[], bool]) -> str | None:
+        """The run that may be followed; None: stopped. Raises `NoAnswer` where it may not, or nobody says so."""
+        until, asked = time.monotonic() + patience_s, 0.0
+        while time.monotonic() < until and not stopped():
+            if time.monotonic() - asked > ASK_AGAIN_S:
+                asked = time.monotonic()
+                self._ask()
+            answer = self._answer(LOOK_S)
+            if answer and answer.why:
+                raise NoAnswer(f"the master at {self._place} does not let {self._name} sniff: {answer.why[:LONGEST]}")
+            if answer:
+                return answer.run
+        if stopped():
+            return None
+        raise NoAnswer(f"the master at {self._place} does not answer {self._name}; is it enrolled with its Authority?")
+
+    def follow(self, journal: Arriving, patience_s: float, stopped: Callable[[], bool]) -> Followed:
+        """Ask for piece after piece."""
+        heard = time.monotonic()
+        while not stopped():
+            content = self._post.ask(journal_key(self._name), journal.question, PIECE_S)
+            if content is not None:
+                heard = time.monotonic()
+                ending = journal.take(content)
+                if journal.idle and not ending:
+                    time.sleep(LOOK_S)
+            elif time.monotonic() - heard > patience_s:
+                return Followed(
+                    over=False, why=f"the master at {self._place} is gone, or lets {self._name} sniff no more"
+                )
+            else:
+                ending = self._refused()
+            if ending:
+                return ending
+        return STOPPED
+
+    def _ask(self) -> None:
+        self._post.send(MASTER, self._letters.write(MASTER, Sniff(self._number)))
+
+    def _refused(self) -> Followed | None:
+        """Ask by letter why there is no answer; None: there is no reason, or nobody says it."""
+        self._ask()
+        answer = self._answer(PIECE_S)
+        if answer is None or not answer.why:
+            return None
+        return Followed(
+            over=False, why=f"the master at {self._place} lets {self._name} sniff no more: {answer.why[:LONGEST]}"
+        )
+
+    def _answer(self, patience_s: float) -> Sniffable | None:
+        """What the master says next, within `patience_s`."""
+        until = time.monotonic() + patience_s
+        while (left := until - time.monotonic()) > 0:
+            try:
+                item = self._post.inbox.get(timeout=left)
+            except Empty:
+                break
+            if isinstance(item, Arrived) and item.sender == MASTER:
+                answer = self._read(item)
+                if answer and answer.number == self._number:
+                    return answer
+        return None
+
+    def _read(self, item: Arrived) -> Sniffable | None:
+        try:
+            word = self._letters.read(item.sender, item.content).word
+        except Refused:
+            return None
+        return word if isinstance(word, Sniffable) else None

@@ -1,0 +1,271 @@
+"""The sniffer's server: the page, and the feed that it draws, for this machine alone.
+
+The page lives under a path that cannot be guessed, as others may use this machine too. What a browser is told unasked
+is small and replaced by what is newer before it is sent: a slow or stopped one makes nothing wait, and nothing grow.
+All that knows the trace happens in one thread, in small pieces; what robots knew is worked out in another.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from socket import socket
+from typing import TypeVar
+
+import msgspec
+from tornado.web import Application
+from tornado.websocket import WebSocketClosedError
+
+from robochoc.sniffer.feed import BadRequest
+from robochoc.sniffer.page import page
+from robochoc.sniffer.session import NotBegun, Session
+from robochoc.view.address import listening, secret_path, url_of
+from robochoc.view.loopback import SecretHandler, SecretPage, SecretSocket, application, in_browser, served
+
+POLL_S = 0.1
+"""How often a file is looked at that had nothing new."""
+NEWS_S = 0.2
+"""Between two news to the same page, at least."""
+_PIECE = 1 << 16
+"""Bytes of a journal that are sent in one go."""
+_MOST_DIGITS = 10
+_HEAD_PATIENCE_S = 20.0
+"""So long a page that asks waits for the first block of the journal."""
+
+R = TypeVar("R")
+
+
+def serve(
+    session: Session, *, port: int = 0, open_browser: bool = False, ready: Callable[[str], None] | None = None
+) -> None:
+    """Serve `session` to browsers of this machine, until interrupted (Ctrl-C); then return.
+
+    Port 0 is any free one. `ready` is told the URL once it can be opened. Raises `OSError` when the port is taken.
+    """
+    with suppress(KeyboardInterrupt):
+        asyncio.run(_serve(session, port, ready, open_browser=open_browser))
+
+
+async def _serve(session: Session, port: int, ready: Callable[[str], None] | None, *, open_browser: bool) -> None:
+    with listening(port) as here:
+        token = secret_path()
+        url = url_of(here, f"{token}/")
+        serving = asyncio.create_task(Server(session, here, token).serve())
+        if ready:
+            ready(url)
+        async with in_browser(url, wanted=open_browser):
+            await serving
+
+
+class Server:
+    """Serves the journal of `session` on the socket `listening`, below `/token/`.
+
+    `seen` is told when the first page has connected. The journal is not read before anybody asks.
+    """
+
+    def __init__(
+        self, session: Session, listening: socket, token: str, seen: Callable[[], None] = lambda: None
+    ) -> None:
+        self.session = session
+        self.token = token
+        self._listening = listening
+        self._seen = seen
+        self._reader = ThreadPoolExecutor(1, "reader")
+        self._insight = ThreadPoolExecutor(1, "insight")
+        self._wanted = asyncio.Event()
+        self._changed = asyncio.Event()
+        self.version = 0
+        """Another one whenever there is something new."""
+        self.trouble: str | None = None
+
+    async def serve(self) -> None:
+        """Serve until cancelled."""
+        following = asyncio.create_task(self._follow())
+        try:
+            async with served(self._application(), self._listening):
+                await asyncio.Event().wait()
+        finally:
+            following.cancel()
+            self.session.stop()
+            self._reader.shutdown(wait=False, cancel_futures=True)
+            self._insight.shutdown(wait=False, cancel_futures=True)
+
+    # What handlers ask
+
+    async def read(self, answer: Callable[[], R]) -> R:
+        """What `answer` says, in the thread that knows the trace, once there is one."""
+        self.connected()
+        loop = asyncio.get_running_loop()
+        while self.trouble is None:
+            version = self.version
+            if self.session.begun:
+                with suppress(NotBegun):
+                    return await loop.run_in_executor(self._reader, answer)
+            async with asyncio.timeout(_HEAD_PATIENCE_S):
+                await self.change(version)
+        raise BadRequest(self.trouble)
+
+    async def look_into(self, answer: Callable[[], R]) -> R:
+        """What `answer` says, in the thread that takes its time."""
+        return await asyncio.get_running_loop().run_in_executor(self._insight, answer)
+
+    async def change(self, since: int) -> None:
+        """Wait until there is something newer than version `since`."""
+        while self.version == since:
+            await self._changed.wait()
+
+    def connected(self) -> None:
+        """A page is there."""
+        if not self._wanted.is_set():
+            self._wanted.set()
+            self._seen()
+
+    # The journal
+
+    async def _follow(self) -> None:
+        await self._wanted.wait()
+        loop = asyncio.get_running_loop()
+        begun = False
+        while True:
+            try:
+                more = await loop.run_in_executor(self._reader, self.session.advance)
+            except Exception as error:  # noqa: BLE001 - of a stranger's file; whoever waits for it is to know
+                self.trouble = str(error) or type(error).__name__
+                self._tell()
+                return
+            if more or self.session.begun != begun:
+                begun = self.session.begun
+                self._tell()
+            if not more:
+                await asyncio.sleep(POLL_S)
+
+    def _tell(self) -> None:
+        self.version += 1
+        changed, self._changed = self._changed, asyncio.Event()
+        changed.set()
+
+    def _application(self) -> Application:
+        known = {"server": self}
+        whole = {"secret": self.token, "page": page("served")}
+        return application(
+            [
+                (r"/([^/]*)/", SecretPage, whole),
+                (r"/([^/]*)/news", _News, known),
+                (r"/([^/]*)/journal", _Journal, known),
+                (r"/([^/]*)/(about|columns|steps|decisions|details|states|scene)", _Answer, known),
+            ],
+            compress=True,
+        )
+
+
+class _Known(SecretHandler):
+    """Answers those who know the token, and no page of another site."""
+
+    def initialize(self, server: Server) -> None:
+        self.server = server
+        self.secret = server.token
+
+
+class _Answer(_Known):
+    """One answer of the feed."""
+
+    async def get(self, _token: str, what: str) -> None:
+        try:
+            content = await self._content(what)
+        except BadRequest as wrong:
+            self._refuse(400, str(wrong))
+        except TimeoutError:
+            self._refuse(503, "the run has not begun yet")
+        else:
+            binary = what in {"columns", "steps"}
+            self.set_header("Content-Type", "application/octet-stream" if binary else "application/json")
+            self.write(content)
+
+    async def _content(self, what: str) -> bytes:
+        server, session = self.server, self.server.session
+        match what:
+            case "about":
+                return await server.read(session.about)
+            case "scene":
+                first = self._number("from", 0)
+                return await server.read(lambda: session.scene(first))
+            case "details":
+                chunk = self._number("chunk")
+                return await server.read(lambda: session.details(chunk))
+            case "states":
+                robot, chunk = self._number("robot"), self._number("chunk")
+                name = await server.read(lambda: session.robot(robot))
+                return await server.look_into(lambda: session.states(name, chunk))
+            case _:
+                first, end = self._number("from"), self._number("to")
+                return await server.read(lambda: session.rows(what, first, end))
+
+    def _number(self, name: str, default: int | None = None) -> int:
+        text = self.get_query_argument(name, None)
+        if text is None and default is not None:
+            return default
+        if text is None or not text.isdecimal() or len(text) > _MOST_DIGITS:
+            raise BadRequest(f"{name} is to be a number")
+        return int(text)
+
+    def _refuse(self, status: int, why: str) -> None:
+        self.set_status(status)
+        self.set_header("Content-Type", "text/plain; charset=utf-8")
+        self.write(why)
+
+
+class _Journal(_Known):
+    """The journal's file as it stands."""
+
+    def head(self, _token: str) -> None:
+        self._describe()
+
+    async def get(self, _token: str) -> None:
+        size = self._describe()
+        place = 0
+        while place < size:
+            piece = self.server.session.bytes_at(place, min(_PIECE, size - place))
+            if not piece:
+                break
+            self.write(piece)
+            await self.flush()
+            place += len(piece)
+
+    def _describe(self) -> int:
+        size = self.server.session.size
+        self.set_header("Content-Type", "application/octet-stream")
+        self.set_header("Content-Disposition", f'attachment; filename="{self.server.session.file_name}"')
+        self.set_header("Content-Length", str(size))
+        return size
+
+
+class _News(SecretSocket):
+    """Tells a page how much there is; what comes while it is told is put into the next news."""
+
+    def initialize(self, server: Server) -> None:
+        self.server = server
+        self.secret = server.token
+
+    def open(self, *_: str) -> None:
+        self.server.connected()
+        self._telling = asyncio.create_task(self._tell())
+
+    async def _tell(self) -> None:
+        encode = msgspec.json.encode
+        last = ""
+        try:
+            while True:
+                version = self.server.version
+                news = encode(await self.server.read(self.server.session.news)).decode()
+                if news != last:
+                    last = news
+                    await self.write_message(news)  # returns when it has left: the next news is as new as it can be
+                await asyncio.sleep(NEWS_S)
+                await self.server.change(version)
+        except (WebSocketClosedError, BadRequest, TimeoutError):
+            self.close()
+
+    def on_close(self) -> None:
+        self._telling.cancel()

@@ -1,0 +1,338 @@
+"""The trace: a run as columns of numbers, for pages that draw it, and for questions about causes.
+
+It is made of events, and grows by them. A robot's step is what it does with one packet: it takes messages in, changes
+its mind, and speaks. Steps are numbered in the order in which they end, and the messages of a step follow one
+another, so a message's number tells what was said before it. Causes come first whatever the events' order: a step
+that took in what nobody has been seen to send yet waits for it, as two robots' clocks, or the bundles in which robots
+report, need not agree.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import deque
+from collections.abc import Iterable
+from typing import Any, Self
+
+import msgspec
+from msgspec import UNSET
+
+from robochoc.journal.events import (
+    AnyEvent,
+    Began,
+    Concluded,
+    Decided,
+    Given,
+    Heard,
+    Received,
+    Registered,
+    Sent,
+    Settled,
+)
+from robochoc.journal.journal import Header, Journal
+from robochoc.model.outcome import Outcome
+from robochoc.sniffer.columns import NOT_YET, floats, longs, shorts
+from robochoc.sniffer.contents import Contents
+from robochoc.sniffer.open_step import Channel, OpenStep
+from robochoc.sniffer.rows import Messages, Note, Run, Steps, note_of
+
+MOST_NAMES = 0xFFFF
+"""Robots, types of messages, or runs: they are numbered by two bytes."""
+
+
+MOST_COUNTED = 1 << 53
+
+
+class TraceTooLarge(ValueError):  # noqa: N818 - named for what was found
+    """More robots, types of messages, or runs than a trace can tell apart."""
+
+
+class Trace:
+    """All that was seen of the runs of one journal. Columns, lists and numbers only grow.
+
+    `generation` tells traces apart whose numbers mean other things: a trace that was made anew has the next one.
+    """
+
+    def __init__(self, header: Header, generation: int = 0) -> None:
+        self.header = header
+        self.generation = generation
+        self.robots: list[str] = []
+        self.kinds: list[str] = []
+        self.runs: list[Run] = []
+        self.messages = Messages(
+            floats(), floats(), longs(), longs(), shorts(), shorts(), shorts(), shorts(), longs(), longs()
+        )
+        self.steps = Steps(floats(), floats(), floats(), longs(), shorts(), shorts(), longs())
+        self.packets = longs()
+        self.decisions: list[tuple[int, dict[str, int]]] = []
+        self.notes: list[Note] = []
+        self.variables: dict[str, dict[str, None]] = {}
+        """By robot: the variables that it was seen to decide, in that order."""
+        self.over = False
+        self.outcome: Outcome | None = None
+        self.damage: str | None = None
+        self.unseen = 0
+        """Messages that were taken in, and that nobody was seen to send."""
+        self.outdated = False
+        """Whether somebody was seen to send what had been given up as unseen: made anew, it would be better."""
+        self._contents = Contents()
+        self._number_of_robot: dict[str, int] = {}
+        self._number_of_kind: dict[str, int] = {}
+        self._begin()
+
+    @classmethod
+    def of(cls, journal: Journal, generation: int = 0) -> Self:
+        """The trace of a whole journal. Raises `TraceTooLarge`."""
+        trace = cls(journal.header, generation)
+        trace.add(journal.events)
+        trace.end(journal.outcome, journal.damage)
+        return trace
+
+    def add(self, events: Iterable[AnyEvent]) -> None:
+        """Go on with `events`, each robot's in its own order. Raises `TraceTooLarge`."""
+        for event in events:
+            match event:
+                case Sent():
+                    self._open_step(event.sender, event).said.append(event)
+                case Received():
+                    channel = self._channel(event.sender, event.receiver)
+                    self._open_step(event.receiver, event).received.append(channel)
+                case Settled():
+                    self._settle(event)
+                case _:
+                    self._add_rare(event)
+
+    def flush(self) -> None:
+        """Wait no longer: what was taken in and not seen to be sent counts as unseen."""
+        waiting = [(queue[0].t, robot) for robot, queue in self._waiting.items()]
+        heapq.heapify(waiting)
+        while waiting:
+            _, robot = heapq.heappop(waiting)
+            queue = self._waiting.get(robot)
+            if not queue:
+                continue
+            self._give_up(queue[0])
+            self._go_on([robot])
+            if queue:
+                heapq.heappush(waiting, (queue[0].t, robot))
+
+    def end(self, outcome: Outcome | None = None, damage: str | None = None) -> None:
+        """No more events will come."""
+        self._close()
+        self.over, self.outcome, self.damage = True, outcome, damage
+
+    def content(self, message: int) -> dict[str, Any]:
+        """The fields of a message, by name."""
+        return self._contents[message]
+
+    def keep_contents(self, other: Trace, messages: Iterable[int]) -> None:
+        """Hold what these messages of `other` hold, as one's own next ones."""
+        for message in messages:
+            self._contents.append(other.content(message))
+
+    def packet(self, step: int) -> list[int]:
+        """The messages that a step took in, in that order."""
+        first = self.steps.packet_end[step - 1] if step else 0
+        return list(self.packets[first : self.steps.packet_end[step]])
+
+    def said(self, step: int) -> range:
+        """The messages that were said in a step."""
+        return range(self.steps.said_end[step - 1] if step else 0, self.steps.said_end[step])
+
+    def causes(self, message: int) -> list[int]:
+        """The messages that were taken in by the step that said this one; none: it was said at the start."""
+        return self.packet(self.messages.step[message])
+
+    def consequences(self, message: int) -> range:
+        """The messages that were said in the step that took this one in."""
+        taken = self.messages.taken[message]
+        return range(0) if taken == NOT_YET else self.said(taken)
+
+    def number_of(self, robot: str) -> int:
+        """The number of a robot, which has a new one if it was not seen before. Raises `TraceTooLarge`."""
+        return _number(robot, self._number_of_robot, self.robots)
+
+    # Runs
+
+    def _begin(self) -> None:
+        self._channels: dict[tuple[str, str], Channel] = {}
+        self._open: dict[str, OpenStep] = {}
+        self._waiting: dict[str, deque[OpenStep]] = {}
+        self._checks: dict[str, int] = {}
+        self._said: dict[str, int] = {}
+
+    def _close(self) -> None:
+        """The run is over: what waits has nothing to wait for, and steps that were not seen to end have ended."""
+        for robot, step in list(self._open.items()):
+            step.checks = self._checks.get(robot, 0)
+            self._ready(robot, step)
+        self.flush()
+        self._begin()
+
+    def _new_run(self, began: Began) -> None:
+        self._close()
+        if len(self.runs) == MOST_NAMES:
+            raise TraceTooLarge(f"the journal has more than {MOST_NAMES} runs")
+        self.runs.append(
+            Run(
+                number=len(self.runs),
+                protocol=began.protocol,
+                epoch=None if began.epoch is UNSET else began.epoch,
+                opened_by=None if began.opened_by is UNSET else began.opened_by,
+                message=len(self.messages.t),
+                step=len(self.steps.t),
+            )
+        )
+
+    def _give(self, given: Given) -> None:
+        """Take down what the robots of this run are given, and number them in their order."""
+        if not self.runs:
+            self._new_run(Began(t=given.t, protocol=self.header.protocol))
+        known = self.runs[-2].files if len(self.runs) > 1 else {}
+        files = {name: file for name in given.order if (file := given.robots.get(name, known.get(name))) is not None}
+        self.runs[-1] = msgspec.structs.replace(self.runs[-1], given=given, files=files)
+        for name in given.order:
+            self.number_of(name)
+
+    # Steps
+
+    def _open_step(self, robot: str, event: Sent | Received | Decided | Heard | Concluded) -> OpenStep:
+        step = self._open.get(robot)
+        if step is None:
+            if not self.runs:
+                self._new_run(Began(t=event.t, protocol=self.header.protocol))
+            step = self._open[robot] = OpenStep()
+        step.t = event.t
+        if isinstance(event, Sent | Received | Decided):
+            step.clock = event.clock
+        return step
+
+    def _channel(self, sender: str, receiver: str) -> Channel:
+        channel = self._channels.get((sender, receiver))
+        if channel is None:
+            channel = self._channels[sender, receiver] = Channel()
+        return channel
+
+    def _add_rare(self, event: AnyEvent) -> None:
+        match event:
+            case Decided():
+                self._open_step(event.robot, event).decided = event.assignment
+            case Concluded():
+                note = (event.t, "concluded", f"concluded: {event.verdict.replace('-', ' ')}")
+                self._open_step(event.robot, event).notes.append(note)
+            case Heard():
+                note = (event.t, "heard", f"{event.robot} knows of an assignment that costs {event.cost}")
+                self._open_step(event.robot, event).notes.append(note)
+            case Began():
+                self._new_run(event)
+            case Given():
+                self._give(event)
+            case Registered():
+                self.number_of(event.robot)
+            case _:
+                note_there = note_of(event, len(self.steps.t))
+                if note_there is not None:
+                    self.notes.append(note_there)
+
+    def _settle(self, event: Settled) -> None:
+        robot = event.robot
+        step = self._open.get(robot)
+        if step is None:
+            if not self.runs:
+                self._new_run(Began(t=event.t, protocol=self.header.protocol))
+            step = OpenStep()
+        step.t, step.clock, step.checks = event.t, event.clock, event.checks
+        self._checks[robot] = event.checks
+        self._ready(robot, step)
+
+    def _ready(self, robot: str, step: OpenStep) -> None:
+        """The step has ended: write it down, or let it wait for its turn, or for what it took in."""
+        self._open.pop(robot, None)
+        queue = self._waiting.get(robot)
+        if queue is not None:
+            queue.append(step)
+        elif step.taken_in():
+            self._write(robot, step)
+            if self._waiting and step.said:
+                self._go_on(dict.fromkeys(sent.receiver for sent in step.said))
+        else:
+            self._waiting[robot] = deque([step])
+
+    def _go_on(self, robots: Iterable[str]) -> None:
+        """Write down what waits no longer: steps of `robots`, and of those that these steps speak to."""
+        ready = list(robots)
+        while ready:
+            robot = ready.pop()
+            queue = self._waiting.get(robot)
+            while queue and queue[0].taken_in():
+                step = queue.popleft()
+                self._write(robot, step)
+                ready.extend(dict.fromkeys(sent.receiver for sent in step.said if sent.receiver in self._waiting))
+            if queue is not None and not queue:
+                del self._waiting[robot]
+
+    def _give_up(self, step: OpenStep) -> None:
+        """What `step` still waits for counts as unseen."""
+        while not step.taken_in():
+            step.received.popleft().owed += 1
+            self.unseen += 1
+
+    def _write(self, robot: str, step: OpenStep) -> None:
+        """The step becomes a row, and so does each of its messages."""
+        steps, number = self.steps, len(self.steps.t)
+        run = len(self.runs) - 1
+        for message in step.packet:
+            self.messages.taken[message] = number
+        self.packets.extend(step.packet)
+        for t, kind, text in step.notes:
+            self.notes.append(Note(t, number, kind, robot, text))
+        if step.decided is not None:
+            self.decisions.append((number, step.decided))
+            self.variables.setdefault(robot, {}).update(dict.fromkeys(step.decided))
+        robot_number = self.number_of(robot)
+        for sent in step.said:
+            self._write_message(sent, number, robot_number, run)
+        steps.t.append(step.t)
+        steps.clock.append(_counted(step.clock))
+        steps.checks.append(_counted(step.checks))
+        steps.packet_end.append(len(self.packets))
+        steps.robot.append(robot_number)
+        steps.run.append(run)
+        steps.said_end.append(len(self.messages.t))
+
+    def _write_message(self, sent: Sent, step: int, sender: int, run: int) -> None:
+        messages, number = self.messages, len(self.messages.t)
+        channel = self._channel(sent.sender, sent.receiver)
+        if channel.owed:
+            channel.owed -= 1
+            self.unseen -= 1
+            self.outdated = True
+        else:
+            channel.under_way.append(number)
+        self._contents.append(sent.content)
+        messages.t.append(sent.t)
+        messages.clock.append(_counted(sent.clock))
+        messages.step.append(step)
+        messages.bytes.append(min(max(sent.bytes, 0), NOT_YET))
+        messages.sender.append(sender)
+        messages.receiver.append(self.number_of(sent.receiver))
+        messages.kind.append(_number(sent.type, self._number_of_kind, self.kinds))
+        messages.run.append(run)
+        messages.taken.append(NOT_YET)
+        self._said[sent.sender] = sequence = self._said.get(sent.sender, 0) + 1
+        messages.sequence.append(sequence)
+
+
+def _number(name: str, numbers: dict[str, int], names: list[str]) -> int:
+    number = numbers.get(name)
+    if number is None:
+        if len(names) == MOST_NAMES:
+            raise TraceTooLarge(f"the journal has more than {MOST_NAMES} names of robots, or types of messages")
+        number = numbers[name] = len(names)
+        names.append(name)
+    return number
+
+
+def _counted(number: int) -> int:
+    """A count, as floating point holds it: nobody counts as far as a journal could say."""
+    return min(max(number, 0), MOST_COUNTED)

@@ -1,0 +1,109 @@
+"""A viewer: a process of its own that serves the page of a run to come, so that whoever looks never slows the robots.
+
+It is started before the robots, with the journal's file and the socket at which browsers will ask; the URL stands
+before it has even begun. Robots and viewer share nothing but the file, which the viewer reads when a page is there. It
+ends when its parent hangs up, or dies.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Self
+
+from robochoc.communication.resources import signals_held
+from robochoc.view.address import listening, secret_path, url_of
+from robochoc.view.redirect import RedirectFile
+
+_PATIENCE_S = 2.0
+"""So long a viewer may take to end."""
+_MOST_CHOSEN = 1000
+_PROGRAM = "robochoc.sniffer.viewer_process"
+
+
+class Viewer:
+    """The viewer of the journal in the file `journal` (a descriptor, open for reading).
+
+    `chosen` are names or patterns of robots to begin with, `port` 0 is any free one; with `open_browser` it has the
+    user's browser show the page. Raises `OSError` when the port is taken, or no process can be had.
+    """
+
+    def __init__(self, journal: int, chosen: Sequence[str] = (), port: int = 0, *, open_browser: bool = False) -> None:
+        heard, theirs_out = os.pipe()
+        theirs_in, lifeline = os.pipe()
+        with listening(port) as here:
+            token = secret_path()
+            self.url = url_of(here, f"{token}/")
+            self._redirect: RedirectFile | None = None
+            try:
+                self._redirect = RedirectFile(self.url) if open_browser else None
+                with signals_held():  # until it has said itself what they do: Ctrl-C reaches it, too
+                    self._process = subprocess.Popen(  # noqa: S603 - our own module
+                        [sys.executable, "-P", "-m", _PROGRAM, str(here.fileno()), str(journal)],
+                        stdin=theirs_in,
+                        stdout=theirs_out,
+                        pass_fds=(here.fileno(), journal),
+                    )
+            except BaseException:
+                os.close(heard)
+                os.close(lifeline)
+                if self._redirect:
+                    self._redirect.close()
+                raise
+            finally:
+                os.close(theirs_in)
+                os.close(theirs_out)
+        self._heard, self._lifeline = heard, lifeline
+        # Not as arguments: those can be read by everybody on this machine.
+        shown = self._redirect.url if self._redirect else None
+        settings = json.dumps({"token": token, "chosen": [*chosen][:_MOST_CHOSEN], "shown": shown}).encode()
+        with suppress(BrokenPipeError):  # it is gone already, which is said later
+            os.write(lifeline, settings + b"\n")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def wait_until_seen(self, most_s: float) -> bool:
+        """Wait until a page has connected; False after `most_s` seconds without one."""
+        ready, _, _ = select.select([self._heard], [], [], most_s)
+        seen = bool(ready and os.read(self._heard, 1))
+        if seen and self._redirect:
+            self._redirect.close()
+        return seen
+
+    def finish(self) -> None:
+        """Tell it that nothing more will be written."""
+        with suppress(BrokenPipeError):
+            os.write(self._lifeline, b".")
+
+    @property
+    def is_gone(self) -> bool:
+        """Whether its process has ended by itself."""
+        return self._process.poll() is not None
+
+    def wait(self) -> None:
+        """Wait until it is gone."""
+        self._process.wait()
+
+    def close(self) -> None:
+        """End it."""
+        os.close(self._lifeline)
+        try:
+            self._process.wait(_PATIENCE_S)
+        except BaseException as reason:
+            self._process.kill()
+            self._process.wait()
+            if not isinstance(reason, subprocess.TimeoutExpired):
+                raise
+        finally:
+            os.close(self._heard)
+            if self._redirect:
+                self._redirect.close()

@@ -1,0 +1,200 @@
+"""Problems with costs, as the solver is handed them: what is charged becomes a column of tables, never an expression.
+
+For the variables that share charges there is one more variable, whose codes are what they are charged, and a table
+that says which of them goes with which codes of theirs. What is left for the solver to compute is a sum of these
+variables, none of which is negative; what is minimised is checked again by whoever knows the problem.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from robochoc.model.problem import INFINITE, Constraint, Team, Variable
+from robochoc.solver.encoding import Codes, Component, Network, Table, Unsupported, components, is_soft, price_on
+from robochoc.solver.propagation import propagated
+
+MOST_PRICED = 1_000_000
+"""How many combinations of values may have a price each."""
+HIGHEST = 2**30
+"""So much may all charges come to, at worst, in units of their greatest common divisor: ACE's codes are small."""
+
+Prices = dict[Codes, float]
+"""What combinations of codes are charged; those that are not there are forbidden."""
+
+
+@dataclass(frozen=True)
+class Priced:
+    """The variables of `part`, which come first in `network`, and what they are charged.
+
+    That is `base`, and `unit` times the sum of the codes at the places `costs`.
+    """
+
+    part: Component
+    network: Network
+    costs: Codes
+    base: int
+    unit: int
+
+    def cost(self, codes: Sequence[int]) -> int:
+        """What a solution of `network` costs."""
+        return self.base + self.unit * sum(codes[place] for place in self.costs)
+
+    def decoded(self, codes: Sequence[int]) -> dict[str, int]:
+        """The values of the variables behind a solution of `network`; those that are aside have none."""
+        values = self.part.values
+        own = zip(self.part.names, codes, strict=False)
+        return {name: values[code] for name, code in own if code < len(values)}
+
+
+def priced(variables: Iterable[Variable], constraints: Sequence[Constraint]) -> list[Priced]:
+    """The problem of `variables` and `constraints`, split into what does not depend on each other.
+
+    What constraints on constants charge is left out. Raises `Unsupported` when a constraint has too many tuples, or
+    charges are too high.
+    """
+    soft = [constraint for constraint in constraints if is_soft(constraint) and constraint.variables]
+    parts = components(variables, constraints, [constraint.variables for constraint in soft])
+    of: dict[str, list[Constraint]] = {part.names[0]: [] for part in parts}
+    first = {name: part.names[0] for part in parts for name in part.names}
+    for constraint in soft:
+        of[first[constraint.variables[0]]].append(constraint)
+    return [_priced(part, of[part.names[0]]) for part in parts]
+
+
+def charged_anyway(team: Team) -> int:
+    """What soft constraints on constants only charge."""
+    fixed = (price_on(constraint, ())(()) for constraint in team.constraints() if not constraint.variables)
+    return int(sum(price for price in fixed if price < INFINITE))
+
+
+def _priced(part: Component, soft: Iterable[Constraint]) -> Priced:
+    network = propagated(part.network)
+    if network.impossible:
+        return Priced(part, network, (), 0, 1)
+    return with_charges(part, network, charges_on(part, network, soft))
+
+
+def charges_on(part: Component, network: Network, soft: Iterable[Constraint]) -> dict[Codes, Prices]:
+    """What `soft` constraints on variables of `part` charge, by scope, for the codes that `network` leaves."""
+    together = _by_scope(part, soft)
+    _join_unary(together)
+    return {scope: _prices(part, network, scope, held) for scope, held in together.items()}
+
+
+def _by_scope(part: Component, soft: Iterable[Constraint]) -> dict[Codes, list[Constraint]]:
+    place = {name: index for index, name in enumerate(part.names)}
+    together: dict[Codes, list[Constraint]] = {}
+    for constraint in soft:
+        together.setdefault(tuple(sorted(place[name] for name in constraint.variables)), []).append(constraint)
+    return together
+
+
+def with_charges(part: Component, network: Network, charges: Mapping[Codes, Prices]) -> Priced:
+    """`network`, which is that of `part`, with a variable for every scope that is charged.
+
+    Combinations of codes that a scope has no price for are forbidden. Raises `Unsupported` when they are too high.
+    """
+    least = {scope: int(min(prices.values(), default=0)) for scope, prices in charges.items()}
+    above = {scope: {row: int(price) - least[scope] for row, price in charges[scope].items()} for scope in charges}
+    unit = math.gcd(*(price for prices in above.values() for price in prices.values())) or 1
+    worst = sum(max(prices.values(), default=0) for prices in above.values()) // unit
+    if worst > HIGHEST:
+        raise Unsupported(
+            f"costs add up to {worst * unit:,} at worst, which is more than the central judge can minimise; costs that"
+            " stand for 'never' are better written as infinity"
+        )
+    domains, tables, costs = list(network.domains), list(network.tables), []
+    for scope, prices in above.items():
+        rows = tuple(sorted((*row, price // unit) for row, price in prices.items()))
+        if any(prices.values()):
+            costs.append(len(domains))
+            tables.append(Table((*scope, len(domains)), allowed=True, rows=rows))
+            domains.append(tuple(sorted({row[-1] for row in rows})))
+    return Priced(part, Network(tuple(domains), tuple(tables)), tuple(costs), sum(least.values()), unit)
+
+
+def with_robots_aside(team: Team, aside: int) -> list[Priced]:
+    """The problem of `team`, where a robot of weight 1 may step aside for the price `aside`, with all its constraints.
+
+    Its variables then have a code that stands for no value.
+    """
+    constraints = list(team.constraints())
+    soft = [constraint for constraint in constraints if is_soft(constraint) and constraint.variables]
+    own = {robot.name: tuple(variable.name for variable in robot.variables) for robot in team.robots}
+    parts = components(team.variables.values(), constraints, [*own.values(), *(one.variables for one in soft)])
+    found = []
+    for part in parts:
+        place = {name: index for index, name in enumerate(part.names)}
+        together = _by_scope(part, [one for one in soft if one.variables[0] in place])
+        absent = len(part.values)
+        network = Network(
+            tuple((*domain, absent) for domain in part.network.domains),
+            tuple(_unless_absent(table, part.network.domains, absent) for table in part.network.tables),
+        )
+        charges = {
+            scope: _free_if_absent(_prices(part, part.network, scope, held), scope, network, absent)
+            for scope, held in together.items()
+        }
+        robots = [robot for robot in team.robots if own[robot.name][0] in place]
+        for robot in robots:
+            first, *others = (place[name] for name in own[robot.name])
+            network = replace(network, tables=(*network.tables, *_all_or_none(network, first, others, absent)))
+            prices = charges.setdefault((first,), {(code,): 0 for code in network.domains[first]})
+            prices[absent,] += robot.weight * aside
+        found.append(with_charges(part, network, charges))
+    return found
+
+
+def _unless_absent(table: Table, domains: Sequence[Codes], absent: int) -> Table:
+    """`table`, which says nothing where one of its variables has the code `absent`."""
+    if not table.allowed:
+        return table
+    return replace(table, rows=(*table.rows, *_absences([domains[place] for place in table.scope], absent)))
+
+
+def _free_if_absent(prices: Prices, scope: Codes, network: Network, absent: int) -> Prices:
+    domains = [network.domains[place][:-1] for place in scope]
+    return {**prices, **dict.fromkeys(_absences(domains, absent), 0)}
+
+
+def _absences(domains: Sequence[Codes], absent: int) -> Iterable[Codes]:
+    """All combinations of codes of `domains` in which at least one is replaced by `absent`."""
+    wider = itertools.product(*((*domain, absent) for domain in domains))
+    return (row for row in wider if absent in row)
+
+
+def _all_or_none(network: Network, first: int, others: Iterable[int], absent: int) -> Iterable[Table]:
+    """The variables of one robot are absent together."""
+    for other in others:
+        rows = itertools.product(network.domains[first], network.domains[other])
+        alike = tuple(row for row in rows if (row[0] == absent) == (row[1] == absent))
+        yield Table((first, other), allowed=True, rows=alike)
+
+
+def _join_unary(together: dict[Codes, list[Constraint]]) -> None:
+    """Let what one variable is charged for be charged with others, where it has a charge with others."""
+    wider = {place: scope for scope in together if len(scope) > 1 for place in scope}
+    for scope in [scope for scope in together if len(scope) == 1 and scope[0] in wider]:
+        together[wider[scope[0]]] += together.pop(scope)
+
+
+def _prices(part: Component, network: Network, scope: Codes, charging: Iterable[Constraint]) -> Prices:
+    """What constraints on variables at places of `scope` charge for each combination of their codes."""
+    size = math.prod(len(network.domains[place]) for place in scope)
+    if size > MOST_PRICED:
+        names = ", ".join(constraint.name for constraint in charging)
+        raise Unsupported(
+            f"constraint {names} has a price for {size:,} combinations of values, more than {MOST_PRICED:,} that the"
+            " central judge can list; split it"
+        )
+    prices = [price_on(constraint, [part.names[place] for place in scope]) for constraint in charging]
+    found = {}
+    for codes in itertools.product(*(network.domains[place] for place in scope)):
+        values = part.decoded(codes)
+        total = sum(price(values) for price in prices)
+        if total < INFINITE:
+            found[codes] = total
+    return found

@@ -1,0 +1,81 @@
+"""What installed packages offer under an entry point group: protocols, filters. Code of whoever wrote the package."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+from robochoc.system.entry_points import EntryPoint, entry_points
+
+Fault = Callable[[object], str]
+"""Why something that was loaded cannot be used; empty when it can."""
+
+
+class Loaded(NamedTuple):
+    """What stands behind an entry point, or, if it cannot be used, why."""
+
+    what: object
+    broken: str
+
+
+def entries(group: str) -> Sequence[EntryPoint]:
+    """All that is offered under `group`, in no order.
+
+    What every installed package offers takes as long to read as a small run takes. It is read anew where a package may
+    have come or gone, which changes the folder that holds it.
+    """
+    return _read(group, tuple((place, _changed_ns(place)) for place in sys.path))
+
+
+@lru_cache(maxsize=8)
+def _read(group: str, _path: tuple[tuple[str, int], ...]) -> tuple[EntryPoint, ...]:
+    return tuple(entry_points(group))
+
+
+def _changed_ns(place: str) -> int:
+    try:
+        return os.stat(place or os.curdir).st_mtime_ns  # noqa: PTH116 - a name of sys.path, as often as anybody asks
+    except OSError:
+        return 0
+
+
+def names_in(group: str) -> tuple[str, ...]:
+    """The names of all that is installed, ours and others', sorted."""
+    return tuple(sorted({entry.name for entry in entries(group)}))
+
+
+def all_in(group: str) -> list[tuple[EntryPoint, list[EntryPoint]]]:
+    """Every entry, by name, with those of its name (itself among them)."""
+    found = sorted(entries(group), key=lambda entry: entry.name)
+    return [(entry, [other for other in found if other.name == entry.name]) for entry in found]
+
+
+def named(group: str, name: str) -> list[EntryPoint]:
+    """All entries of that name; more than one where packages do not agree whose it is."""
+    return [entry for entry in entries(group) if entry.name == name]
+
+
+def missing(group: str, kind: str, name: str) -> str:
+    """That nothing of that name is installed, what is, and what may have been meant."""
+    import difflib  # noqa: PLC0415 - start-up: only mistakes need it
+
+    names = names_in(group)
+    near = difflib.get_close_matches(name.lower(), names, 1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"no {kind} {name!r} is installed, only: {', '.join(names) or 'none'}{hint}"
+
+
+def loaded(entry: EntryPoint, namesakes: Sequence[EntryPoint], fault: Fault) -> Loaded:
+    """What stands behind `entry`. Whatever goes wrong is told: one broken package must not hide the others."""
+    if len(namesakes) > 1:
+        places = " and ".join(sorted(f"{one.value} ({one.dist.name if one.dist else 'unknown'})" for one in namesakes))
+        return Loaded(None, f"is offered by several packages, and only one may: {places}")
+    try:
+        found = entry.load()
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - see above
+        return Loaded(None, f"cannot be imported: {type(error).__name__}: {error}")
+    broken = fault(found)
+    return Loaded(None if broken else found, broken)

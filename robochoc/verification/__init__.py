@@ -1,0 +1,1 @@
+"""Checks of answers, which share nothing with the protocols that found them."""

@@ -1,0 +1,69 @@
+"""What a team minimises, seen from outside: the costs of its constraints, and of robots that step aside."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from robochoc.model.message import Value
+from robochoc.model.problem import INFINITE, Team
+from robochoc.solver.encoding import dearest, price_on
+
+
+class Objective:
+    """What is minimised, for values that change: the costs of `team`'s constraints, and of those who step aside.
+
+    `aside` is what it costs that a robot of weight 1 does so (None: nobody may, and without values there is no cost).
+    `interfaces` are the variables that each robot shows to its neighbours. They are `team`'s, until somebody says
+    that robots work on the team in another form.
+    """
+
+    def __init__(self, team: Team, aside: float | None = None) -> None:
+        self._weights = {robot.name: robot.weight for robot in team.robots}
+        self._aside = aside
+        self._constraints = [(c.variables, price_on(c, c.variables)) for c in team.constraints()]
+        self._paid: list[float] = [0] * len(self._constraints)
+        self._on: dict[str, list[int]] = {name: [] for name in team.variables}
+        self.interfaces = {robot.name: robot.interface for robot in team.robots}
+        self._variables = {robot.name: [variable.name for variable in robot.variables] for robot in team.robots}
+        for number, (names, price) in enumerate(self._constraints):
+            for name in names:
+                self._on[name].append(number)
+            if not names:
+                self._paid[number] = price(())
+        self._values: dict[str, int] = {}
+        self._absent = set(self._weights)
+
+    def change(self, own: Mapping[str, Mapping[str, int]]) -> None:
+        """Some robots have their `own` values from now on."""
+        touched: dict[int, None] = {}
+        for robot, values in own.items():
+            for name in self._variables[robot]:
+                self._values.pop(name, None)
+                touched.update(dict.fromkeys(self._on[name]))
+            self._values.update(values)
+            (self._absent.discard if values else self._absent.add)(robot)
+        for number in touched:
+            names, price = self._constraints[number]
+            known = all(name in self._values for name in names)
+            self._paid[number] = price([self._values[name] for name in names]) if known else 0
+
+    def shown(self, values: Mapping[str, Value]) -> dict[str, dict[str, int]] | None:
+        """Return what `values`, as neighbours see them, say of each robot's variables; None if they cannot be those."""
+        if any(len(self.interfaces.get(robot, (*value, ""))) != len(value) for robot, value in values.items()):
+            return None
+        return {
+            robot: {name: part for name, part in zip(self.interfaces[robot], value, strict=True) if part is not None}
+            for robot, value in values.items()
+        }
+
+    @property
+    def cost(self) -> float:
+        """What it comes to now."""
+        if self._absent and self._aside is None:
+            return INFINITE
+        return sum(self._paid) + sum(self._weights[name] for name in self._absent) * (self._aside or 0)
+
+
+def aside_cost(team: Team) -> float:
+    """What stepping aside has to cost, for a robot of weight 1, so that nobody does so to spare others their costs."""
+    return 1 + sum(dearest(constraint) for constraint in team.constraints())
