@@ -31,10 +31,10 @@ test-slow: $(READY)
 	$(BIN)/pytest -n 2 --dist worksteal -m slow
 
 # Findings are kept in out/fuzz. A seed repeats what the loop did; a kept input is tried again by
-# PYTHONPATH=tests .venv/bin/python -m fuzz --target NAME FILE
+# .venv/bin/python -m tests.fuzz --target NAME FILE
 SECONDS ?= 600
 fuzz: $(READY)  ## spoilt inputs for all that reads them: make fuzz SECONDS=600 SEED=1 ENGINE=loop
-	PYTHONPATH=tests $(BIN)/python -m fuzz --seconds $(SECONDS) $(if $(SEED),--seed $(SEED)) $(if $(ENGINE),--engine $(ENGINE))
+	$(BIN)/python -m tests.fuzz --seconds $(SECONDS) $(if $(SEED),--seed $(SEED)) $(if $(ENGINE),--engine $(ENGINE))
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -54,7 +54,7 @@ bench: $(READY)  ## figures into benchmarks/RESULTS.md
 	$(BIN)/python benchmarks/run.py
 
 journals: $(READY)  ## rewrite the golden journals: a changed one is a changed protocol
-	$(BIN)/python tests/golden.py
+	$(BIN)/python -m tests.support.golden
 
 clean:
 	rm -rf $(VENV) out dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

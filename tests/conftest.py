@@ -8,17 +8,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from authorities import Clock, Seen
-from desks import Desk, open_files
 from hypothesis import settings
-from machines import Site
 
 from robochoc.authority.authority import Authority
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
+from tests.support.authorities import Clock, Seen
+from tests.support.desks import Desk, open_files
+from tests.support.machines import Site
 
 if TYPE_CHECKING:
-    from sniffed import Served
+    from tests.support.sniffed import Served
 
 # How long an example takes says something of the machine, and nothing of what is tested.
 settings.register_profile("robochoc", deadline=None)
@@ -90,7 +90,7 @@ def without_the_scenes_viewer() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     """Chromium, by Playwright."""
-    from sniffer_pages import chromium  # noqa: PLC0415 - see above
+    from tests.support.sniffer_pages import chromium  # noqa: PLC0415 - see above
 
     with chromium() as browser:
         yield browser
@@ -99,10 +99,9 @@ def browser() -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def server(without_the_scenes_viewer: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     """A page of the journal `sniffer_pages.WHOLE`."""
-    from sniffed import served  # noqa: PLC0415 - see above
-    from sniffer_pages import WHOLE  # noqa: PLC0415 - see above
-
     from robochoc.sniffer.session import Session  # noqa: PLC0415 - see above
+    from tests.support.sniffed import served  # noqa: PLC0415 - see above
+    from tests.support.sniffer_pages import WHOLE  # noqa: PLC0415 - see above
 
     del without_the_scenes_viewer  # it only has to be there before the page is made
     file = tmp_path_factory.mktemp("sniffed") / "run.journal"

@@ -17,8 +17,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from random import Random
 
-from fuzz.harness import CPU_S, Findings, Target, spoilt, tried
-from fuzz.mutations import LARGEST
+from tests.fuzz.harness import CPU_S, Findings, Target, spoilt, tried
+from tests.fuzz.mutations import LARGEST
 
 GRACE_S = 120
 """So long may a process take to end once its time is over."""
@@ -49,8 +49,8 @@ def main() -> int:
 
 
 def _named(names: list[str] | None) -> list[Target]:
-    from fuzz.file_targets import TARGETS as FILES  # noqa: PLC0415 - atheris wants to see them come
-    from fuzz.wire_targets import TARGETS as WIRE  # noqa: PLC0415 - the same
+    from tests.fuzz.file_targets import TARGETS as FILES  # noqa: PLC0415 - atheris wants to see them come
+    from tests.fuzz.wire_targets import TARGETS as WIRE  # noqa: PLC0415 - the same
 
     targets = {target.name: target for target in (*FILES, *WIRE)}
     unknown = set(names or ()) - targets.keys()
@@ -78,7 +78,7 @@ def _apart(options: argparse.Namespace, target: Target, seconds: float) -> bool:
     began = time.time()
     with (options.out / f"{target.name}.log").open("w") as log, tempfile.TemporaryDirectory(prefix="fuzz-") as cache:
         environment = {**os.environ, "XDG_CACHE_HOME": cache, "TMPDIR": cache}
-        command = [sys.executable, "-m", "fuzz", *words]
+        command = [sys.executable, "-m", "tests.fuzz", *words]
         try:
             done = subprocess.run(
                 command, env=environment, stderr=log, check=False, timeout=seconds + GRACE_S

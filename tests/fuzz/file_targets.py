@@ -11,24 +11,7 @@ from pathlib import Path
 from random import Random
 
 from click.testing import CliRunner
-from complex_problems import random_complex_team
-from cost_problems import random_cost_team
-from pkc_problems import random_pkc_team
-from problems import random_team
-from ros_recordings import TOPICS, messages, read, write
 
-from fuzz.harness import Target, assert_clear
-from fuzz.mutations import (
-    files_of,
-    folder_of,
-    in_folder,
-    one_of,
-    spoilt_bytes,
-    spoilt_json,
-    spoilt_msgpack,
-    spoilt_text,
-    spoilt_xml,
-)
 from robochoc.cli.group import cli
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
@@ -42,8 +25,25 @@ from robochoc.model.problem import Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.dpop import DPOP
 from robochoc.ros.source import SourceFailed
+from tests.fuzz.harness import Target, assert_clear
+from tests.fuzz.mutations import (
+    files_of,
+    folder_of,
+    in_folder,
+    one_of,
+    spoilt_bytes,
+    spoilt_json,
+    spoilt_msgpack,
+    spoilt_text,
+    spoilt_xml,
+)
+from tests.support.complex_problems import random_complex_team
+from tests.support.cost_problems import random_cost_team
+from tests.support.pkc_problems import random_pkc_team
+from tests.support.problems import random_team
+from tests.support.program import ROOT
+from tests.support.ros_recordings import TOPICS, messages, read, write
 
-ROOT = Path(__file__).parents[2]
 STATUSES = {0, 1, 2, 3, 4}
 LATEST_NS = (1 << 31) * 10**9
 """Later times are read of ROS 1, and not written."""

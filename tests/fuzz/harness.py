@@ -15,7 +15,7 @@ from pathlib import Path
 from random import Random
 from types import FrameType
 
-from fuzz.mutations import Mutation
+from tests.fuzz.mutations import Mutation
 
 CPU_S = 5.0
 """Seconds of CPU time that one input may take."""

@@ -7,12 +7,7 @@ from functools import cache, partial
 from random import Random
 
 import msgspec
-from complex_problems import random_complex_team
-from cost_problems import random_cost_team
-from problems import random_team
 
-from fuzz.harness import Target, assert_said
-from fuzz.mutations import one_of, spoilt_bytes, spoilt_msgpack, spoilt_text
 from robochoc.authority.certificates import (
     BadCertificate,
     ca_certificate,
@@ -67,6 +62,11 @@ from robochoc.services.identifier import AgentIdentifier, identifier_on
 from robochoc.services.sl import Function, df_on, request
 from robochoc.sniffer.acl import ACLMessage, BadACL, parse, text
 from robochoc.solver.explanation import Known
+from tests.fuzz.harness import Target, assert_said
+from tests.fuzz.mutations import one_of, spoilt_bytes, spoilt_msgpack, spoilt_text
+from tests.support.complex_problems import random_complex_team
+from tests.support.cost_problems import random_cost_team
+from tests.support.problems import random_team
 
 LATEST = 1_800_000_000.0
 PLATFORM = "host:7447/robochoc"

@@ -1,0 +1,156 @@
+"""The sniffer's page in a browser: runs that go on, break off or are made by strangers, and readers of every kind."""
+
+from __future__ import annotations
+
+import io
+import json
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from robochoc.journal.journal import lines_of
+from robochoc.sniffer.packed import packed_feed
+from robochoc.sniffer.page import page as page_of
+from robochoc.sniffer.session import Session
+from tests.support.sniffed import Served, journal_of, served
+from tests.support.sniffer_pages import (
+    ALL,
+    CONTRAST,
+    FEED,
+    JOURNAL,
+    NAMELESS,
+    OUTCOME,
+    choose,
+    heads,
+    rows,
+    shown,
+    text_is,
+    until,
+)
+
+HOSTILE = "</script><img src=x onerror=document.title='broken'>"
+
+
+pytestmark = pytest.mark.usefixtures("without_the_scenes_viewer")
+
+
+# Live, ended, broken
+
+
+def test_a_run_is_followed_until_somebody_looks_elsewhere(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401
+    lines = list(lines_of(JOURNAL))
+    file = tmp_path / "run.journal"
+    place = 600
+    file.write_bytes(b"".join(lines[:place]))
+    with served(Session(file, live=True)) as server, file.open("ab") as writing:
+
+        def more(end: int) -> None:
+            nonlocal place
+            writing.write(b"".join(lines[place:end]))
+            writing.flush()
+            place = end
+
+        about = server.json("about")
+        with shown(browser, server.url, f"{about['messages']} messages") as page:
+            assert page.inner_text("#live") == "Following"
+            more(900)
+            until(lambda: int(page.inner_text("#counts").split()[0]) > about["messages"], "nothing comes")
+            until(lambda: rows(page)[-1] == int(page.inner_text("#counts").split()[0]) - 1, "the newest is not shown")
+            page.keyboard.press("Home")
+            text_is(page, "#live", "Follow")
+            more(len(lines))
+            text_is(page, "#counts", ALL)
+            assert rows(page)[0] == 0
+            until(lambda: not page.locator("#live").is_visible(), "it is over, and the page does not know")
+            assert page.inner_text("#verdict") == FEED.news()["verdict"]
+
+
+def test_a_server_that_ends_is_told_and_what_is_seen_stays(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401
+    file = tmp_path / "run.journal"
+    file.write_bytes(b"".join(list(lines_of(JOURNAL))[:600]))
+    with ExitStack() as ends:
+        server = ends.enter_context(served(Session(file, live=True)))
+        count = server.json("about")["messages"]
+        with shown(browser, server.url, f"{count} messages") as page:
+            ends.close()
+            until(lambda: "The run's server has ended" in page.inner_text("#notices"), "nobody says so")
+            assert page.inner_text("#counts") == f"{count} messages"
+            assert rows(page)
+
+
+def test_damage_and_an_empty_journal_are_told(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401
+    file = tmp_path / "run.journal"
+    file.write_bytes(b"".join(list(lines_of(JOURNAL))[:300]) + b"nonsense\n")
+    with served(Session(file)) as server:
+        until(lambda: server.json("about")["damage"], "no damage")
+        with shown(browser, server.url, f"{server.json('about')['messages']} messages") as page:
+            assert "The journal is damaged" in page.inner_text("#notices")
+    file.write_bytes(journal_of([], OUTCOME))
+    with served(Session(file)) as server, shown(browser, server.url, "0 messages") as page:
+        until(lambda: "Nobody has said anything" in page.inner_text("#notices"), "an empty page, and nobody says why")
+
+
+def test_names_of_strangers_are_text(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401
+    text = b"".join(lines_of(JOURNAL)).decode().replace("queens3d-4", HOSTILE)
+    lines = [json.loads(line) for line in text.splitlines()]
+    for line in lines:
+        for key in ("robot", "sender", "receiver"):
+            if line.get(key) == "Robot1.1":
+                line[key] = HOSTILE
+    file = tmp_path / "run.journal"
+    kept = [json.dumps(line, separators=(",", ":")) + "\n" for line in lines if line["event"] != "Given"]
+    file.write_text("".join(kept))
+    with served(Session(file)) as server, shown(browser, server.url) as page:
+        names = [one["name"] for one in server.json("about")["robots"]]
+        page.evaluate(f"Sniffer.page.robot({names.index(HOSTILE)})")
+        choose(page, 0)
+        assert HOSTILE in page.inner_text("#title")
+        assert any(name.startswith("</script>") for name in heads(page))
+        assert page.locator("img").count() == 0
+        assert "broken" not in page.title().split("onerror")[0]
+        assert "cannot be worked out" in page.inner_text("#notices")
+
+
+def test_an_export_needs_no_server(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401
+    file = tmp_path / "run.html"
+    file.write_bytes(page_of("embedded", packed_feed(FEED, JOURNAL), title="A run"))
+    with shown(browser, file.as_uri()) as page:
+        choose(page, 100)
+        text_is(page, "#message blockquote", FEED.detail(100)["words"])
+        page.click("#tab-robot")
+        page.wait_for_selector("#robot .knows")
+
+
+# For everybody
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_can_be_read_in_light_and_dark(browser: Any, server: Served, scheme: str) -> None:  # noqa: ANN401
+    with shown(browser, server.url, color_scheme=scheme, reduced_motion="reduce") as page:
+        corner = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("L"))[3, 3]
+        assert (corner < 60) == (scheme == "dark")
+        choose(page, 250)
+        page.wait_for_selector("#message pre", state="attached")
+        assert page.evaluate(CONTRAST) == []
+        assert page.evaluate(NAMELESS) == []
+        page.click("#tab-filters")
+        page.click("#tab-robot")
+        page.wait_for_selector("#robot .knows")
+        assert page.evaluate(CONTRAST) == []
+        assert page.evaluate(NAMELESS) == []
+        page.click("#theme")
+        until(lambda: page.evaluate("document.documentElement.dataset.theme") != scheme, "the theme stays")
+
+
+def test_a_narrow_window_has_all_in_reach(browser: Any, server: Served) -> None:  # noqa: ANN401
+    with shown(browser, server.url, viewport={"width": 360, "height": 700}) as page:
+        assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        page.click("#grid .row[data-message='3']")
+        text_is(page, "#message blockquote", FEED.detail(3)["words"])
+        assert page.evaluate(NAMELESS) == []
+        page.keyboard.press("Escape")
+        assert not page.locator("#right").is_visible()

@@ -1,0 +1,398 @@
+"""The page in a browser, which plays it: time, epochs, camera, trails, keys; narrow, dark, with little motion."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from PIL import Image
+
+from robochoc.flight.mission import mission_of
+from robochoc.flight.quadrotor.flown import Flown
+from robochoc.view.page import page
+from robochoc.view.scene import Scene, scene_of
+from tests.support.flights import LEG_S, epochs_of_three, five, straight
+from tests.support.pages import watched
+from tests.support.program import ROOT
+from tests.support.sniffer_pages import CONTRAST, NAMELESS, until
+
+HOSTILE = "</script><img src=x onerror=document.title='broken'>"
+END_S = 3 * LEG_S
+
+Page = Any
+"""Playwright's, which is not everywhere."""
+
+
+def scene(**how: Any) -> Scene:  # noqa: ANN401 - `straight`'s
+    outcome = epochs_of_three(HOSTILE)
+    mission = mission_of(outcome, five())
+    flown: Flown = straight(mission, **how)
+    return scene_of(outcome, mission=mission, flown=flown)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    html = tmp_path_factory.mktemp("flown") / "page.html"
+    html.write_bytes(page(scene(falls={1: 3.0}, obstacles=((2.0, 1.0, 5.0),))))
+    return html
+
+
+@contextmanager
+def opened(browser: Any, url: str, **options: Any) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
+    """The page, once it is drawn. No script may complain, and nothing may be asked for anything."""
+    with watched(browser, **{"viewport": {"width": 700, "height": 560}, **options}) as (page, complaints, asked):
+        page.goto(url)
+        until(lambda: page.evaluate("Boolean(globalThis.Film)"), "it does not begin")
+        yield page
+        assert page.locator("#trouble").is_hidden()
+    assert not [one for one in complaints if "GL Driver Message" not in one]  # it is slow to photograph
+    assert not [one for one in asked if not one.startswith((url, "data:", "blob:"))]
+
+
+@pytest.fixture(scope="module")
+def one(browser: Any, file: Path) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
+    with opened(browser, file.as_uri()) as page:
+        yield page
+
+
+@pytest.fixture
+def player(one: Page) -> Page:
+    """The page, paused at the beginning."""
+    one.evaluate("Film.player.pause(); Film.player.seek(0); Film.camera.see('overview', true)")
+    one.select_option("#speed", "1")
+    one.select_option("#trail", "all")
+    one.locator("#play").focus()
+    one.evaluate("document.activeElement.blur()")
+    return one
+
+
+def now(page: Page) -> float:
+    time: float = page.evaluate("Film.player.time")
+    return time
+
+
+def place(page: Page, drone: int) -> list[float]:
+    """Where a drone is, as it is drawn: x, y and z in cells."""
+    at: list[float] = page.evaluate(f"Film.drones[{drone}].position.toArray()")
+    return at
+
+
+def pressed(page: Page) -> str | None:
+    """The camera's button that is pressed."""
+    names: list[str] = page.eval_on_selector_all(".joined [aria-pressed=true]", "all => all.map((one) => one.id)")
+    return names[0] if names else None
+
+
+def picture(page: Page) -> npt.NDArray[np.int16]:
+    """The scene between caption and controls, as it is drawn: rows of red, green and blue."""
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    image = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    return np.asarray(image, dtype=np.int16)[20:400, 330:]
+
+
+def test_the_drones_move(player: Page) -> None:
+    begin = picture(player)
+    player.keyboard.press("End")
+    end = picture(player)
+    for one in (begin, end):
+        assert len(np.unique(one.reshape(-1, 3), axis=0)) > 500
+    assert (np.abs(begin - end).max(axis=2) > 40).mean() > 0.005
+
+
+def test_of_names_that_would_cover_each_other_one_is_written(player: Page) -> None:
+    """That of the drone which is nearest, or which is followed."""
+
+    def named() -> list[bool]:
+        written: list[bool] = player.evaluate("Film.names.choose(), Film.names.names.map((name) => name.visible)")
+        return written
+
+    assert all(named())
+    player.evaluate("Film.drones[1].position.copy(Film.drones[0].position)")
+    assert sorted(named()[:2]) == [False, True]
+    assert all(named()[2:])
+    hidden = named().index(False)
+    player.select_option("#drone", str(hidden))
+    until(lambda: player.evaluate("!Film.camera.turning"), "it does not turn there")
+    assert named()[:2] == [hidden == 0, hidden == 1]
+    player.click("#overview")
+    player.evaluate("Film.player.seek(1), Film.player.seek(0)")
+    until(lambda: player.evaluate("!Film.camera.turning"), "it does not turn back")
+    assert all(named())
+
+
+def test_it_plays_to_its_end_and_again(player: Page) -> None:
+    player.select_option("#speed", "4")
+    assert player.get_attribute("#play", "aria-label") == "Play"
+    player.click("#play")
+    assert player.get_attribute("#play", "aria-label") == "Pause"
+    until(lambda: now(player) > 1, "it does not play")
+    until(lambda: now(player) == END_S, "it does not end")
+    assert player.get_attribute("#play", "aria-label") == "Play again"
+    assert place(player, 0) == pytest.approx(scene().drones[0].end, abs=0.01)
+    player.keyboard.press("Home")
+    player.locator("body").press(" ")
+    until(lambda: 0 < now(player) < END_S, "it does not begin again")
+    player.keyboard.press(" ")
+    paused = now(player)
+    player.wait_for_timeout(100)
+    assert now(player) == paused
+
+
+def test_it_begins_anew(player: Page) -> None:
+    player.evaluate("Film.player.seek(5)")
+    player.click("#again")
+    assert now(player) < 1
+    assert player.evaluate("Film.player.playing")
+
+
+def test_the_slider_is_the_time(player: Page) -> None:
+    line = player.locator("#time").bounding_box()
+    player.mouse.click(line["x"] + line["width"] / 2, line["y"] + line["height"] / 2)
+    assert now(player) == pytest.approx(END_S / 2, abs=0.05)
+    assert player.inner_text("#clock") == f"{now(player):.1f} / 6.0 s"
+    assert player.get_attribute("#time", "aria-valuetext").endswith("of 6.0 seconds, epoch 1 (0 to 2)")
+    assert not player.evaluate("Film.player.playing")
+
+
+def test_steps_and_epochs_by_keys(player: Page) -> None:
+    player.keyboard.press("ArrowRight")
+    player.keyboard.press("ArrowRight")
+    player.keyboard.press("ArrowLeft")
+    assert now(player) == pytest.approx(0.1)
+    player.keyboard.press("Shift+ArrowRight")
+    assert now(player) == LEG_S
+    player.keyboard.press("Shift+ArrowLeft")
+    assert now(player) == 0
+    player.keyboard.press("End")
+    assert now(player) == END_S
+    player.keyboard.press("-")
+    assert player.input_value("#speed") == "0.5"
+    for _ in range(9):
+        player.keyboard.press("+")
+    assert player.input_value("#speed") == "4"
+
+
+def test_keys_step_while_the_slider_has_the_focus(player: Page) -> None:
+    player.locator("#time").focus()
+    player.keyboard.press("ArrowRight")
+    assert now(player) == pytest.approx(0.1)
+    player.keyboard.press("End")
+    assert now(player) == END_S
+
+
+def test_the_caption_tells_the_epoch(player: Page) -> None:
+    said = ["the start: solution, 4 fly", "-R5.1: no solution, 3 hover on", "V2.1 without <2>: solution, 4 fly"]
+    for number, words in enumerate(said):
+        player.evaluate(f"Film.player.seek({LEG_S * number + 0.5})")
+        assert player.inner_text("#epoch").split("\n") == [f"Epoch {number} (0 to 2)", words]
+
+
+def test_marks_say_what_happened_and_lead_there(player: Page) -> None:
+    marks = player.locator("#marks button")
+    labels = marks.evaluate_all("all => all.map((one) => one.getAttribute('aria-label'))")
+    assert labels[1] == "Epoch 1: -R5.1, no solution, 3 hover on; at 2.0 s"
+    assert labels[3] == "R2.1: motor 2 stopped; at 3.0 s"
+    marks.nth(3).focus()
+    assert player.inner_text("#hint") == "R2.1: motor 2 stopped (3.0 s)"
+    player.keyboard.press("Enter")
+    assert now(player) == 3
+    player.evaluate("document.activeElement.blur()")
+    assert player.locator("#hint").is_hidden()
+    marks.nth(1).hover()
+    assert player.inner_text("#hint").startswith("Epoch 1")
+    marks.nth(1).click()
+    assert now(player) == LEG_S
+
+
+def test_cameras_by_keys_and_by_buttons(player: Page) -> None:
+    def looked_from() -> list[float]:
+        until(lambda: player.evaluate("!Film.camera.turning"), "it turns for ever")
+        return list(player.evaluate("Film.viewer.camera.position.toArray()"))
+
+    overview = looked_from()
+    player.keyboard.press("2")
+    assert pressed(player) == "top"
+    above = looked_from()
+    assert above[1] > 2 * abs(above[0])
+    player.keyboard.press("3")
+    front = looked_from()
+    assert front[2] > 3 * abs(front[1])
+    player.click("#overview")
+    assert looked_from() == pytest.approx(overview, abs=1e-4)
+    player.mouse.move(350, 300)
+    player.mouse.down()
+    player.mouse.move(420, 330)
+    player.mouse.up()
+    until(lambda: pressed(player) is None, "it is no overview any more")
+
+
+def test_a_drone_is_followed(player: Page) -> None:
+    player.select_option("#drone", "2")
+    assert pressed(player) == "follow"
+    until(lambda: player.evaluate("!Film.camera.turning"), "it turns for ever")
+    player.evaluate("Film.player.seek(2)")
+    off = "Film.viewer.controls.target.distanceTo(Film.drones[2].getWorldPosition(new MeshCat.THREE.Vector3()))"
+    until(lambda: player.evaluate(off) < 1e-6, "it is not followed")
+    player.keyboard.press("4")
+    assert player.input_value("#drone") == "3"
+    player.keyboard.press("1")
+    assert pressed(player) == "overview"
+
+
+def test_a_click_chooses_a_drone(player: Page) -> None:
+    spot = player.evaluate(
+        "(() => { const at = Film.drones[3].getWorldPosition(new MeshCat.THREE.Vector3()).project(Film.viewer.camera);"
+        " return [(at.x + 1) / 2 * innerWidth, (1 - at.y) / 2 * innerHeight]; })()"
+    )
+    player.mouse.click(*spot)
+    assert (pressed(player), player.input_value("#drone")) == ("follow", "3")
+
+
+def test_trails_grow_and_can_be_left_out(player: Page) -> None:
+    def painted() -> int:
+        """How many pixels are blue, or violet: drones of the first rows, and their trails."""
+        scene = picture(player)
+        return int(((scene[..., 2] - scene[..., 0]) > 60).sum())
+
+    player.evaluate("Film.player.seek(2.9)")
+    whole = painted()
+    player.keyboard.press("t")
+    assert player.input_value("#trail") == "3"
+    assert player.evaluate("Film.trails.uniforms.lasting.value") == 3
+    player.keyboard.press("t")
+    assert player.input_value("#trail") == "none"
+    assert painted() < whole - 50
+    player.keyboard.press("t")
+    assert abs(painted() - whole) < 20
+
+
+def test_hostile_names_stay_text(player: Page) -> None:
+    assert player.title().startswith(HOSTILE)
+    assert player.locator("img").count() == 0
+    assert player.inner_text("h1").startswith(HOSTILE)
+
+
+def test_all_can_be_named_and_read(player: Page) -> None:
+    assert player.evaluate(NAMELESS) == []
+    assert player.evaluate(CONTRAST) == []
+
+
+@pytest.fixture(scope="module")
+def small(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
+    """A telephone at night, of one who wants little motion; the last two epochs begin at the same time."""
+    whole = scene()
+    film = whole.film
+    assert film
+    first, second, third = film.chapters
+    film = replace(film, chapters=(first, second, replace(third, begins_s=second.begins_s)))
+    html = tmp_path_factory.mktemp("small") / "page.html"
+    html.write_bytes(page(replace(whole, film=film)))
+    screen = {"width": 360, "height": 640}
+    with opened(browser, html.as_uri(), viewport=screen, color_scheme="dark", reduced_motion="reduce") as shown:
+        yield shown
+
+
+def test_with_little_motion_it_begins_at_its_end(small: Page) -> None:
+    assert now(small) == END_S
+    assert not small.evaluate("Film.player.playing")
+    small.keyboard.press("2")
+    assert pressed(small) == "top"
+    assert small.evaluate("Film.camera.turning") is None
+
+
+def test_epochs_that_begin_together_are_told_together(small: Page) -> None:
+    said = small.inner_text("#epoch")
+    assert "Epoch 1 (0 to 2)" in said
+    assert "Epoch 2 (0 to 2)" in said
+    boxes = [small.locator("#marks button").nth(number).bounding_box() for number in range(3)]
+    assert boxes[1]["x"] + boxes[1]["width"] <= boxes[2]["x"] + 0.5
+
+
+def test_a_narrow_dark_page_has_room_for_all(small: Page) -> None:
+    assert small.evaluate("document.documentElement.scrollWidth") == 360
+    boxes = [small.locator(f"#{name}").bounding_box() for name in ("caption", "controls")]
+    for box in boxes:
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= 360
+    assert boxes[1]["y"] - boxes[0]["y"] - boxes[0]["height"] > 250
+    outside = small.eval_on_selector_all(
+        "#controls button, #controls select, #controls input",
+        "all => all.filter((one) => { const box = one.getBoundingClientRect();"
+        " return box.left < 0 || box.right > innerWidth || box.bottom > innerHeight; }).map((one) => one.id)",
+    )
+    assert outside == []
+    assert small.evaluate(CONTRAST) == []
+    small.click("#keys summary")
+    keys = small.locator("#keys dl").bounding_box()
+    assert keys["x"] >= 0
+    assert keys["x"] + keys["width"] <= 360
+
+
+def test_without_a_flight_there_is_nothing_to_play(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401 - Playwright's
+    bare = Scene("a team: a solution", (("flight", "none"),), scene().drones, scene().axes)
+    html = tmp_path / "page.html"
+    html.write_bytes(page(bare))
+    with opened(browser, html.as_uri()) as shown:
+        assert shown.locator("#play").is_hidden()
+        assert shown.locator("#time").is_hidden()
+        shown.keyboard.press("4")
+        assert pressed(shown) == "follow"
+        shown.keyboard.press(" ")
+        assert place(shown, 0) == pytest.approx(bare.drones[0].end)
+
+
+LIVE = """
+import sys
+from tests.support.flights import epochs_of_three, five, straight
+from robochoc.flight.mission import mission_of
+from robochoc.view.live import serve
+from robochoc.view.scene import scene_of
+outcome, mission = epochs_of_three(), mission_of(epochs_of_three(), five())
+serve(scene_of(outcome, mission=mission, flown=straight(mission)), ready=lambda url: print(url, flush=True))
+"""
+
+
+def test_the_live_page_plays_the_same(browser: Any, one: Page) -> None:  # noqa: ANN401 - Playwright's
+    with subprocess.Popen([sys.executable, "-c", LIVE], stdout=subprocess.PIPE, text=True, cwd=ROOT) as server:
+        try:
+            assert server.stdout
+            with opened(browser, server.stdout.readline().strip(), viewport=one.viewport_size) as live:
+                until(lambda: live.evaluate("Boolean(Film.trails.mesh)"), "nothing to play has come")
+                live.evaluate("Film.player.pause(); Film.player.seek(4.5)")
+                assert live.inner_text("#epoch").startswith("Epoch 2 (0 to 2)")
+                assert place(live, 0) != pytest.approx(place(live, 1), abs=0.5)
+                assert pressed(live) == "overview"
+                away = "Film.viewer.camera.position.length()"
+                assert live.evaluate(away) > 2, "as the window wants it"
+        finally:
+            server.kill()
+
+
+def test_its_keys_are_a_key_away(player: Page) -> None:
+    keys = player.locator("#keys dl")
+    assert keys.is_hidden()
+    player.keyboard.press("?")
+    assert keys.is_visible()
+    player.keyboard.press("Escape")
+    assert keys.is_hidden()
+    player.click("#keys summary")
+    assert keys.is_visible()
+    player.mouse.click(350, 250)
+    assert keys.is_hidden()
+
+
+def test_space_plays_after_a_click_on_a_button(player: Page) -> None:
+    player.click("#top")
+    player.keyboard.press(" ")
+    until(lambda: player.evaluate("Film.player.playing"), "it does not play")
+    player.keyboard.press(" ")
+    assert not player.evaluate("Film.player.playing")

@@ -1,0 +1,127 @@
+"""Channel models of one's own: TOML files, what is wrong with them, and the command line."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from robochoc.communication.simulator.channel import CHANNELS, LARGEST_FILE, ChannelModel, read_channel
+from robochoc.formats import InvalidInput
+from tests.support.entries import entries_of
+from tests.support.program import ROOT, robochoc
+
+
+def test_a_file_has_all_fields(tmp_path: Path) -> None:
+    fields = {**msgspec.structs.asdict(CHANNELS["wpan"]), "name": "mesh"}
+    path = tmp_path / "any.toml"
+    path.write_text("".join(f"{field} = {json.dumps(value)}\n" for field, value in fields.items()))
+    assert read_channel(path) == msgspec.structs.replace(CHANNELS["wpan"], name="mesh")
+
+
+def test_the_example_in_the_manual_is_a_channel(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "channels.md").read_text()
+    path = tmp_path / "mesh.toml"
+    path.write_text(text.split("```toml\n")[1].split("```")[0])
+    assert read_channel(path).name == "mesh"
+    assert all(f"`{field}`" in text for field in ChannelModel.__struct_fields__)
+
+
+def test_a_file_needs_a_latency_only(tmp_path: Path) -> None:
+    path = tmp_path / "still.toml"
+    path.write_text("latency_ms = 5")
+    assert read_channel(path) == ChannelModel(name="still", latency_ms=5)
+
+
+BAD = {
+    "": "missing required field `latency_ms`",
+    "latency_ms": "is no TOML file",
+    "latency_ms = 1\nlatency_ms = 2": "is no TOML file",
+    "latency_ms = 5\nlos = 0.1": "los: a channel has no such field (did you mean 'loss'?",
+    "latency_ms = -1": "latency_ms: expected a number from 0 to 60,000, got -1",
+    "latency_ms = nan": "latency_ms: expected a number from 0 to 60,000, got nan",
+    "latency_ms = inf": "latency_ms: expected a number from 0 to 60,000, got inf",
+    "latency_ms = 1e9": "latency_ms: expected",
+    "latency_ms = 'five'": "latency_ms: Expected `float`, got `str`",
+    "latency_ms = 5\nminimum_ms = 6": "minimum_ms: expected at most latency_ms",
+    "latency_ms = 5\nloss = 1": "loss: expected a number from 0 to 0.9, got 1",
+    "latency_ms = 5\nloss = nan": "loss: expected",
+    "latency_ms = 5\nbandwidth_bps = 0": "bandwidth_bps: expected a number from 1 to",
+    "latency_ms = 5\nbandwidth_bps = inf": "bandwidth_bps: expected",
+    "latency_ms = 5\npayload_bytes = 0": "payload_bytes: expected a number from 8 to 65,535",
+    "latency_ms = 5\npayload_bytes = 10.5": "payload_bytes: Expected `int`, got `float`",
+    "latency_ms = 5\nshared = 1": "shared: Expected `bool`, got `int`",
+    "latency_ms = 5\ntimeout_ms = 500\nlongest_timeout_ms = 400": "longest_timeout_ms: expected at least timeout_ms",
+    "latency_ms = 5\ncheck_ns = 1000000000000000000000000": "check_ns: ",
+    f"latency_ms = 1{'0' * 400}": "latency_ms: ",
+    f"latency_ms = 1{'0' * 5000}": "is no TOML file",
+    f"latency_ms = {'[' * 20000}": "is no TOML file",
+    "latency_ms = 5\nname = 'a b'": "name: expected up to 40",
+    "latency_ms = 5\nname = 'wlan'": "name: wlan is the name of a shipped model",
+    "latency_ms = 5\nname = ['wlan']": "name: Expected `str`, got `array`",
+    "[channel]\nlatency_ms = 5": "channel: a channel has no such field",
+    f"#{'x' * LARGEST_FILE}": "is too large",
+}
+
+
+@pytest.mark.parametrize(("content", "message"), BAD.items(), ids=range(len(BAD)))
+def test_a_bad_file_is_told_in_one_line(tmp_path: Path, content: str, message: str) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_text(content)
+    with pytest.raises(InvalidInput) as caught:
+        read_channel(path)
+    (line,) = str(caught.value).splitlines()
+    assert line.startswith(f"{path}: ")
+    assert message in line
+    assert len(line) < 400 + len(str(path))
+
+
+def test_what_is_no_file_or_no_text(tmp_path: Path) -> None:
+    (tmp_path / "raw.toml").write_bytes(b"\xff\xfe")
+    for name, message in (("", "is no file"), ("none.toml", "is no file"), ("raw.toml", "is not UTF-8")):
+        with pytest.raises(InvalidInput, match=message):
+            read_channel(tmp_path / name)
+
+
+@pytest.mark.parametrize("values", [{"loss": 1.0}, {"latency_ms": -1.0}, {"sigma": math.nan}])
+def test_what_cannot_be_is_refused_in_python_too(values: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=f"{next(iter(values))}: expected"):
+        msgspec.structs.replace(CHANNELS["wlan"], **values)
+
+
+# The command line
+
+
+def test_the_command_line_simulates_seconds(tmp_path: Path) -> None:
+    run = ("solve", ROOT / "instances" / "queens3d-4", "--runtime", "simulator", "--channel")
+    words = robochoc(*run, "wwan", "--journal", tmp_path / "journal.jsonl")
+    assert words.returncode == 0
+    assert words.stdout.rstrip().endswith("simulated (wwan)")
+    assert entries_of(tmp_path / "journal.jsonl")[0]["channel"] == "wwan"
+    (tmp_path / "own.toml").write_text("latency_ms = 1000")
+    outcome = json.loads(robochoc(*run, tmp_path / "own.toml", "--json").stdout)
+    assert outcome["channel"] == "own"
+    assert outcome["metrics"]["simulated_s"] > 1
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [
+        (("--channel", "wlan"), 2, "add --runtime simulator"),
+        (("--channel", "wlan", "--runtime", "simulator", "--delay", "5"), 2, "drop --delay"),
+        (("--channel", "wlan", "--runtime", "simulator", "--schedule", "random"), 2, "drop --delay and --schedule"),
+        (("--channel", "wlam", "--runtime", "simulator"), 2, "did you mean 'wlan'?"),
+        (("--channel", "", "--runtime", "simulator"), 2, "channels: wlan"),
+        (("--channel", "wlan", "--runtime", "simulator", "--protocol", "central"), 2, "not for --protocol central"),
+        (("--channel", ROOT / "README.md", "--runtime", "simulator"), 1, "is no TOML file"),
+        (("--channel", ROOT, "--runtime", "simulator"), 1, "is no file"),
+    ],
+)
+def test_wrong_usage_and_bad_files_are_told(words: tuple[object, ...], status: int, message: str) -> None:
+    done = robochoc("solve", ROOT / "docs" / "examples" / "scouts", *words)
+    assert done.returncode == status
+    assert message in done.stderr
+    assert not done.stdout

@@ -1,0 +1,321 @@
+"""The command line as a user meets it: what it prints, what it writes, and its exit status."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click import Context
+
+from robochoc.cli.group import COMMANDS, cli
+from robochoc.formats import read_team, write_team
+from robochoc.generators.queens3d import queens3d
+from robochoc.model.problem import Constraint, Model, Relation, Robot, Semantics
+from tests.support.broken import CASES
+from tests.support.broken_case import Broken
+from tests.support.problems import team_of
+from tests.support.program import ROOT, on_a_terminal, robochoc, robochoc_within
+
+RESULT_KEYS = {
+    "team", "protocol", "runtime", "seed", "verdict", "assignment", "cost", "withdrawn", "epochs", "metrics",
+    "verified",
+}  # fmt: skip
+METRIC_KEYS = {"messages", "bytes", "largest", "ncccs", "checks", "wall_s"}
+
+
+# generate
+
+
+def test_generate_writes_where_it_says(tmp_path: Path) -> None:
+    done = robochoc("generate", "queens3d", "--n", 3, folder=tmp_path)
+    assert done.returncode == 0
+    assert sorted(path.name for path in (tmp_path / "instances" / "queens3d-3").iterdir())[:2] == [
+        "Robot1.1.xml",
+        "Robot1.2.xml",
+    ]
+    assert read_team(tmp_path / "instances" / "queens3d-3") == queens3d(3)
+
+
+def test_generate_does_not_overwrite_unless_forced(four: Path) -> None:
+    again = ("generate", "queens3d", "--n", 3, "-o", four)
+    done = robochoc(*again)
+    assert done.returncode == 1
+    assert "--force" in done.stderr
+    assert len(list(four.iterdir())) == 16
+    assert robochoc(*again, "--force").returncode == 0
+    assert len(list(four.iterdir())) == 9
+    assert [path.name for path in four.parent.iterdir()] == [four.name]
+
+
+def test_force_does_not_replace_a_folder_that_is_no_team(tmp_path: Path) -> None:
+    (tmp_path / "home").mkdir()
+    (tmp_path / "home" / "thesis.tex").write_text("years of work")
+    done = robochoc("generate", "queens3d", "--n", 3, "-o", tmp_path / "home", "--force")
+    assert done.returncode == 1
+    assert "thesis.tex" in done.stderr
+    assert (tmp_path / "home" / "thesis.tex").exists()
+
+
+@pytest.mark.parametrize("n", ["0", "65", "four", "-1"])
+def test_generate_refuses_absurd_sizes_as_wrong_usage(tmp_path: Path, n: str) -> None:
+    assert robochoc("generate", "queens3d", "--n", n, folder=tmp_path).returncode == 2
+
+
+# validate
+
+
+def test_validate_says_one_line_a_team(four: Path) -> None:
+    done = robochoc("validate", folder=ROOT)
+    assert done.returncode == 0
+    assert done.stdout.splitlines() == [
+        "instances/queens3d-4: 16 robots, 16 variables, 76 constraints: ok",
+        "instances/queens3d-7: 49 robots, 49 variables, 476 constraints: ok",
+    ]
+    assert robochoc("validate", four / "Robot1.1.xml").stdout.endswith(": ok by itself\n")
+
+
+def test_validate_tells_every_mistake_of_every_file(four: Path) -> None:
+    for name, old, new in (
+        ("Robot1.1.xml", 'nbValues="4"', 'nbValues="5"'),
+        ("Robot3.1.xml", 'reference="neq"', 'reference="nope"'),
+        ("Robot4.4.xml", "</instance>", ""),
+    ):
+        path = four / name
+        path.write_text(path.read_text().replace(old, new))
+    done = robochoc("validate", four)
+    assert done.returncode == 1
+    assert "queens3d-4: 4 errors" in done.stdout
+    for name in ("Robot1.1.xml:5:", "Robot3.1.xml:", "Robot4.4.xml:"):
+        assert name in done.stdout
+    assert robochoc("solve", four).returncode == 1
+
+
+def test_validate_json(four: Path) -> None:
+    good = json.loads(robochoc("validate", four, "--json").stdout)
+    sizes = {"robots": 16, "variables": 16, "constraints": 76, "events": 0}
+    assert good == {"path": str(four), "valid": True, **sizes, "errors": []}
+    (four / "Robot1.1.xml").unlink()
+    bad = json.loads(robochoc("validate", four, "--json").stdout)
+    assert bad["valid"] is False
+    assert all({"file", "line", "message", "hint"} <= error.keys() for error in bad["errors"])
+
+
+def test_an_empty_place_says_what_to_do(tmp_path: Path) -> None:
+    for command in ("validate", "solve"):
+        done = robochoc(command, tmp_path)
+        assert done.returncode == 1
+        assert "robochoc generate queens3d --n 4" in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("program", [robochoc_within, pytest.param(robochoc, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("command", ["validate", "solve"])
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_broken_input_is_status_1_and_one_clear_message(
+    case: Broken, command: str, program: Callable[..., subprocess.CompletedProcess[str]], tmp_path: Path
+) -> None:
+    if (case.name, command) == ("a file for a folder", "validate"):
+        return  # a single robot's file may be validated
+    case.write(tmp_path)
+    done = program(command, tmp_path / case.target)
+    assert done.returncode == 1
+    told = done.stdout.splitlines()[1:] if command == "validate" else done.stderr.splitlines()
+    assert len(told) == len(case.expected(tmp_path))
+    assert done.stdout == "" or command == "validate"
+
+
+# solve
+
+
+@pytest.mark.parametrize("runtime", ["processes", "simulator"])
+def test_solve_json_is_the_contract(runtime: str) -> None:
+    done = robochoc("solve", "instances/", "--json", "--runtime", runtime, folder=ROOT)
+    assert done.returncode == 0
+    assert done.stderr == ""
+    four, seven = map(json.loads, done.stdout.splitlines())
+    assert four.keys() == seven.keys() == RESULT_KEYS
+    assert four["metrics"].keys() >= METRIC_KEYS
+    assert (four["team"], four["verdict"], four["assignment"], four["cost"]) == ("queens3d-4", "no-solution", {}, None)
+    assert (seven["team"], seven["verdict"], seven["cost"], seven["verified"]) == ("queens3d-7", "solution", 0, True)
+    assert len(seven["assignment"]) == 49
+    assert sum(seven["metrics"]["messages_by_type"].values()) == seven["metrics"]["messages"]
+
+
+@pytest.mark.parametrize(
+    ("words", "verdict", "placed_by"),
+    [
+        (["--withdraw"], "optimal", "sfb"),
+        (["--withdraw", "fewest"], "optimal", "sfb"),
+        (["--withdraw", "maximal"], "solution", "first-fit"),
+        (["--withdraw=maximal"], "solution", "first-fit"),
+    ],
+)
+def test_withdraw_may_stand_alone_even_before_the_path(
+    four: Path, words: list[str], verdict: str, placed_by: str
+) -> None:
+    done = robochoc("solve", *words, four, "--json", "--runtime", "simulator")
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert (result["verdict"], result["verified"]) == (verdict, True)
+    assert (result["protocol"], result["placed_by"]) == ("abt", placed_by)
+    assert len(result["withdrawn"]) == {"optimal": 6, "solution": 7}[verdict]
+    assert len(result["assignment"]) == 16 - len(result["withdrawn"])
+
+
+def test_solve_tells_people_what_happened(four: Path) -> None:
+    words = robochoc("solve", four, "--withdraw", "--runtime", "simulator").stdout
+    assert "no solution for the whole team (Robot" in words
+    assert "has ruled everything out" in words
+    assert "as few as possible (proven) step aside" in words
+    assert "10 fly, 6 step aside" in words
+    assert "abt, then sfb, simulator, seed 0: " in words
+    assert re.search(r"row\\column +1 +2 +3 +4", words)
+
+
+def test_a_seed_repeats_a_run(four: Path) -> None:
+    first, again, other = (
+        json.loads(robochoc("solve", four, "--json", "--runtime", "simulator", "--seed", seed).stdout)
+        for seed in (1, 1, 2)
+    )
+    for result in (first, again, other):
+        del result["metrics"]["wall_s"]
+    assert first == again
+    assert first["metrics"] != other["metrics"]
+
+
+@pytest.mark.parametrize("runtime", ["processes", "simulator"])
+def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
+    write_team(queens3d(9), tmp_path / "nine")
+    done = robochoc("solve", tmp_path / "nine", "--timeout", "0.3", "--json", "--runtime", runtime)
+    assert done.returncode == 3
+    assert json.loads(done.stdout)["verdict"] == "unknown"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--protocol", "abtt"], "did you mean 'abt'"),
+        (["--runtime", "threads"], "threads"),
+        (["--seed", "-1"], "--seed"),
+        (["--timeout", "0"], "--timeout"),
+        (["--withdraw=most"], "fewest"),
+        (["--set", "cycles"], "NAME=VALUE"),
+        (["--set", "cycles=5"], "no setting"),
+        (["--protocol", "dsa", "--set", "cycles=0"], "cycles"),
+        (["--protocol", "dsa", "--set", "cycles=many"], "cycles"),
+        (["--protocol", "dsa", "--set", "circles=5"], "cycles"),
+        (["--protocol", "dsa", "--withdraw"], "proves nothing"),
+        (["--protocol", "central", "--set", "cycles=5"], "--set"),
+        (["--explain", "--json"], "--explain"),
+        (["--nonsense"], "--nonsense"),
+        (["--timeout", "nan"], "--timeout"),
+        (["--html", ""], "--html"),
+        (["--html", "x", "--journal", "./x"], "are one place"),
+        ([""], "empty"),
+        (["--delay", "3"], "--runtime simulator"),
+        (["--schedule", "random"], "--runtime simulator"),
+        (["--runtime", "simulator", "--schedule", "random", "--delay", "3"], "--schedule concurrent"),
+    ],
+)
+def test_wrong_usage_is_status_2(four: Path, words: list[str], said: str) -> None:
+    done = robochoc_within("solve", four, *words)
+    assert done.returncode == 2
+    assert said in done.stderr
+
+
+def test_a_command_that_there_is_not_is_status_2() -> None:
+    for word, said in (
+        ("sovle", "No such command 'sovle'. Did you mean 'solve'?"),
+        ("xyzzy", "No such command 'xyzzy'."),
+    ):
+        done = robochoc(word)
+        assert (done.returncode, done.stderr.splitlines()[-1]) == (2, f"Error: {said}")
+
+
+def test_one_file_cannot_hold_several_teams(tmp_path: Path) -> None:
+    done = robochoc("solve", "instances/", "--html", tmp_path / "page.html", folder=ROOT)
+    assert done.returncode == 2
+    assert "2 were found" in done.stderr
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_what_this_version_cannot_solve_is_said_in_one_sentence(tmp_path: Path) -> None:
+    differ = Relation("R", 2, Semantics.CONFLICTS, ((1, 1),))
+    part = Constraint("C", differ, ("A", "B"), ("A", "B"), model=Model.PKC)
+    write_team(team_of({"A": (1, 2), "B": (1, 2)}, [part]), tmp_path / "private")
+    done = robochoc("solve", tmp_path / "private", "--withdraw")
+    assert done.returncode == 2
+    assert "PKC" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_complex_robots_are_solved_alike_by_abt_and_the_judge() -> None:
+    for words in ([], ["--runtime", "simulator"], ["--protocol", "central"]):
+        done = robochoc("solve", ROOT / "tests" / "data" / "complex", "--json", *words)
+        result = json.loads(done.stdout)
+        assert (result["verdict"], result["verified"], result["cost"]) == ("solution", True, 0), done.stderr
+        assert len(result["assignment"]) == 5
+
+
+def test_the_example_of_the_documentation_is_solved(tmp_path: Path) -> None:
+    done = robochoc("solve", ROOT / "docs" / "examples" / "scouts", "--html", tmp_path / "page.html")
+    assert done.returncode == 0
+    assert "Relay: V2 = 3" in done.stdout
+    assert (ROOT / "docs" / "examples" / "scouts" / "Relay.xml").read_text() in (ROOT / "README.md").read_text()
+
+
+def test_the_jchoc_originals_get_a_verdict_distributed_and_central() -> None:
+    originals = ROOT.parent / "shared" / "data" / "jchoc"
+    if not originals.is_dir():
+        pytest.skip("the original files are not part of this repository")
+    assert "3 robots, 12 variables" in robochoc("validate", originals).stdout
+    assert not any(solutions_of_robot(robot) for robot in read_team(originals).robots)
+    for words in (["--runtime", "simulator"], ["--protocol", "central"]):
+        result = json.loads(robochoc("solve", originals, "--json", *words).stdout)
+        assert result["verdict"] == "no-solution", words
+    assert "A1 alone has none" in robochoc("solve", originals).stdout
+
+
+def solutions_of_robot(robot: Robot) -> bool:
+    names = [variable.name for variable in robot.variables]
+    every = itertools.product(*(variable.domain for variable in robot.variables))
+    locals_ = (dict(zip(names, values, strict=True)) for values in every)
+    return any(all(constraint.allows(local) for constraint in robot.private) for local in locals_)
+
+
+def test_progress_is_shown_on_a_terminal_only(tmp_path: Path) -> None:
+    write_team(queens3d(8), tmp_path / "eight")
+    words = ("solve", tmp_path / "eight", "--runtime", "simulator", "--timeout", "1.5")
+    assert robochoc(*words).stderr == ""
+    shown = on_a_terminal(*words)
+    assert re.search(rb"eight: [0-9,]+ messages", shown)
+
+
+# the whole
+
+
+def test_every_command_has_help_and_is_in_the_readme() -> None:
+    readme = (ROOT / "README.md").read_text()
+    for name in COMMANDS:
+        command = cli.get_command(Context(cli), name)
+        assert command
+        assert command.help, name
+        assert f"robochoc {name}" in readme, name
+    assert robochoc("--help").returncode == 0
+
+
+def test_the_help_of_commands_imports_nothing_heavy() -> None:
+    code = (
+        "import sys; from click import Context; from robochoc.cli.group import COMMANDS, cli\n"
+        "for name in COMMANDS: cli.get_command(Context(cli), name).get_help(Context(cli))\n"
+        "print(*sys.modules)"
+    )
+    modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert {f"robochoc.cli.{name}" for name in COMMANDS} <= {*modules}
+    heavy = {"numpy", "meshcat", "lxml", "rich", "msgspec", "multiprocessing", "tornado", "pycsp3", "zenoh"}
+    assert not heavy & set(modules)

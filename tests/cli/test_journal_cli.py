@@ -1,0 +1,324 @@
+"""`robochoc journal`: what it says, and exports that others can read."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import json
+import re
+import shlex
+import zlib
+from pathlib import Path
+
+import pytest
+import sexpdata
+from click.testing import CliRunner, Result
+
+from robochoc.cli.group import cli
+from robochoc.cli.reports.failures import INVALID, USAGE
+from robochoc.journal.events import AnyEvent, Began, Decided, Received, Sent, Settled
+from robochoc.journal.journal import Header, Journal, Recorder, read_journal
+from robochoc.sniffer.acl import parse
+from robochoc.sniffer.columns import NOT_YET
+from robochoc.sniffer.export import MOST_ARROWS, drawable, mermaid
+from robochoc.sniffer.feed import Feed
+from robochoc.sniffer.patterns import matching, patterns_in
+from robochoc.sniffer.trace import Trace
+from tests.support.recorded import recorded
+
+NAME = "R;#1\nend"
+
+
+def content_of(journal: Journal) -> bytes:
+    recorder = Recorder(journal.header)
+    for event in journal.events:
+        recorder(event)
+    recorder.outcome = journal.outcome
+    return recorder.content()
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "a.journal"
+    path.write_bytes(content_of(recorded("abt")))
+    return path
+
+
+def journal(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(cli, ["journal", *map(str, arguments)])
+
+
+def exported(file: Path, *arguments: str) -> str:
+    result = journal("export", file, "--format", *arguments)
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def trace_of(file: Path) -> Trace:
+    return Trace.of(read_journal(file.read_bytes()))
+
+
+def test_show_says_what_is_in_it(file: Path) -> None:
+    trace = trace_of(file)
+    lines = journal("show", file).stdout.splitlines()
+    assert lines[0] == "team       queens3d-3"
+    assert lines[1] == "protocol   abt (simulator, seed 0)"
+    assert f"messages   {len(trace.messages.t):,}, {sum(trace.messages.bytes):,} bytes" in lines
+    assert any(line.strip().startswith("Ok ") for line in lines)
+    assert lines[-2:] == ["replay     possible", "whole      yes"]
+
+
+def test_show_tells_of_an_end_that_is_missing_and_keeps_names_on_their_lines(tmp_path: Path) -> None:
+    recorder = Recorder(Header(team="x\n\x1b[2Jy", protocol="abt", runtime="network", seed=1, order=("a", "b")))
+    recorder(Settled(t=0, robot="a\nb", clock=0, checks=0))
+    path = tmp_path / "broken.journal"
+    path.write_bytes(recorder.content())
+    shown = journal("show", path).stdout
+    assert r"x\n\x1b[2Jy" in shown
+    assert r"1: a\nb" in shown
+    assert "order listed" in shown
+    assert "The run broke off before an outcome." in shown
+    assert "not possible: the journal does not say what the robots were given" in shown
+
+
+def test_a_table_comes_back_as_the_trace(file: Path) -> None:
+    trace, feed = trace_of(file), Feed(trace_of(file))
+    of, steps = trace.messages, trace.steps
+    rows = list(csv.DictReader(io.StringIO(exported(file, "csv"), newline="")))
+    assert len(rows) == len(of.t)
+    for message, row in enumerate(rows):
+        taken = of.taken[message]
+        seen = taken != NOT_YET
+        assert row == {
+            "message": str(message),
+            "run": str(of.run[message] + 1),
+            "step": str(of.step[message]),
+            "sent_at": repr(of.t[message]),
+            "taken_at": repr(steps.t[taken]) if seen else "",
+            "taken_in_step": str(taken) if seen else "",
+            "sender": trace.robots[of.sender[message]],
+            "receiver": trace.robots[of.receiver[message]],
+            "type": trace.kinds[of.kind[message]],
+            "performative": {"Ok": "inform", "Nogood": "disconfirm", "AddLink": "subscribe"}[row["type"]],
+            "bytes": str(of.bytes[message]),
+            "clock": str(int(of.clock[message])),
+            "taken_clock": str(int(steps.clock[taken])) if seen else "",
+            "causes": " ".join(map(str, trace.causes(message))),
+            "words": feed.words(message),
+            "content": row["content"],
+        }
+        assert json.loads(row["content"]) == trace.content(message)
+
+
+def test_acl_texts_are_messages_of_fipa(file: Path) -> None:
+    trace = trace_of(file)
+    lines = exported(file, "acl").splitlines()
+    assert len(lines) == len(trace.messages.t)
+    for message, line in enumerate(lines):
+        acl = parse(line)
+        read = sexpdata.loads(line)
+        assert str(read[0]) == acl.performative.upper()
+        keys = [str(key)[1:] for key in read[1::2]]
+        values = dict(zip(keys, read[2::2], strict=True))
+        kind, fields = json.loads(values["content"])
+        assert acl.content == values["content"]
+        assert (kind, fields) == (trace.kinds[trace.messages.kind[message]], trace.content(message))
+        assert str(values["sender"][2]) == f"{trace.robots[trace.messages.sender[message]]}@localhost/robochoc"
+
+
+def test_lines_are_the_journal_again(file: Path) -> None:
+    before = read_journal(file.read_bytes())
+    assert read_journal(exported(file, "jsonl").encode()) == before
+
+
+def test_a_part_of_a_journal_is_a_journal_with_those_messages(file: Path) -> None:
+    chosen = ("--robots", "Robot1.*,Robot2.1", "--types", "Ok,Nog*")
+    part = read_journal(exported(file, "jsonl", *chosen).encode())
+    whole = read_journal(file.read_bytes())
+    meant = {"Robot1.1", "Robot1.2", "Robot1.3", "Robot2.1"}
+    assert [event for event in part.events if isinstance(event, Sent)] == [
+        event
+        for event in whole.events
+        if isinstance(event, Sent) and {event.sender, event.receiver} <= meant and event.type != "AddLink"
+    ]
+    assert [event for event in part.events if isinstance(event, Received)] == [
+        event
+        for event in whole.events
+        if isinstance(event, Received) and {event.sender, event.receiver} <= meant and event.type != "AddLink"
+    ]
+    others = [event for event in part.events if not isinstance(event, Sent | Received)]
+    assert others == [event for event in whole.events if not isinstance(event, Sent | Received)]
+    assert Trace.of(part).unseen == 0
+
+
+def test_numbers_and_conversations_are_chosen(file: Path) -> None:
+    rows = list(csv.DictReader(io.StringIO(exported(file, "csv", "--from", "5", "--to", "7", "--conversation", "1"))))
+    assert [row["message"] for row in rows] == ["5", "6", "7"]
+
+
+ARROW = re.compile(r"    R(\d+)(->>|-x)R(\d+): (\d+) (\w+)")
+NOTE = re.compile(r"    Note over R(\d+): (.+)")
+PARTICIPANT = re.compile(r"    participant R(\d+) as (.+)")
+
+
+def test_a_diagram_has_the_messages_and_decisions_in_their_order(file: Path) -> None:
+    trace, of = trace_of(file), trace_of(file).messages
+    lines = exported(file, "mermaid", "--to", "60").splitlines()
+    assert lines[0] == "sequenceDiagram"
+    named = [match.groups() for line in lines if (match := PARTICIPANT.fullmatch(line))]
+    assert all(trace.robots[int(number)] == name for number, name in named)
+    arrows = [match.groups() for line in lines if (match := ARROW.fullmatch(line))]
+    assert [(int(a), sign, int(b), int(number), kind) for a, sign, b, number, kind in arrows] == [
+        (
+            of.sender[one],
+            "-x" if of.taken[one] == NOT_YET else "->>",
+            of.receiver[one],
+            one,
+            trace.kinds[of.kind[one]],
+        )
+        for one in range(61)
+    ]
+    notes = [match.groups() for line in lines if (match := NOTE.fullmatch(line))]
+    last = of.step[60]
+    assert notes == [
+        (str(trace.steps.robot[step]), ", ".join(f"{name} = {value}" for name, value in taken.items()) or "no value")
+        for step, taken in trace.decisions
+        if step <= last and trace.steps.robot[step] in {int(number) for number, _ in named}
+    ]
+    assert len(lines) == 1 + len(named) + len(arrows) + len(notes)
+
+
+def test_names_mean_nothing_to_mermaid() -> None:
+    events: list[AnyEvent] = [
+        Began(t=0, protocol="ABT"),
+        Decided(t=0, robot=NAME, assignment={"a:b": 1}, clock=0),
+        Sent(t=0, sender=NAME, receiver="%%{init}%%", type="Ok->>R1: x", content={}, bytes=1, clock=0),
+        Settled(t=0, robot=NAME, clock=0, checks=0),
+    ]
+    journal = Journal(Header(team="", protocol="abt", runtime="", seed=0), tuple(events), None)
+    diagram = mermaid(Feed(Trace.of(journal)), [0]).decode()
+    assert diagram.splitlines() == [
+        "sequenceDiagram",
+        "    participant R0 as R#59;#35;1#65533;end",
+        "    participant R1 as #37;#37;#123;init#125;#37;#37;",
+        "    Note over R0: a#58;b = 1",
+        "    R0-xR1: 0 Ok-#62;#62;R1#58; x",
+    ]
+
+
+def test_a_diagram_that_nobody_could_read_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "long.journal"
+    path.write_bytes(content_of(recorded("mgm")))
+    result = journal("export", path, "--format", "mermaid")
+    assert result.exit_code == USAGE
+    assert f"at most {MOST_ARROWS} (choose some, by --robots" in result.output
+
+
+@pytest.mark.parametrize("chosen", [(), ("--types", "*", "--from", "7", "--conversation", "1")])
+def test_with_the_refusal_comes_a_command_that_works(chosen: tuple[str, ...], tmp_path: Path) -> None:
+    path, output = tmp_path / "a long one.journal", tmp_path / "of it.mmd"
+    path.write_bytes(content_of(recorded("mgm")))
+    result = journal("export", path, "--format", "mermaid", "-o", output, *chosen)
+    assert result.exit_code == USAGE
+    command = shlex.split(result.output.strip().rsplit("; the first of them: ", 1)[1])
+    assert command[0] == "robochoc"
+    again = CliRunner().invoke(cli, command[1:])
+    assert again.exit_code == 0, again.output
+    arrows = [match for line in output.read_text().splitlines() if (match := ARROW.fullmatch(line))]
+    assert len(arrows) == MOST_ARROWS
+    assert arrows[0][4] == ("7" if chosen else "0")
+
+
+def test_a_diagram_of_long_names_is_cut_until_it_can_be_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    feed = Feed(Trace.of(recorded("mgm")))
+    monkeypatch.setattr("robochoc.sniffer.export.MOST_CHARACTERS", 3_000)
+    part = drawable(feed, range(len(feed.trace.messages.t)))
+    assert 20 < len(part) <= MOST_ARROWS / 4
+    assert part[0] == 0
+    assert mermaid(feed, part)
+
+
+def test_a_page_holds_everything(file: Path, tmp_path: Path) -> None:
+    output = tmp_path / "page.html"
+    result = journal("export", file, "--format", "html", "-o", output)
+    assert result.exit_code == 0, result.output
+    page = output.read_text()
+    trace = trace_of(file)
+    assert f"{len(trace.messages.t):,} messages, {output.stat().st_size:,} bytes" in result.output
+    assert 'id="feed:about"' in page
+    assert 'id="feed:columns"' in page
+    assert 'id="feed:details:0"' in page
+
+
+def test_a_page_holds_the_whole_run_and_shows_some_robots_at_first(file: Path) -> None:
+    page = exported(file, "html", "--robots", "Robot1.*")
+    about = re.search(r'id="feed:about"[^>]*>([^<]*)<', page)
+    assert about is not None
+    told = json.loads(zlib.decompress(base64.b64decode(about[1])))
+    assert (told["messages"], told["chosen"]) == (len(trace_of(file).messages.t), ["Robot1.*"])
+    refused = journal("export", file, "--format", "html", "--types", "Nogood")
+    assert refused.exit_code == USAGE
+    assert "a page holds the whole run; choose in it" in refused.output
+
+
+def test_a_page_that_no_browser_could_open_is_refused(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.cli.commands.journal.MOST_IN_PAGE", 10)
+    result = journal("export", file, "--format", "html")
+    assert result.exit_code == USAGE
+    assert "too many for one page: at most 10 (look at them" in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--types", "Okay"), "no type of message is called 'Okay'; there are AddLink, Nogood, Ok"),
+        (("--robots", "Robot1.1,X*"), "no robot is called 'X*'; there are Robot1.1, "),
+        (("--conversation", "2"), "there is no conversation 2, only 1 to 1"),
+        (("--from", "-1"), "-1 is not in the range x>=0"),
+        (("--from", "5", "--to", "3"), "there is no message from 5 to 3, only 0 to "),
+        (("--from", "999999"), "there is no message from 999999 on, only 0 to "),
+    ],
+)
+def test_a_choice_that_fits_nothing_is_told(file: Path, arguments: tuple[str, ...], words: str) -> None:
+    result = journal("export", file, "--format", "csv", *arguments)
+    assert result.exit_code == USAGE
+    assert words in result.output
+
+
+def test_an_export_that_finds_no_room_says_which(file: Path) -> None:
+    result = journal("export", file, "--format", "csv", "-o", "/dev/full")
+    assert result.exit_code == INVALID
+    assert result.output.startswith("/dev/full: the export cannot be written: No space left on device (")
+
+
+def test_a_journal_that_is_not_whole_is_exported_and_that_is_told(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    trace = trace_of(file)
+    trace.damage = "block 3 is broken"
+    monkeypatch.setattr(Trace, "of", lambda _: trace)
+    result = journal("export", file, "--format", "csv")
+    assert result.exit_code == 0
+    assert result.stderr == f"{file}: it is not whole, this is what can be read: block 3 is broken\n"
+    assert len(result.stdout.splitlines()) == 1 + len(trace.messages.t)
+    assert journal("show", file).stdout.splitlines()[-1] == "whole      no: block 3 is broken"
+
+
+def test_what_is_no_journal_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "no.journal"
+    for content in (b"", b"hello", b"\x00" * 100):
+        path.write_bytes(content)
+        for command in (("show", path), ("export", path, "--format", "csv")):
+            result = journal(*command)
+            assert result.exit_code == INVALID
+            assert "give what 'robochoc solve --journal' wrote" in result.output
+    assert journal("show", tmp_path / "none").exit_code == INVALID
+
+
+def test_patterns_are_like_those_of_jade() -> None:
+    names = ["Robot1.1", "Robot1.2", "Robot12.1", "df", "a*b"]
+    assert matching(names, patterns_in("Robot1.*, df")) == ["Robot1.1", "Robot1.2", "df"]
+    assert matching(names, ("Robot1?.?",)) == ["Robot12.1"]
+    assert matching(names, ("Robot?.?",)) == ["Robot1.1", "Robot1.2"]
+    assert matching(names, ("*",)) == names
+    assert matching(names, ("robot*", "")) == []
+    assert matching(["a" * 60], (("a*" * 20) + "b",)) == []

@@ -1,0 +1,279 @@
+"""A user's own protocol (docs/write-a-protocol.md): installed as a user does, found, run, tested; what may go wrong.
+
+Packages go into folders of their own, which stand on PYTHONPATH: nothing is downloaded, and neither the repository nor
+the environment changes.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import Traits
+from robochoc.run.registry import UnknownProtocol, protocol_named, protocol_names
+from robochoc.solver.agent_problem import parts
+from robochoc.solver.compiled import LocalProblem
+from tests.support import golden
+from tests.support.problems import team_of
+from tests.support.program import ROOT
+
+EXAMPLE = ROOT / "docs" / "examples" / "breakout"
+GUIDE = (ROOT / "docs" / "write-a-protocol.md").read_text()
+BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", GUIDE, re.MULTILINE | re.DOTALL)
+COMMANDS = [place for place, (kind, _) in enumerate(BLOCKS) if kind == "sh"]
+INSTALL = "pip install docs/examples/breakout"
+SUFFIXES = {"python": ".py", "toml": ".toml"}
+PATIENCE_S = 250
+"""The conformance suite takes half a minute, and more on a machine that is busy."""
+SCOUTS = str(ROOT / "docs" / "examples" / "scouts")
+
+
+def environment(*packages: Path, **more: str) -> dict[str, str]:
+    """The shell's, with this Python's programs and `packages` to be found first."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
+    found = [str(folder) for folder in packages]
+    return {
+        **kept,
+        "PATH": os.pathsep.join([str(Path(sys.executable).parent), kept["PATH"]]),
+        "PYTHONPATH": os.pathsep.join([*found, *filter(None, [kept.get("PYTHONPATH")])]),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "PYTEST_ADDOPTS": "-p no:cacheprovider",
+        **more,
+    }
+
+
+def run(command: str, environ: Mapping[str, str]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        ["sh", "-c", command], cwd=ROOT, env=environ, capture_output=True, text=True, timeout=PATIENCE_S, check=False
+    )
+
+
+def files() -> set[Path]:
+    return {path for path in EXAMPLE.rglob("*") if "__pycache__" not in path.parts}
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The environment in which the guide's package is installed, by the guide's own command."""
+    target = tmp_path_factory.mktemp("packages")
+    # What pip is not told on its command line it reads from its environment; "0" means without isolation.
+    offline = {"PIP_TARGET": str(target), "PIP_NO_DEPS": "1", "PIP_NO_INDEX": "1", "PIP_NO_BUILD_ISOLATION": "0"}
+    before = files()
+    done = run(INSTALL, environment(**offline))
+    assert done.returncode == 0, done.stderr
+    assert files() == before
+    return environment(target, HYPOTHESIS_STORAGE_DIRECTORY=str(target / "hypothesis"))
+
+
+# The guide
+
+
+@pytest.mark.timeout(PATIENCE_S)
+@pytest.mark.parametrize("place", COMMANDS, ids=lambda place: BLOCKS[place][1].splitlines()[0])
+def test_the_guides_commands_do_what_it_says(place: int, installed: dict[str, str]) -> None:
+    """Each line ends with status 0, unless it says otherwise; a text after the commands is what they print."""
+    printed = ""
+    for line in BLOCKS[place][1].splitlines():
+        if line == INSTALL:
+            continue
+        done = run(line, installed)
+        said = re.search(r"# exit status (\d)$", line)
+        assert done.returncode == int(said[1] if said else 0), done.stdout + done.stderr
+        printed += done.stdout
+    kind, text = BLOCKS[place + 1] if place + 1 < len(BLOCKS) else ("", "")
+    if kind == "text":
+        assert _without_seconds(printed) == _without_seconds(text)
+
+
+def test_the_guide_installs_and_its_own_tests_and_the_conformance_suite_are_among_its_commands() -> None:
+    said = "".join(BLOCKS[place][1] for place in COMMANDS)
+    assert INSTALL in said
+    assert "pytest docs/examples/breakout" in said
+    assert "pytest tests/test_conformance.py" in said
+
+
+def test_the_guides_code_is_the_examples() -> None:
+    sources = {kind: [path.read_text() for path in EXAMPLE.rglob(f"*{end}")] for kind, end in SUFFIXES.items()}
+    for kind, text in BLOCKS:
+        if kind not in {"sh", "text"}:
+            assert any(text in source for source in sources[kind]), text
+
+
+def test_the_guide_explains_every_trait_and_all_that_a_robot_knows() -> None:
+    problem = LocalProblem(parts(team_of({"A": (1,)}, []))["RA"])
+    assert _explained("trait") == {field.name for field in fields(Traits)}
+    assert _explained("member") == {name for name in dir(problem) if not name.startswith("_")}
+
+
+def test_the_guide_names_what_a_protocol_has() -> None:
+    said = _explained("you write") | _explained("you use")
+    has = {*dir(Protocol), "value", "verdict", "problem", "order", "chance"}
+    assert said == {name for name in has if not name.startswith("_")} - {"messages", "traits", "assignment"}
+
+
+def test_the_guides_links_lead_somewhere() -> None:
+    links = re.findall(r"\]\(([^)]+)\)", GUIDE)
+    assert links
+    assert all((ROOT / "docs" / link).exists() for link in links)
+    assert "docs/write-a-protocol.md" in (ROOT / "README.md").read_text()
+
+
+def _explained(head: str) -> set[str]:
+    """The names in the first column of the table whose first column is headed `head`."""
+    (table,) = re.findall(rf"^\| {head} \|.*\n\|.*\n((?:\|.*\n)+)", GUIDE, re.MULTILINE)
+    return {name for row in table.splitlines() for name in re.findall(r"`(\w+)`", row.split("|")[1])}
+
+
+def _without_seconds(text: str) -> str:
+    return re.sub(r"\d+\.\d+ s\b", "some s", text)
+
+
+# What may go wrong
+
+SILENT = """
+from robochoc.model.message import Message
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import Traits
+
+class Silent(Protocol):
+    messages = Message
+    traits = Traits(complete=False)
+    def start(self):
+        self.value = 0
+    def receive(self, sender, message):
+        pass
+
+class Raises(Silent):
+    def start(self):
+        raise ValueError("out of ideas")
+
+class Odd(Silent):
+    traits = {"complete": False}
+
+class Mute(Protocol):
+    def start(self): pass
+    def receive(self, sender, message): pass
+
+class Half(Protocol):
+    messages = Message
+    def start(self): pass
+"""
+
+
+def package(folder: Path, name: str, offers: Mapping[str, str], code: str = SILENT) -> Path:
+    """A package as an installer leaves it, with one module of its name; `offers` maps protocols to places."""
+    entries = "\n".join(f"{protocol} = {place}" for protocol, place in offers.items())
+    info = folder / f"{name}-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[robochoc.protocols]\n{entries}\n")
+    (folder / f"{name}.py").write_text(code)
+    return folder
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder for packages, in which this process looks too."""
+    monkeypatch.syspath_prepend(tmp_path)
+    modules = set(sys.modules)
+    yield tmp_path
+    for name in set(sys.modules) - modules:
+        del sys.modules[name]
+
+
+def solved(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    return run(f"robochoc solve {SCOUTS} {' '.join(words)}", environment(folder))
+
+
+@pytest.mark.parametrize(
+    ("place", "why"),
+    [
+        ("nowhere:Mine", "cannot be imported: ModuleNotFoundError: No module named 'nowhere'"),
+        ("mine:Nobody", "cannot be imported: AttributeError: module 'mine' has no attribute 'Nobody'"),
+        ("mine:Message", "is no subclass of Protocol"),
+        ("mine:Half", "does not define receive"),
+        ("mine:Mute", "does not declare its messages"),
+        ("mine:Odd", "declares traits that are no Traits"),
+    ],
+)
+def test_what_cannot_be_used_is_said(place: str, why: str, here: Path) -> None:
+    package(here, "mine", {"own": place})
+    with pytest.raises(UnknownProtocol, match=re.escape(f"{place}, installed as protocol 'own', {why}")):
+        protocol_named("own")
+
+
+@pytest.mark.parametrize(
+    "code", ["import nothing_of_the_kind", "def (", "raise RuntimeError('no')", "raise SystemExit"]
+)
+def test_a_module_that_cannot_be_imported_is_said_in_one_line(code: str, tmp_path: Path) -> None:
+    """And other protocols are not concerned."""
+    package(tmp_path, "mine", {"own": "mine:Silent"}, code)
+    done = solved(tmp_path, "--protocol own")
+    assert done.returncode == 2
+    assert f"{SCOUTS}: mine:Silent, installed as protocol 'own', cannot be imported: " in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert solved(tmp_path).returncode == 0
+
+
+def test_a_name_that_two_packages_offer_is_refused(here: Path) -> None:
+    package(here, "mine", {"own": "mine:Silent", "abt": "mine:Silent"})
+    package(here, "yours", {"own": "yours:Silent"})
+    with pytest.raises(
+        UnknownProtocol, match=r"'own', is offered by several .* only one may: mine:Silent \(mine\) and yours:"
+    ):
+        protocol_named("own")
+    assert list(protocol_names()).count("own") == 1
+    done = solved(here, "--protocol abt")
+    assert done.returncode == 2
+    assert "installed as protocol 'abt', is offered by several packages" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_package_that_comes_and_goes_meanwhile_is_there_and_gone(here: Path) -> None:
+    before = protocol_names()
+    package(here, "mine", {"own": "mine:Silent"})
+    assert {*protocol_names()} == {*before, "own"}
+    shutil.rmtree(here / "mine-1.0.dist-info")
+    assert protocol_names() == before
+
+
+def test_a_package_on_the_path_twice_is_one_package(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As when a folder that is being worked on stands before what is installed."""
+    for folder in ("first", "second"):
+        monkeypatch.syspath_prepend(package(here / folder, "mine", {"own": "mine:Silent"}))
+    assert protocol_named("own").__name__ == "Silent"
+
+
+def test_what_is_installed_beside_ours_is_tested_but_has_no_golden_journals(here: Path) -> None:
+    ours = golden.files()
+    package(here, "mine", {"own": "mine:Silent"})
+    golden.files.cache_clear()
+    assert "own" in protocol_names()
+    assert golden.files() == ours
+
+
+@pytest.mark.parametrize("runtime", ["processes", "simulator"])
+def test_a_wrong_solution_is_refuted(runtime: str, tmp_path: Path) -> None:
+    package(tmp_path, "mine", {"own": "mine:Silent"})
+    done = solved(tmp_path, "--protocol own --runtime", runtime)
+    assert done.returncode == 4
+    assert "the checker refutes the answer for scouts" in done.stderr
+
+
+def test_an_exception_is_told_with_its_place(tmp_path: Path) -> None:
+    package(tmp_path, "mine", {"own": "mine:Raises"})
+    done = solved(tmp_path, "--protocol own")
+    assert done.returncode == 4
+    assert re.search(r"was lost: ValueError: out of ideas \(.*mine\.py:\d+\)", done.stderr)
+    done = solved(tmp_path, "--protocol own --runtime simulator")
+    assert "Traceback" in done.stderr
+    assert "ValueError: out of ideas" in done.stderr

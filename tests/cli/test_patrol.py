@@ -1,0 +1,32 @@
+"""The example with costs: what the README says of it."""
+
+from __future__ import annotations
+
+import pytest
+
+from robochoc.formats import read_team
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Kind
+from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run.registry import protocol_named, protocol_names
+from tests.support.cost_problems import least_cost
+from tests.support.program import ROOT
+
+PATROL = ROOT / "docs" / "examples" / "patrol"
+MINIMISING = [name for name in protocol_names() if protocol_named(name).traits.costs]
+BEST = {"lead": 3, "north": 2, "south": 1, "west": 2}
+
+
+def test_the_example_has_soft_and_hard_constraints() -> None:
+    team = read_team(PATROL)
+    assert team.kind is Kind.DISWCSP
+    assert least_cost(team) == 6
+
+
+@pytest.mark.parametrize("protocol", MINIMISING)
+def test_every_protocol_that_minimises_comes_to_the_readmes_answer(protocol: str) -> None:
+    outcome = solve(read_team(PATROL), Options(protocol=protocol, runtime=Runtime.SIMULATOR))
+    complete = protocol_named(protocol).traits.complete
+    assert outcome.verdict is (Verdict.OPTIMAL if complete else Verdict.SOLUTION)
+    assert (outcome.assignment, outcome.cost) == (BEST, 6) or not complete
+    assert outcome.verified

@@ -1,0 +1,203 @@
+"""`robochoc protocols`: what there is to solve with, also when a package that offers a protocol is broken."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+from click.testing import CliRunner, Result
+
+from robochoc import __version__
+from robochoc.cli.group import cli
+from robochoc.cli.reports.protocols import print_table, rows
+from robochoc.protocols import abt
+from robochoc.run.registry import UnknownProtocol, offer_named, offers, protocol_named, protocol_names
+from tests.support.program import robochoc
+
+WITHOUT_DOCSTRING = """
+    from robochoc.protocols.first_fit import FirstFit, Placed
+    from robochoc.protocols.protocol import DynamicProtocol
+    from robochoc.protocols.traits import Traits
+
+    class Other(FirstFit, DynamicProtocol):
+        messages = Placed
+        traits = Traits(
+            paper="[bold]Nobody[/bold] 1999\\n", complete=False, synchronous=True, costs=True, n_ary=False,
+            partially_known=True, dynamic=True, privacy="decisions",
+        )
+
+        def change(self, problem, order, void): ...
+
+        def resume(self, *, quiet): ...
+
+    class Static(FirstFit):
+        traits = Traits(dynamic=True)
+
+    class Odd(FirstFit):
+        traits = "none"
+
+    NUMBER = 3
+"""
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A package beside ours, which offers what it should not."""
+    (tmp_path / "others.py").write_text(dedent(WITHOUT_DOCSTRING))
+    (tmp_path / "leaving.py").write_text("raise SystemExit(3)\n")
+    (tmp_path / "garbled.py").write_text("def (:\n")
+    about = tmp_path / "others_protocols-1.2.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: others-protocols\nVersion: 1.2\n")
+    places = {
+        "zz-other": "others:Other",
+        "zz-odd": "others:Odd",
+        "zz-static": "others:Static",
+        "zz-number": "others:NUMBER",
+        "zz-gone": "no_such_module:Gone",
+        "zz-without": "others:Without",
+        "zz-leaving": "leaving:Leaving",
+        "zz-garbled": "garbled:Garbled",
+    }
+    lines = [f"{name} = {place}" for name, place in places.items()]
+    (about / "entry_points.txt").write_text("\n".join(["[robochoc.protocols]", *lines]))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return about
+
+
+def run(*words: str) -> Result:
+    return CliRunner().invoke(cli, ["protocols", *words])
+
+
+def objects(result: Result) -> dict[str, dict[str, object]]:
+    return {one["name"]: one for one in map(json.loads, result.stdout.splitlines())}
+
+
+def row(table: str, name: str) -> str:
+    (found,) = (line for line in table.splitlines() if line.split()[:1] == [name])
+    return found
+
+
+def test_the_table_has_a_line_for_each_protocol_and_the_judge() -> None:
+    done = robochoc("protocols")
+    assert done.returncode == 0
+    assert done.stderr == ""
+    heading, *lines = done.stdout.splitlines()
+    assert heading.split() == ["name", "for", "complete", "synchronous", "constraints", "dynamic", "paper", "privacy"]
+    assert {*protocol_names(), "central"} <= {line.split()[0] for line in lines}
+    assert row(done.stdout, "abt").split()[1:7] == ["satisfaction", "yes", "no", "n-ary,", "PKC", "no"]
+    assert abt.ABT.traits.paper in row(done.stdout, "abt")
+    assert abt.ABT.traits.privacy in row(done.stdout, "abt")
+    assert "no protocol" in row(done.stdout, "central")
+    assert "n-ary, PKC" in row(done.stdout, "central")
+    assert "\x1b" not in done.stdout
+
+
+@pytest.mark.usefixtures("package")
+def test_other_packages_protocols_are_listed_beside_ours() -> None:
+    told = row(run().stdout, "zz-other")
+    assert told.split()[1:7] == ["optimisation", "no", "yes", "binary,", "PKC", "yes"]
+    assert r"[bold]Nobody[/bold] 1999\n" in told
+    assert "decisions" in told
+
+
+@pytest.mark.usefixtures("package")
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("zz-gone", "no_such_module:Gone (package others-protocols 1.2) cannot be imported: ModuleNotFoundError"),
+        ("zz-without", "others:Without (package others-protocols 1.2) cannot be imported: AttributeError"),
+        ("zz-leaving", "cannot be imported: SystemExit: 3"),
+        ("zz-garbled", "cannot be imported: SyntaxError"),
+        ("zz-number", "is no subclass of Protocol"),
+        ("zz-odd", "traits that are no Traits"),
+        ("zz-static", "is to be dynamic if it is a DynamicProtocol, and only then"),
+    ],
+)
+def test_what_is_broken_is_shown_with_its_reason(name: str, reason: str) -> None:
+    table = run()
+    assert table.exit_code == 0
+    assert f"{name} " in table.stdout
+    assert "broken" in next(line for line in table.stdout.splitlines() if line.split()[:1] == [name])
+    assert reason in next(line for line in table.stdout.splitlines() if line.startswith(f"{name}: "))
+    assert reason.rpartition(")")[2].strip() in str(objects(run("--json"))[name]["broken"])
+    asked = run(name)
+    assert asked.exit_code == 2
+    assert reason in asked.stderr
+    assert len(asked.stderr.splitlines()) == 1
+    with pytest.raises(UnknownProtocol, match=name):
+        protocol_named(name)
+
+
+def test_of_two_with_one_name_none_is_taken(package: Path) -> None:
+    (package / "entry_points.txt").write_text("[robochoc.protocols]\nabt = others:Other\n")
+    first, second = (offer for offer in offers() if offer.name == "abt")
+    assert {first.package, second.package} == {"others-protocols 1.2", f"robochoc {__version__}"}
+    assert first.protocol is second.protocol is offer_named("abt").protocol is None
+    assert "several packages, and only one may" in run().stdout
+    with pytest.raises(UnknownProtocol, match=r"others:Other \(others-protocols\)"):
+        protocol_named("abt")
+
+
+def test_json_is_an_object_a_line() -> None:
+    found = objects(run("--json"))
+    assert found["abt"] == {
+        "name": "abt",
+        "place": "robochoc.protocols.abt:ABT",
+        "package": f"robochoc {__version__}",
+        "distributed": True,
+        **vars(abt.ABT.traits),
+        "concludes": ["no-solution"],
+        "settings": {},
+    }
+    assert found["central"]["distributed"] is False
+    assert "doc" not in found["abt"]
+    (one,) = objects(run("abt", "--json")).values()
+    assert str(one["doc"]).startswith("Asynchronous Backtracking.\n\nYokoo")
+
+
+def test_a_protocol_is_explained_by_its_docstring() -> None:
+    done = run("abt")
+    head, _, doc = done.stdout.partition("\n\n")
+    what, place = head.splitlines()
+    assert what.startswith("abt: satisfaction; complete; robots act at the same time; ")
+    assert place == f"robochoc.protocols.abt:ABT, from the package robochoc {__version__}"
+    assert abt.__doc__ is not None
+    assert doc.splitlines() == abt.__doc__.strip().splitlines()
+    assert "judge" in run("central").stdout
+
+
+@pytest.mark.usefixtures("package")
+def test_a_protocol_without_docstring_says_so() -> None:
+    assert "others:Other, from the package others-protocols 1.2" in run("zz-other").stdout
+    assert "no docstring" in run("zz-other").stdout
+
+
+@pytest.mark.parametrize(("name", "near"), [("abtt", "abt"), ("centrl", "central"), ("ABT ", None)])
+def test_an_unknown_protocol_is_wrong_usage(name: str, near: str | None) -> None:
+    done = robochoc("protocols", name)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert len(done.stderr.splitlines()) == 1
+    if near:
+        assert f"did you mean '{near}'?" in done.stderr
+
+
+def test_solve_points_to_the_list() -> None:
+    assert "robochoc protocols" in " ".join(robochoc("solve", "--help").stdout.split())
+
+
+def test_a_narrow_terminal_is_spared_the_long_columns(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    for columns, wide in ((80, False), (200, True)):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        print_table(rows())
+        table = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out)
+        assert ("Meisels & Zivan 2007" in table) is wide
+        assert all(len(line) <= columns for line in table.splitlines())

@@ -1,0 +1,112 @@
+"""The example of the documentation whose problem changes: the same verdicts, whoever solves it, and what is shown."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from robochoc.formats import read_robot, read_team
+from robochoc.model.change import changed_by
+from robochoc.model.problem import AddAgent, AddConstraint, RemoveAgent, RemoveConstraint, RemoveValue
+from tests.support.entries import entries_of
+from tests.support.program import ROOT, robochoc
+
+RESCUE = ROOT / "docs" / "examples" / "rescue"
+VERDICTS = ["solution", "solution", "solution", "no-solution", "solution"]
+EPOCH_KEYS = {
+    "verdict",
+    "opened_by",
+    "robots",
+    "assignment",
+    "cost",
+    "messages",
+    "bytes",
+    "ncccs",
+    "checks",
+    "wall_s",
+    "verified",
+}
+METRICS = ("messages", "bytes", "ncccs", "checks")
+
+
+def test_the_story() -> None:
+    team = read_team(RESCUE)
+    kinds = [[type(change) for change in event.changes] for event in team.scenario]
+    assert kinds == [[RemoveAgent], [AddAgent], [RemoveValue, RemoveValue], [RemoveConstraint, AddConstraint]]
+    assert "East" in team
+    assert "Spare" not in team
+    last = changed_by(team, len(team.scenario))
+    assert last.order == ("Lead", "North", "South", "West", "Medic", "Relay", "Spare")
+    assert last["Spare"] == read_robot(RESCUE / "late" / "Spare.xml")
+
+
+def test_validate_finds_nothing_wrong() -> None:
+    done = robochoc("validate", RESCUE, RESCUE / "late" / "Spare.xml")
+    assert done.returncode == 0
+    assert done.stdout.count(": ok") == 2
+
+
+@pytest.mark.parametrize(
+    "words", [["dynabt"], ["dynabt", "--runtime", "simulator"], ["abt", "--runtime", "simulator"], ["central"]]
+)
+def test_all_come_to_the_same_verdicts(words: list[str]) -> None:
+    done = robochoc("solve", RESCUE, "--json", "--protocol", *words)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    epochs = result["epochs"]
+    assert [epoch["verdict"] for epoch in epochs] == VERDICTS
+    assert (result["verdict"], result["verified"]) == ("solution", True)
+    assert result["assignment"] == epochs[-1]["assignment"]
+    for epoch in epochs:
+        assert epoch.keys() == EPOCH_KEYS
+        solved = epoch["verdict"] == "solution"
+        assert epoch["verified"] is solved
+        assert epoch["assignment"].keys() == {name.lower() for name in epoch["robots"] if solved}
+    for key in METRICS:
+        assert result["metrics"][key] == sum(epoch[key] for epoch in epochs)
+
+
+def test_going_on_costs_less_than_to_begin_anew() -> None:
+    messages = []
+    for protocol in ("dynabt", "abt"):
+        done = robochoc("solve", RESCUE, "--json", "--protocol", protocol, "--runtime", "simulator")
+        messages.append([epoch["messages"] for epoch in json.loads(done.stdout)["epochs"]])
+    went_on, anew = messages
+    assert went_on[0] == anew[0]
+    assert sum(went_on) < sum(anew)
+
+
+def test_the_report_of_the_readme_is_what_is_printed() -> None:
+    done = robochoc("solve", RESCUE, "--protocol", "dynabt", "--runtime", "simulator")
+    *told, cost = done.stdout.splitlines()
+    readme = (ROOT / "README.md").read_text()
+    assert "\n".join(told) in readme
+    assert cost.rpartition(",")[0] in readme, "all but the time"
+
+
+def test_the_scene_shows_the_robots_of_the_last_epoch(tmp_path: Path) -> None:
+    html, journal, result = (tmp_path / name for name in ("page.html", "run.jsonl", "result.json"))
+    words = ("solve", RESCUE, "--protocol", "dynabt", "--json", "--html", html, "--journal", journal)
+    result.write_text(robochoc(*words).stdout)
+    for saved in (journal, result):
+        page = tmp_path / f"{saved.name}.html"
+        assert robochoc("animate", saved, "--team", RESCUE, "-o", page).returncode == 0
+        assert page.read_bytes() == html.read_bytes()
+    began = [event for event in entries_of(journal) if event["event"] == "Began"]
+    assert [event.get("epoch", 0) for event in began] == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["solve", RESCUE, "--withdraw"], "--withdraw is for problems that do not change"),
+        (["solve", RESCUE, "--protocol", "central", "--count"], "--count is for problems that do not change"),
+        (["export", RESCUE, "--format", "xcsp3"], "not its changes"),
+    ],
+)
+def test_what_does_not_go_with_changes_is_said(words: list[object], said: str, tmp_path: Path) -> None:
+    done = robochoc(*map(str, words), folder=tmp_path)
+    assert done.returncode == 2
+    assert said in done.stderr

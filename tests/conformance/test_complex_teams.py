@@ -1,0 +1,155 @@
+"""Complex robots: compiled domains, ABT and the central judge against brute force."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from random import Random
+
+import pytest
+
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.orders import in_order
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Robot, Team
+from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run.registry import protocol_named
+from robochoc.solver import compiled
+from robochoc.solver.ace import AceProcess
+from robochoc.solver.central import Judge
+from robochoc.solver.compile import Compiler
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.domain import CompiledDomain, compiled_domain
+from robochoc.solver.encoding import Codes, Network
+from robochoc.verification.checker import objections
+from tests.conformance.test_conformance import random_schedule
+from tests.support.complex_problems import random_complex_team
+from tests.support.loose_problems import any_order, loosened
+from tests.support.problems import solutions
+
+
+def by_hand(network: Network) -> Iterator[Codes]:
+    """All solutions of a network, by trying everything."""
+    for codes in itertools.product(*network.domains):
+        if all((tuple(codes[p] for p in table.scope) in table.rows) is table.allowed for table in network.tables):
+            yield codes
+
+
+def compiled_by_hand(team: Team) -> CompiledTeam:
+    """`team`, its local problems solved by hand."""
+    return CompiledTeam(team, lambda robot: compiled_domain(robot, by_hand))
+
+
+def local_solutions(robot: Robot) -> Iterator[dict[str, int]]:
+    """All local solutions of a robot, as its file states them."""
+    names = [variable.name for variable in robot.variables]
+    for values in itertools.product(*(variable.domain for variable in robot.variables)):
+        local = dict(zip(names, values, strict=True))
+        if all(constraint.allows(local) for constraint in robot.private):
+            yield local
+
+
+def check_domain(robot: Robot, domain: CompiledDomain) -> None:
+    """`domain` has a group for each way that local solutions look from outside, and counts them right."""
+    every = list(local_solutions(robot))
+    groups = Counter(tuple(local[name] for name in robot.interface) for local in every)
+    assert dict(zip(domain.values, domain.counts, strict=True)) == groups
+    assert domain.total == len(every)
+    assert list(domain.solutions) == sorted(domain.solutions)
+    for value, solution in zip(domain.values, domain.solutions, strict=True):
+        local = dict(zip(domain.variables, solution, strict=True))
+        assert local in every
+        assert tuple(local[name] for name in robot.interface) == value
+
+
+def solved_by_hand(team: Team, chance: Random) -> Verdict:
+    """ABT's verdict on any schedule, its local problems solved by hand; a solution is held against the files."""
+    schedule = RandomChannels(chance.getrandbits(32))
+    result = Simulation(compiled_by_hand(team), protocol_named("abt"), schedule).run(60)
+    if result.verdict is Verdict.SOLUTION:
+        assignment = {name: value for own in result.assignments.values() for name, value in own.items()}
+        assert not list(objections(team, assignment))
+    return result.verdict
+
+
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 8))])
+def test_domains_and_abt_agree_with_brute_force(batch: int) -> None:
+    """Without Java: local problems are solved by hand."""
+    chance = Random(f"complex {batch}")
+    seen = Counter[Verdict]()
+    for _ in range(150):
+        team = random_complex_team(chance)
+        for robot in team.robots:
+            check_domain(robot, compiled_domain(robot, by_hand))
+        team = loosened(team, chance)
+        verdict = solved_by_hand(in_order(team, any_order(team, chance)), chance)
+        assert verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION), team
+        seen[verdict] += 1
+    assert min(seen[Verdict.SOLUTION], seen[Verdict.NO_SOLUTION]) > 20, seen
+
+
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 20))])
+def test_ace_abt_the_judge_and_brute_force_agree(batch: int) -> None:
+    chance = Random(f"judged {batch}")
+    seen = Counter[Verdict]()
+    with AceProcess(always=True) as solver, Compiler(solver=solver) as compiler:
+        for _ in range(100 if batch else 50):
+            team = loosened(random_complex_team(chance), chance)
+            for robot in team.robots:
+                check_domain(robot, compiler.compile(robot).domain)
+            count = sum(1 for _ in solutions(team))
+            expected = Verdict.SOLUTION if count else Verdict.NO_SOLUTION
+            assert Judge(solver=solver).judge(team, count=True).count == count
+            assert solve(team, Options(protocol="central", cache=False), solver=solver).verdict is expected
+            options = replace(random_schedule(chance), cache=False, order=any_order(team, chance))
+            assert solve(team, options, solver=solver).verdict is expected
+            seen[expected] += 1
+    assert min(seen.values()) > (15 if batch else 7), seen
+
+
+def test_processes_agree_with_brute_force() -> None:
+    chance = Random("complex processes")
+    with AceProcess() as solver:
+        for _ in range(8):
+            team = loosened(random_complex_team(chance), chance)
+            outcome = solve(team, Options(timeout=60, cache=False, order=any_order(team, chance)), solver=solver)
+            assert outcome.verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION)
+
+
+def test_withdrawing_leaves_a_placement_that_no_robot_could_join() -> None:
+    chance = Random("complex withdraw")
+    wanted = 15
+    with AceProcess() as solver:
+        while wanted:
+            team = random_complex_team(chance)
+            if any(solutions(team)):
+                continue
+            wanted -= 1
+            options = Options(runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL, cache=False)
+            outcome = solve(team, options, solver=solver)  # its checker tries to let others join
+            assert outcome.withdrawn
+            for name in outcome.withdrawn:
+                assert not any(fits(team, {**outcome.assignment, **own}) for own in local_solutions(team[name]))
+
+
+def fits(team: Team, assignment: dict[str, int]) -> bool:
+    met = (c for c in team.constraints() if all(name in assignment for name in c.variables))
+    return all(constraint.allows(assignment) for constraint in met)
+
+
+def test_many_values_are_looked_up_as_few_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Conflicts of large domains come from numpy tables; the walk over constraints finds and counts the same."""
+    chance = Random("tables")
+    for _ in range(150):
+        team = random_complex_team(chance)
+        by_itself = compiled_by_hand(team)
+        seed = chance.getrandbits(32)
+        results = []
+        for large in (1, 10**9):
+            monkeypatch.setattr(compiled, "LARGE", large)
+            results.append(Simulation(by_itself, protocol_named("abt"), Concurrent(seed, 20)).run(60))
+        walked, tables = (replace(result, metrics=replace(result.metrics, wall_s=0)) for result in results)
+        assert walked == tables

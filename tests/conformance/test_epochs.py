@@ -1,0 +1,203 @@
+"""Problems that change over time: each epoch's verdict against brute force, by every protocol and runtime."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from random import Random
+
+import pytest
+
+from robochoc.journal.journal import Header, Recorder, metrics_of, read_journal
+from robochoc.model.orders import Order
+from robochoc.model.outcome import Metrics, Outcome, Verdict
+from robochoc.model.problem import (
+    AddAgent,
+    AddConstraint,
+    AddValue,
+    Constraint,
+    Domain,
+    Event,
+    Parent,
+    Relation,
+    RemoveAgent,
+    RemoveConstraint,
+    RemoveValue,
+    Robot,
+    Semantics,
+    Team,
+    Variable,
+)
+from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run.registry import protocol_named, protocol_names
+from tests.conformance.test_conformance import random_schedule
+from tests.support.changes import random_journey, stages
+from tests.support.loose_problems import loosened
+from tests.support.problems import ON_ONE_MACHINE, random_team, solutions, team_of
+
+DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
+SIMULATED = Options(runtime=Runtime.SIMULATOR, protocol="dynabt")
+
+
+def differ(left: str, right: str, name: str = "C") -> Constraint:
+    return Constraint(name, DIFFERENT, (left, right), (left, right))
+
+
+def pair(*events: Event, values: int = 1) -> Team:
+    """Two robots that want to differ."""
+    team = team_of(dict.fromkeys("AB", range(1, values + 1)), [differ("A", "B")])
+    return replace(team, scenario=events)
+
+
+def agrees(team: Team, options: Options) -> int:
+    """Every epoch that came to its end ends with brute force's verdict; returns how many did."""
+    outcome = solve(team, options)
+    every = list(stages(team))
+    assert len(outcome.epochs) == len(every)
+    ended = 0
+    for now, epoch, event in zip(every, outcome.epochs, [*team.scenario, None], strict=True):
+        assert set(epoch.robots) == set(now.order)
+        if epoch.verdict is Verdict.UNKNOWN:
+            assert event is not None
+            assert event.after is not None, "only an event may end an epoch without a verdict"
+            continue
+        truth = Verdict.NO_SOLUTION if next(solutions(now), None) is None else Verdict.SOLUTION
+        assert epoch.verdict is truth, (team, options)
+        assert epoch.verified is (truth is Verdict.SOLUTION)
+        ended += 1
+    return ended
+
+
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 10))])
+def test_dynabt_agrees_with_brute_force_after_each_change(batch: int) -> None:
+    chance = Random(f"dynabt {batch}")
+    steps = sum(agrees(random_journey(chance), random_dynabt(chance)) for _ in range(100 if batch else 60))
+    assert steps > (900 if batch else 540)
+
+
+def random_dynabt(chance: Random) -> Options:
+    return replace(random_schedule(chance), protocol="dynabt")
+
+
+@pytest.mark.parametrize("protocol", protocol_names())
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in (1, 2))])
+def test_any_protocol_begins_anew_after_each_change(protocol: str, batch: int) -> None:
+    traits = protocol_named(protocol).traits
+    chance = Random(f"anew {protocol} {batch}")
+    for _ in range(8):
+        team = random_journey(chance, 6)
+        if traits.n_ary and traits.complete:
+            agrees(team, replace(random_schedule(chance), protocol=protocol))
+
+
+@pytest.mark.parametrize("protocol", ["dynabt", "abt"])
+def test_processes_go_through_epochs_as_well(protocol: str) -> None:
+    chance = Random(f"processes {protocol}")
+    for _ in range(4):
+        agrees(random_journey(chance, 6), Options(protocol=protocol, timeout=60))
+
+
+def test_epochs_follow_an_order_that_is_asked_for() -> None:
+    chance = Random("order")
+    for _ in range(25):
+        team = random_journey(chance, 5, lambda team: loosened(team, chance))
+        order = chance.choice([*Order, tuple(chance.sample(team.order, len(team.order)))])
+        agrees(team, replace(random_dynabt(chance), order=order))
+
+
+def test_the_judge_goes_through_the_same_epochs() -> None:
+    team = pair(Event((AddValue("B", 2),)), Event((RemoveValue("B", 2),)))
+    outcome = solve(team, Options(protocol="central", cache=False))
+    assert [epoch.verdict for epoch in outcome.epochs] == ["no-solution", "solution", "no-solution"]
+
+
+def test_second_opinions_are_asked_for_in_each_epoch() -> None:
+    team = pair(Event((AddValue("B", 2),)), Event((RemoveValue("B", 2),)))
+    outcome = solve(team, replace(SIMULATED, verify=True, cache=False))
+    assert [epoch.verified for epoch in outcome.epochs] == [True, True, True]
+
+
+# What each change does
+
+
+def verdicts(outcome: Outcome) -> list[str]:
+    return [str(epoch.verdict) for epoch in outcome.epochs]
+
+
+def test_a_constraint_goes_and_another_comes() -> None:
+    team = pair(
+        Event((RemoveConstraint("RB", "RA", "C"),)),
+        Event((AddConstraint("RB", "RA", differ("A", "B", "again")),)),
+    )
+    assert verdicts(solve(team, SIMULATED)) == ["no-solution", "solution", "no-solution"]
+
+
+def test_a_robot_leaves_and_another_joins() -> None:
+    newcomer = Robot(
+        "RC",
+        (Variable("C", Domain("D", (range(1, 2),))),),
+        parents=(Parent("RB", (differ("B", "C"),)),),
+    )
+    team = pair(Event((RemoveAgent("RA"),)), Event((AddAgent(newcomer),)))
+    outcome = solve(team, SIMULATED)
+    assert verdicts(outcome) == ["no-solution", "solution", "no-solution"]
+    assert [epoch.robots for epoch in outcome.epochs] == [("RA", "RB"), ("RB",), ("RB", "RC")]
+
+
+def test_a_verdict_that_still_stands_costs_nothing() -> None:
+    team = pair(Event((AddConstraint("RB", "RA", differ("A", "B", "more")),)))
+    first, second = solve(team, SIMULATED).epochs
+    assert first.verdict is second.verdict is Verdict.NO_SOLUTION
+    assert second.metrics.messages == {}
+    assert second.witness == first.witness
+    anew = solve(team, replace(SIMULATED, protocol="abt")).epochs[1]
+    assert sum(anew.metrics.messages.values()) > 0
+
+
+def test_a_change_that_hurts_nobody_costs_nothing() -> None:
+    team = pair(Event((AddValue("A", 3),)), values=2)
+    second = solve(team, SIMULATED).epochs[1]
+    assert second.verdict is Verdict.SOLUTION
+    assert second.metrics.messages == {}
+
+
+def test_an_event_in_mid_run_ends_the_epoch_without_a_verdict() -> None:
+    domains = dict.fromkeys("ABCDE", range(1, 4))
+    constraints = [differ(left, right) for left in "ABCDE" for right in "ABCDE" if left < right]
+    team = replace(team_of(domains, constraints), scenario=(Event((RemoveAgent("RE"),), after=8),))
+    for runtime in ON_ONE_MACHINE:
+        first, second = solve(team, replace(SIMULATED, runtime=runtime, timeout=60)).epochs
+        assert first.verdict is Verdict.UNKNOWN
+        assert sum(first.metrics.messages.values()) >= 8
+        assert second.verdict is Verdict.NO_SOLUTION
+
+
+def test_an_event_in_mid_run_comes_at_the_end_if_there_are_not_so_many_messages() -> None:
+    team = pair(Event((RemoveAgent("RA"),), after=1000), values=2)
+    assert verdicts(solve(team, SIMULATED)) == ["solution", "solution"]
+
+
+def test_the_outcome_sums_up_its_epochs() -> None:
+    chance = Random("sum")
+    for _ in range(10):
+        outcome = solve(random_journey(chance), replace(SIMULATED, seed=chance.getrandbits(30)))
+        last = outcome.epochs[-1]
+        assert (outcome.verdict, outcome.assignment) == (last.verdict, last.assignment)
+        assert outcome.metrics.messages == sum((e.metrics for e in outcome.epochs), Metrics()).messages
+        assert outcome.metrics.ncccs == sum(e.metrics.ncccs for e in outcome.epochs)
+
+
+def test_a_problem_that_does_not_change_has_no_epochs() -> None:
+    assert solve(random_team(Random(1)), SIMULATED).epochs == ()
+
+
+@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
+def test_the_journal_says_what_the_metrics_say(runtime: Runtime) -> None:
+    team = random_journey(Random(5), 6)
+    recorder = Recorder(Header(team=team.name, protocol="dynabt", runtime=runtime, seed=0))
+    outcome = solve(team, replace(SIMULATED, runtime=runtime), observer=recorder)
+    told = metrics_of(read_journal(recorder.content()).events)
+    assert (told.messages, told.bytes, told.ncccs) == (
+        {kind: n for kind, n in outcome.metrics.messages.items() if n},
+        outcome.metrics.bytes,
+        outcome.metrics.ncccs,
+    )

@@ -1,0 +1,46 @@
+"""The house's own rules."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tests.support.program import ROOT
+
+SOURCES = sorted((ROOT / "robochoc").rglob("*.py"))
+LINES_AT_MOST = 400
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_file_outgrows_its_room(path: Path) -> None:
+    assert len(path.read_text().splitlines()) <= LINES_AT_MOST
+
+
+def test_imports_run_downward() -> None:
+    linter = Path(sys.executable).parent / "lint-imports"
+    done = subprocess.run([linter], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_untrusted_bytes_reach_neither_eval_nor_pickle(path: Path) -> None:
+    """But for what a parent tells the process that it has started, which `multiprocessing` pickles as well."""
+    found = re.search(r"(?<![\w.])(eval|exec)\(|\bpickle\b|Pickler", path.read_text())
+    assert not found or path.name == "control.py"
+
+
+def test_names_that_say_nothing_are_not_used() -> None:
+    assert not [path for path in SOURCES if re.search(r"manager|utils|helper", path.stem)]
+
+
+def test_every_dependency_is_explained() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    design = (ROOT / "docs" / "design.md").read_text()
+    for requirement in project["dependencies"]:
+        name = re.split(r"[<>=!~ ]", requirement)[0]
+        assert f"| {name} |" in design, name

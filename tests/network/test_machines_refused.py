@@ -1,0 +1,201 @@
+"""`robochoc master`, `robot` and `directory`: who is turned away, and how they are told."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from robochoc.cli.group import cli
+from robochoc.formats import write_team
+from tests.support.machines import LONG_S, LOOPBACK, PAIR, SOON_S, Site, ended, one_line, taken, written
+from tests.support.program import ROOT
+
+# Who is turned away
+
+
+@pytest.mark.slow
+def test_tokens_that_do_not_work(site: Site) -> None:
+    files = written(PAIR, site)
+    tokens = site.enrol("--team", files)
+    expired = site.enrol("Late", "--token-ttl", 1e-6)["Late"]
+    write_team(PAIR, site.folder / "other")
+    (site.folder / "other" / "RA.xml").rename(site.folder / "other" / "Late.xml")
+    master = site.master("--gather", 60)
+
+    def refused(file: Path, token: str, *words: object) -> str:
+        robot = site.robot(file, "--token", token, *words)
+        assert robot.status() == (1 if "no token" in robot.errors else 4), robot.errors
+        return one_line(robot)
+
+    assert "not for this name" in refused(files / "RA.xml", tokens["RB"])
+    assert "no token" in refused(files / "RA.xml", tokens["RA"][:20])
+    assert "expired" in refused(site.folder / "other" / "Late.xml", expired)
+    first = site.robot(files / "RA.xml", "--token", tokens["RA"])
+    master.wait_to_say("RA is there")
+    assert "used already" in refused(files / "RA.xml", tokens["RA"], "--identity", site.folder / "second")
+    with Site(site.folder / "elsewhere") as elsewhere:
+        foreign = elsewhere.enrol("RB")["RB"]
+    assert "not the Authority that the token is from" in refused(files / "RB.xml", foreign)
+    second = site.robot(files / "RB.xml", "--token", tokens["RB"])
+    assert master.status() == 0, master.errors
+    ended({"RA": first, "RB": second})
+
+
+def test_identities_that_do_not_fit(site: Site) -> None:
+    files = written(PAIR, site)
+    tokens = site.enrol("--team", files)
+    master = site.master("--gather", 60)
+    nobody = site.robot(files / "RA.xml")
+    assert nobody.status() == 1
+    assert "enrol with a token" in one_line(nobody)
+    first = site.robot(files / "RA.xml", "--token", tokens["RA"], "--identity", site.folder / "RA.id")
+    master.wait_to_say("RA is there")
+    borrowed = site.robot(files / "RB.xml", "--identity", site.folder / "RA.id")
+    assert borrowed.status() == 1
+    assert "is the identity of RA, not of RB" in one_line(borrowed)
+    double = site.robot(files / "RA.xml", "--identity", site.folder / "RA.id")
+    assert double.status() == 4
+    assert "registered already" in one_line(double)
+    second = site.robot(files / "RB.xml", "--token", tokens["RB"])
+    assert master.status() == 0, master.errors
+    ended({"RA": first, "RB": second})
+
+
+# Nobody there
+
+
+def test_no_master_there(site: Site) -> None:
+    files = written(PAIR, site)
+    token = site.enrol("RA")["RA"]
+    began = time.monotonic()
+    stranger = site.robot(files / "RA.xml", "--token", token, "--patience", 1)
+    watcher = site.start("desk", "directory", "--master", site.place, "--as", "RA", "--token", token, "--patience", 1)
+    for program in (stranger, watcher):
+        assert program.status() == 4
+        assert "is 'robochoc master' running there?" in one_line(program)
+    assert time.monotonic() - began < LONG_S / 3
+    master = site.master("--gather", 60)
+    known = site.robot(files / "RA.xml", "--token", token)
+    master.wait_to_say("RA is there")
+    master.kill()
+    known.strike(signal.SIGINT)
+    assert known.status() == 130, known.errors
+    began = time.monotonic()
+    known = site.robot(files / "RA.xml", "--patience", 1)
+    assert known.status() == 4
+    assert f"no master answers at {site.place}" in one_line(known)
+    assert time.monotonic() - began < LONG_S / 3
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_a_robot_that_waits_for_its_master(site: Site) -> None:
+    files = written(PAIR, site)
+    master = site.master("--gather", 60)
+    site.robot(files / "RA.xml", "--token", site.enrol("RA")["RA"])
+    master.wait_to_say("RA is there")
+    with socket.create_server((LOOPBACK, 0)) as silent:
+        silent.settimeout(LONG_S)
+        place = f"{LOOPBACK}:{silent.getsockname()[1]}"
+        robot = site.start("RA", "robot", files / "RA.xml", "--master", place, "--patience", 3600)
+        with silent.accept()[0]:
+            robot.strike(signal.SIGINT)
+            assert robot.status(SOON_S) == 130, robot.errors
+
+
+def test_a_master_that_nobody_joins(site: Site) -> None:
+    files = written(PAIR, site)
+    master = site.master("--gather", 1, "--team", files)
+    assert (master.status(), master.output) == (3, "")
+    told = master.errors.splitlines()[-1]
+    assert "not complete after 1 s" in told
+    assert "awaited: RA, RB" in told
+
+
+@pytest.mark.slow
+def test_a_robot_hears_that_the_others_did_not_come(site: Site) -> None:
+    files = written(PAIR, site)
+    robot = site.robot(files / "RA.xml", "--token", site.enrol("RA")["RA"])
+    master = site.master("--gather", 15)
+    assert master.status() == 3
+    assert "awaited: RB" in master.errors
+    assert robot.status() == 4
+    assert "awaited: RB" in one_line(robot)
+
+
+# What the command line says no to
+
+
+@pytest.mark.parametrize("higher", [0, 1])
+def test_a_port_in_use(higher: int, site: Site) -> None:
+    with taken(site.port + higher):
+        words = ("--listen", site.place, "--authority", site.authority_folder, "--gather", 5)
+        master = site.start("master", "master", *words)
+        assert master.status() == 2
+    told = one_line(master)
+    assert f"cannot listen on 127.0.0.1:{site.port + higher}" in told
+    assert "in use" in told
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "told"),
+    [
+        (["master", "--listen", "nowhere at all"], 2, "no HOST:PORT"),
+        (["master", "--listen", "0.0.0.0:17000"], 2, "--host NAME"),
+        (["master", "--listen", "[::1]:17000"], 2, "--host NAME"),
+        (["master", "--listen", "192.0.2.1:17000"], 2, "cannot listen on 192.0.2.1:1700"),
+        (["master", "--protocol", "nonsense"], 2, "nonsense"),
+        (["master", "--filter", "nonsense"], 2, "--filter"),
+        (["master", "--set", "colour=red"], 2, "colour"),
+        (["master", "--gather", "nan"], 2, "--gather takes a number of seconds, more than 0"),
+        (["master", "--timeout", "0"], 2, "--timeout takes a number of seconds"),
+        (["master", "--robots", "2", "--team", "."], 2, "--robots and --team"),
+        (["master", "--team", "nowhere"], 1, "nowhere"),
+        (["robot", "nowhere.xml", "--master", "127.0.0.1:17000"], 1, "nowhere.xml: "),
+        (["robot", "RA.xml", "--master", "[::1"], 2, "no HOST:PORT"),
+        (["robot", "RA.xml", "--master", "[::1]7447"], 2, "no HOST:PORT"),
+        (["robot", "RA.xml", "--master", "127.0.0.1:65535"], 2, "no HOST:PORT"),
+        (["directory", "--master", "127.0.0.1:17000", "--as", "Watcher"], 1, "enrol with a token"),
+        (["directory", "--master", "127.0.0.1:17000", "--as", "../up"], 2, "../up"),
+        (["directory", "--master", "h", "--as", "A", "--search", "colour=red"], 2, "slots are name, protocol"),
+        (["directory", "--master", "127.0.0.1:17000", "--as", "A", "--sl", "--json"], 2, "--sl and --json"),
+    ],
+)
+def test_what_cannot_be_is_said_in_a_line(
+    words: list[str], status: int, told: str, site: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(site.folder))
+    given = [*words, "--authority", str(site.authority_folder)] if words[0] == "master" else words
+    done = CliRunner().invoke(cli, given)
+    assert (done.exit_code, done.stdout) == (status, "")
+    assert isinstance(done.exception, SystemExit)
+    said = [line for line in done.stderr.splitlines() if line and not line.startswith(("Usage:", "Try "))]
+    assert len(said) == 1
+    assert told in said[0]
+
+
+def test_a_master_without_an_authority(tmp_path: Path) -> None:
+    with Site(tmp_path) as site:
+        words = ("--authority", tmp_path / "nowhere", "--listen", site.place)
+        master = site.start("master", "master", *words)
+        assert master.status() == 1
+        assert one_line(master).endswith("say: robochoc authority init\n")
+
+
+@pytest.mark.parametrize("missing", ["zenoh", "cryptography"])
+@pytest.mark.parametrize(
+    "words", [["master"], ["robot", "A.xml", "--master", "h"], ["directory", "--master", "h", "--as", "A"]]
+)
+def test_without_the_extra_it_says_what_to_install(missing: str, words: list[str]) -> None:
+    program = f"import sys; sys.modules[{missing!r}] = None; from robochoc.cli.main import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", program, *words], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"this needs {missing}, which is an extra; say: pip install 'robochoc[network]'\n"

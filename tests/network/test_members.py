@@ -1,0 +1,292 @@
+"""Who is registered: once, in one life, as long as the team is open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from random import Random
+
+import msgspec
+import pytest
+
+from robochoc.communication.network.members import Members, NotTaken
+from robochoc.communication.network.profile import Profile, Ranges
+from robochoc.formats import PREDEFINED
+from robochoc.model.problem import Constraint, Kind, Predicate
+from robochoc.protocols.traits import Traits
+from robochoc.solver.agent_problem import NO_BRIEF
+from tests.support.pkc_problems import random_pkc_team
+from tests.support.problems import random_team, team_of
+from tests.support.sparse_teams import profiles_of
+
+TRIANGLE = [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in (("A", "B"), ("A", "C"), ("B", "C"))]
+PROFILES = profiles_of(team_of(dict.fromkeys("ABC", (1, 2)), TRIANGLE))
+RA, RB, RC = PROFILES
+
+
+def join(members: Members, *names: str, visit: str = "first") -> None:
+    for name in names:
+        members.register(name, PROFILES[name], visit).joined = True
+
+
+def refused(members: Members, name: str, profile: Profile, visit: str = "first") -> str:
+    before = dict(members.robots)
+    with pytest.raises(NotTaken) as caught:
+        members.register(name, profile, visit)
+    assert members.robots == before
+    return str(caught.value)
+
+
+def test_registering_twice_is_registering_once() -> None:
+    members = Members()
+    first = members.register(RA, PROFILES[RA], "first")
+    assert members.register(RA, PROFILES[RA], "first") is first
+    first.joined = True
+    members.closed = True
+    assert members.register(RA, PROFILES[RA], "first") is first
+
+
+def test_a_name_is_one_robots() -> None:
+    members = Members()
+    join(members, RA)
+    assert refused(members, RA, PROFILES[RA], "second") == f"a robot called {RA} is registered already"
+
+
+def test_who_was_away_may_come_in_another_life_while_the_team_is_open() -> None:
+    members = Members()
+    join(members, RA)
+    members.robots[RA].gone = 12.5
+    now = members.register(RA, PROFILES[RA], "second")
+    assert (now.visit, now.joined, now.gone) == ("second", False, None)
+    now.gone = 13.5
+    assert "start it anew" in refused(members, RA, PROFILES[RA], "first")
+    members.closed = True
+    assert "registered already" in refused(members, RA, PROFILES[RA], "third")
+
+
+def test_who_was_given_up_comes_in_another_life_or_not_at_all() -> None:
+    members = Members()
+    join(members, RA)
+    members.remove([RA, "nobody"])
+    assert "away for too long; start it anew" in refused(members, RA, PROFILES[RA], "first")
+    assert members.register(RA, PROFILES[RA], "second").visit == "second"
+
+
+def test_a_certificate_is_for_one_file() -> None:
+    members = Members()
+    assert refused(members, RB, PROFILES[RA]) == f"its file is '{RA}''s, and its certificate {RB}'s"
+    long = msgspec.structs.replace(PROFILES[RA], name="R" * 5000)
+    assert len(refused(members, RB, long)) < 200
+
+
+def test_strangers_are_not_taken_where_robots_are_expected() -> None:
+    assert refused(Members([RA, RB]), RC, PROFILES[RC]) == "it is not one of the team"
+
+
+def test_nobody_is_taken_once_the_team_is_closed() -> None:
+    members = Members([RA, RB, RC])
+    join(members, RA, RB)
+    members.closed = True
+    assert refused(members, RC, PROFILES[RC]) == "the team is complete without it"
+
+
+def test_absurd_profiles_and_contradictions_are_not_taken() -> None:
+    members = Members()
+    join(members, RA)
+    assert "no name" in refused(members, RB, msgspec.structs.replace(PROFILES[RB], children=("?",)))
+    stranger = msgspec.structs.replace(PROFILES[RB], parents=())
+    assert "does not list it as a parent" in refused(members, RB, stranger)
+    join(members, RB)
+
+
+def test_who_comes_again_is_not_held_against_its_former_life() -> None:
+    members = Members()
+    join(members, RA)
+    members.robots[RA].gone = 1.0
+    other = msgspec.structs.replace(PROFILES[RA], children=(), variables={}, kind=Kind.DISWCSP)
+    assert members.register(RA, other, "second").profile is other
+
+
+# When the team is complete
+
+
+def test_complete_when_all_who_are_expected_are_there() -> None:
+    members = Members([RA, RB, RC])
+    assert members.awaited == {RA, RB, RC}
+    join(members, RC, RA)
+    assert members.awaited == {RB}
+    assert not members.complete
+    join(members, RB)
+    assert members.complete
+
+
+def test_complete_when_all_neighbours_are_there() -> None:
+    members = Members()
+    assert not members.complete
+    join(members, RC)
+    assert members.awaited == {RA, RB}
+    join(members, RA, RB)
+    assert members.complete
+
+
+def test_complete_when_so_many_are_there_and_all_their_neighbours() -> None:
+    lonely = Profile("RZ", Kind.DISCSP, (), (), {}, {}, 1, 0, ())
+    members = Members(number=2)
+    members.register("RZ", lonely, "first").joined = True
+    assert not members.awaited
+    assert not members.complete
+    join(members, RA)
+    assert not members.complete
+    join(members, RB, RC)
+    assert members.complete
+
+
+def test_complete_when_all_have_read_their_welcome() -> None:
+    members = Members()
+    join(members, RA, RB, RC)
+    members.robots[RB].joined = False
+    assert not members.complete
+
+
+def test_an_open_team_misses_who_is_given_up() -> None:
+    members = Members()
+    join(members, RA, RB, RC)
+    members.remove([RB])
+    assert members.awaited == {RB}
+    assert not members.complete
+
+
+# What others want to see
+
+
+def looked_at() -> dict[str, Profile]:
+    upper = Profile("A", Kind.DISCSP, (), ("B",), {"X": ((1, 2),)}, {"B": ("Y", "Z")}, 1, 0, ())
+    lower = Profile("B", Kind.DISCSP, ("A",), (), {"Y": ((1, 2),)}, {}, 1, 0, ())
+    return {"A": upper, "B": lower}
+
+
+def test_variables_that_a_parent_looks_at_are_shown() -> None:
+    members = Members()
+    members.register("A", looked_at()["A"], "first")
+    assert members.unseen() == {}
+    members.register("B", looked_at()["B"], "first")
+    assert members.unseen() == {"B": ("Z",)}
+    members.robots["B"].also["Z"] = ((3, 4),)
+    assert members.unseen() == {}
+    task = members.tasks(1, "abt", Traits(), NO_BRIEF)["A"]
+    assert task.interfaces == {"A": ("X",), "B": ("Y", "Z")}
+    assert task.domains["Z"] == ((3, 4),)
+
+
+def test_who_is_no_child_is_not_asked_to_show_anything() -> None:
+    members = Members()
+    members.register("B", looked_at()["B"], "first")
+    spy = Profile("S", Kind.DISCSP, (), (), {}, {"B": ("Secret",)}, 1, 0, ())
+    assert "looks at variables of B, which is no child" in refused(members, "S", spy)
+    assert members.unseen() == {}
+
+
+def robot(
+    name: str,
+    parents: tuple[str, ...] = (),
+    children: tuple[str, ...] = (),
+    shown: str = "",
+    wants: tuple[str, ...] = (),
+) -> Profile:
+    variables: dict[str, Ranges] = {shown: ((1, 2),)} if shown else {}
+    return Profile(name, Kind.DISCSP, parents, children, variables, {}, 1, 0, (), wants)
+
+
+def test_what_a_childs_constraints_look_at_is_asked_for_whether_its_parent_says_so_or_not() -> None:
+    members = Members()
+    members.register("A", robot("A", children=("B",)), "first")
+    members.register("B", robot("B", parents=("A",), shown="Y", wants=("X",)), "first")
+    assert members.unseen() == {"A": ("X",)}
+    assert (
+        members.show("A", {"X": ((1, 3),), "Secret": ((1, 1),)}) == "it has shown variables that it was not asked for"
+    )
+    assert members.show("A", {"X": ((1, 3),)}) == ""
+    assert not members.unseen()
+    assert not list(members.strangers())
+    assert members.tasks(1, "abt", Traits(), NO_BRIEF)["B"].interfaces == {"A": ("X",), "B": ("Y",)}
+
+
+def test_two_that_show_one_variable_are_both_named() -> None:
+    members = Members()
+    for name in ("A", "C"):
+        members.register(name, robot(name, children=("B",)), "first")
+    members.register("B", robot("B", parents=("A", "C"), shown="Y", wants=("X",)), "first")
+    assert members.unseen() == {"A": ("X",), "C": ("X",)}
+    assert members.show("A", {"X": ((1, 3),)}) == ""
+    assert members.show("C", {"X": ((1, 3),)}) == "the variable X is A's, and C's too"
+
+
+def test_a_constraint_over_what_no_neighbour_has_is_told() -> None:
+    members = Members()
+    members.register("A", robot("A", children=("B",)), "first")
+    members.register("B", robot("B", parents=("A",), shown="Y", wants=("V9",)), "first")
+    assert members.unseen() == {"A": ("V9",)}
+    assert members.show("A", {}) == ""
+    assert not members.unseen()
+    assert list(members.strangers()) == ["B holds a constraint over V9, which is a variable of none of its neighbours"]
+
+
+def test_who_may_only_ask_does_not_take_part() -> None:
+    with pytest.raises(NotTaken, match="enrolled to observe"):
+        Members().register("A", robot("A"), "first", admitted=False)
+
+
+def test_a_robot_that_was_away_may_come_back_in_another_life() -> None:
+    members = Members()
+    members.register("A", robot("A"), "first")
+    with pytest.raises(NotTaken, match="registered already"):
+        members.register("A", robot("A"), "second")
+    members.robots["A"].doubtful = True
+    assert members.register("A", robot("A"), "second").visit == "second"
+
+
+def test_a_team_is_not_complete_while_one_that_has_come_is_away_or_may_be_another() -> None:
+    members = Members()
+    member = members.register("A", robot("A"), "first")
+    steps: list[tuple[Callable[[], object], bool, dict[str, str]]] = [
+        (lambda: member.join("another's", b""), False, {"A": "first"}),
+        (lambda: member.join("first", b""), True, {}),
+        (lambda: member.note_presence(there=False), False, {}),
+        (lambda: member.note_presence(there=True), False, {"A": "first"}),
+        (lambda: member.join("first", b""), True, {}),
+        (lambda: member.note_presence(there=False), False, {}),
+        (lambda: members.register("A", robot("A"), "first"), True, {}),
+    ]
+    for step, complete, to_welcome in steps:
+        step()
+        assert (members.complete, members.to_welcome()) == (complete, to_welcome)
+
+
+# What is told at the end
+
+
+def test_a_neighbourhood_is_what_sharers_of_constraints_show() -> None:
+    any_three = Predicate("any", ("X", "Y", "Z"), PREDEFINED["ne"].body)
+    scope = ("A", "B", "C")
+    team = team_of(dict.fromkeys((*scope, "D"), (1, 2)), [Constraint("C", any_three, scope, scope)])
+    members = Members()
+    for name, profile in profiles_of(team).items():
+        members.register(name, profile, "first")
+    values = {"RA": {"A": 1, "Hidden": 7}, "RB": {"B": 2}, "RC": {"C": 1}, "RD": {"D": 2}, "RX": {"A": 9}}
+    assert members.neighbourhood("RA", values) == {"B": 2, "C": 1}
+    assert members.neighbourhood("RC", values) == {"A": 1, "B": 2}
+    assert members.neighbourhood("RD", values) == {}
+    members.remove(["RB"])
+    assert members.neighbourhood("RA", values) == {"C": 1}
+
+
+def test_all_kinds_of_teams_are_taken_in_any_order() -> None:
+    for seed in range(20):
+        for make in (random_team, random_pkc_team):
+            chance = Random(seed)
+            profiles = list(profiles_of(make(chance)).items())
+            chance.shuffle(profiles)
+            members = Members([name for name, _ in profiles])
+            for name, profile in profiles:
+                assert not members.complete
+                members.register(name, profile, "visit").joined = True
+            assert members.complete

@@ -1,0 +1,163 @@
+"""Robots on machines that only a link joins: network namespaces with cables, and with a bad line, between them."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from robochoc.formats import write_team
+from robochoc.model.problem import Constraint
+from robochoc.run.orchestrator import Options, Runtime, solve
+from tests.support.entries import entries_of
+from tests.support.machines import Program, Site, ended
+from tests.support.namespaces import DELAY_S, TUN, Link, bad_line, inside, namespaces, route, veth, why_not
+from tests.support.problems import PREDICATES, team_of
+from tests.support.program import ROOT
+
+WHY_NOT = why_not()
+pytestmark = pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT or "there are namespaces")
+needs_tun = pytest.mark.skipif(not TUN.exists(), reason=f"a line that loses packets needs {TUN}")
+
+FOUR = ROOT / "instances" / "queens3d-4"
+PORT = 7447
+HILL, FIELD = "10.77.1.1", "10.77.1.2"
+OUTAGE_S = 5.0
+CROWD = team_of(
+    dict.fromkeys("ABCDE", range(1, 5)),
+    [Constraint("C", PREDICATES[0], pair, pair) for pair in itertools.combinations("ABCDE", 2)],
+)
+"""One robot too many; told one after the other (`sbt`), which takes the same messages whatever the link does."""
+
+
+class Apart(NamedTuple):
+    """A master on the hill, robots in the field, and a bad line between them."""
+
+    site: Site
+    hill: tuple[str, ...]
+    field: tuple[str, ...]
+    line: Link
+
+
+@pytest.fixture
+def apart(tmp_path: Path) -> Iterator[Apart]:
+    with (
+        namespaces(2) as (hill, field),
+        bad_line((hill, f"{HILL}/24"), (field, f"{FIELD}/24"), seed=6) as line,
+        Site(tmp_path, HILL, PORT) as site,
+    ):
+        yield Apart(site, inside(hill), inside(field), line)
+
+
+def robots(site: Site, files: Path, tokens: dict[str, str], where: tuple[str, ...], *words: object) -> list[Program]:
+    return [site.robot(files / f"{n}.xml", "--token", t, *words, inside=where) for n, t in tokens.items()]
+
+
+def test_three_machines_that_only_cables_join(tmp_path: Path) -> None:
+    with namespaces(3) as (hill, east, west), Site(tmp_path, HILL, PORT) as site:
+        veth((hill, f"{HILL}/24"), (east, f"{FIELD}/24"))
+        veth((hill, "10.77.2.1/24"), (west, "10.77.2.2/24"))
+        route(west, "10.77.1.0/24", "10.77.2.1")
+        tokens = site.enrol("--team", FOUR)
+        master = site.master("--team", FOUR, "--json", "--timeout", 100, inside=inside(hill))
+        half = len(tokens) // 2
+        parts = (dict(itertools.islice(tokens.items(), half)), dict(itertools.islice(tokens.items(), half, None)))
+        crew = [robot for part, where in zip(parts, (east, west), strict=True)
+                for robot in robots(site, FOUR, part, inside(where))]  # fmt: skip
+        assert master.status() == 0, master.errors
+        told = master.object
+        assert (told["verdict"], told["runtime"]) == ("no-solution", "network")
+        assert told["metrics"]["messages_by_type"].keys() == {"Ok", "Nogood", "AddLink"}
+        ended(dict(zip(tokens, crew, strict=True)))
+
+
+def test_a_master_with_an_address_for_each_cable(tmp_path: Path) -> None:
+    pair = team_of(dict.fromkeys("AB", range(1, 3)), [Constraint("C", PREDICATES[0], ("A", "B"), ("A", "B"))])
+    write_team(pair, tmp_path / "pair")
+    with namespaces(3) as (hill, *fields), Site(tmp_path, "0.0.0.0", PORT) as site:  # noqa: S104 - of a namespace
+        here = {name: f"10.77.{number}.1" for number, name in enumerate(fields)}
+        for name, address in here.items():
+            veth((hill, f"{address}/24"), (name, f"{address[:-1]}2/24"))
+        tokens = site.enrol("RA", "RB")
+        hosts = [word for address in here.values() for word in ("--host", address)]
+        master = site.master("--json", *hosts, inside=inside(hill))
+        crew = {}
+        for (robot, token), (name, address) in zip(tokens.items(), here.items(), strict=True):
+            words = ("robot", tmp_path / "pair" / f"{robot}.xml", "--token", token, "--master", f"{address}:{PORT}")
+            crew[robot] = site.start(robot, *words, inside=inside(name))
+        assert master.status() == 0, master.errors
+        assert master.object["verdict"] == "solution"
+        ended(crew)
+
+
+def expected() -> dict[str, int]:
+    """The messages that the crowd needs."""
+    outcome = solve(CROWD, Options(runtime=Runtime.SIMULATOR, protocol="sbt"))
+    assert outcome.verdict == "no-solution"
+    return dict(outcome.metrics.messages)
+
+
+def crowd(apart: Apart, *words: object) -> tuple[Program, list[Program], Path]:
+    """The crowd on the bad line; all are there."""
+    files, journal = apart.site.folder / "crowd", apart.site.folder / "crowd.jsonl"
+    write_team(CROWD, files)
+    tokens = apart.site.enrol("--team", files)
+    watched = ("--protocol", "sbt", "--json", "--journal", journal, "--timeout", 90)
+    master = apart.site.master(*watched, *words, inside=apart.hill)
+    crew = robots(apart.site, files, tokens, apart.field, "--patience", 60)
+    master.wait_to_say(" is there", len(tokens))
+    return master, crew, journal
+
+
+def nothing_was_lost(master: Program, journal: Path) -> float:
+    """Every message that was sent was received, and there were as many as there have to be; how long that took."""
+    told = master.object
+    messages = expected()
+    assert (told["verdict"], told["withdrawn"]) == ("no-solution", [])
+    assert told["metrics"]["messages_by_type"] == messages
+    events = [entry["event"] for entry in entries_of(journal)]
+    assert events.count("Sent") == events.count("Received") == sum(messages.values())
+    assert "is lost" not in master.errors
+    assert "refused" not in master.errors
+    took: float = told["metrics"]["wall_s"]
+    assert took > 2 * DELAY_S * sum(messages.values())  # there and back: messages go by the master's router
+    return took
+
+
+@needs_tun
+@pytest.mark.slow
+def test_a_line_that_delays_and_loses(apart: Apart) -> None:
+    master, crew, journal = crowd(apart)
+    assert master.status() == 0, master.errors
+    ended({str(number): robot for number, robot in enumerate(crew)})
+    nothing_was_lost(master, journal)
+
+
+@needs_tun
+@pytest.mark.slow
+def test_queens_on_a_line_that_delays_and_loses(apart: Apart) -> None:
+    tokens = apart.site.enrol("--team", FOUR)
+    words = ("--team", FOUR, "--json", "--timeout", 100, "--patience", 30)
+    master = apart.site.master(*words, inside=apart.hill)
+    crew = robots(apart.site, FOUR, tokens, apart.field, "--patience", 60)
+    assert master.status(110) == 0, master.errors
+    assert master.object["verdict"] == "no-solution"
+    ended({str(number): robot for number, robot in enumerate(crew)})
+
+
+@needs_tun
+@pytest.mark.slow
+def test_a_line_that_is_down_for_a_while(apart: Apart) -> None:
+    master, crew, journal = crowd(apart, "--patience", 60)
+    time.sleep(1)
+    apart.line.set("down")
+    time.sleep(OUTAGE_S)
+    assert master.is_running
+    apart.line.set("up")
+    assert master.status() == 0, master.errors
+    ended({str(number): robot for number, robot in enumerate(crew)})
+    assert nothing_was_lost(master, journal) > OUTAGE_S

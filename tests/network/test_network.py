@@ -1,0 +1,192 @@
+"""Teams over a real network on loopback, against brute force, and against what the other runtimes see."""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+
+from robochoc.communication.network.local import LocalNetwork
+from robochoc.communication.network.settings import Conditions
+from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.communication.run_result import RunResult
+from robochoc.generators.queens3d import queens3d
+from robochoc.journal.events import AnyEvent, Decided, Lost, Received, Refused, Registered, Sent
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Team
+from robochoc.protocols.findings import NOTHING
+from robochoc.run.registry import protocol_named
+from robochoc.solver.agent_problem import Brief
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.encoding import TooMuch
+from robochoc.verification.checker import cost, objections
+from tests.conformance.test_complex_teams import compiled_by_hand
+from tests.support.clocks import once
+from tests.support.complex_problems import random_complex_team
+from tests.support.cost_problems import least_cost, random_cost_team
+from tests.support.held import CHAIN, Broken, Held, Overwhelmed
+from tests.support.pkc_problems import random_pkc_team
+from tests.support.problems import random_team, solutions
+
+TIMEOUT_S = 60
+FEW = (("afc-ng", ("signed", "sealed")), ("awc", ()), ("dynabt", ("signed",)))
+MANY = ("abt", "afc-ng", "awc", "dynabt", "sbt", "agile-abt", "afc-tree", "sfb", "dpop", "adopt")
+
+
+def run_over_network(
+    team: Team | CompiledTeam,
+    protocol: str,
+    conditions: Conditions = Conditions(),
+    events: list[AnyEvent] | None = None,
+) -> tuple[RunResult, tuple[bool, float] | None]:
+    """The result, and what the robots themselves say of the values that were decided."""
+    observer = None if events is None else events.append
+    with LocalNetwork(team, protocol_named(protocol), conditions=conditions, observer=observer) as network:
+        result = network.search(TIMEOUT_S)
+        found = result.verdict is Verdict.SOLUTION
+        return result, network.master.checked(result.assignments) if found and not conditions.private else None
+
+
+def agrees(
+    team: Team,
+    protocol: str,
+    filters: tuple[str, ...] = (),
+) -> Verdict:
+    """The verdict is brute force's, and the robots' own check agrees with the checker's."""
+    result, checked = run_over_network(compiled_by_hand(team), protocol, Conditions(filters))
+    truth = next(solutions(team), None)
+    assert result.verdict is (Verdict.NO_SOLUTION if truth is None else Verdict.SOLUTION), (team, protocol)
+    assert not result.lost
+    if truth is not None:
+        assert not list(objections(team, assignment_of(result)))
+        assert checked == (True, 0.0)
+    return result.verdict
+
+
+def assignment_of(result: RunResult) -> dict[str, int]:
+    return {name: value for values in result.assignments.values() for name, value in values.items()}
+
+
+@pytest.mark.parametrize(("protocol", "filters"), FEW)
+def test_random_problems(protocol: str, filters: tuple[str, ...]) -> None:
+    """A random team with constraints over several robots, of both kinds of verdict in the two seeds."""
+    agrees(random_team(Random(f"network {protocol}"), n_ary=protocol_named(protocol).traits.n_ary), protocol, filters)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("batch", range(6))
+@pytest.mark.parametrize("protocol", MANY)
+def test_more_random_problems(protocol: str, batch: int) -> None:
+    chance = Random(f"network {protocol} {batch}")
+    team = random_team(chance, n_ary=protocol_named(protocol).traits.n_ary)
+    agrees(team, protocol, chance.choice([(), ("signed",), ("sealed",), ("signed", "sealed")]))
+
+
+def test_partially_known_constraints() -> None:
+    agrees(random_pkc_team(Random(3)), "disfc")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("protocol", ["disfc", "abt"])
+def test_more_partially_known_constraints(protocol: str, seed: int) -> None:
+    agrees(random_pkc_team(Random(100 + seed)), protocol)
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 8))])
+def test_complex_robots(seed: int) -> None:
+    team = random_complex_team(Random(f"network {seed}"))
+    agrees(team, "abt", ("signed", "sealed"))
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6))])
+@pytest.mark.parametrize("protocol", ["dpop", "sfb", pytest.param("adopt", marks=pytest.mark.slow)])
+def test_costs(protocol: str, seed: int) -> None:
+    team = random_cost_team(Random(f"network {seed}"), n_ary=protocol_named(protocol).traits.n_ary)
+    result, checked = run_over_network(team, protocol)
+    least = least_cost(team)
+    if least == INFINITE:
+        assert result.verdict is Verdict.NO_SOLUTION
+        return
+    assert result.verdict is Verdict.SOLUTION, "whether that is optimal is for who asked to say"
+    assert cost(team, assignment_of(result)) == least
+    assert checked == (True, least)
+
+
+def test_local_search_ends_by_itself() -> None:
+    """An incomplete protocol need not find the best; what it decides is told, and its cost agreed on."""
+    team = random_cost_team(Random("network mgm"), n_ary=False)
+    with LocalNetwork(team, protocol_named("mgm"), brief=Brief(settings={"cycles": "20"})) as network:
+        result = network.search(TIMEOUT_S)
+        held, told = network.master.checked(result.assignments)
+    assert set(result.assignments) == set(team.order)
+    assert (cost(team, assignment_of(result)) < INFINITE) is held
+    if held:
+        assert cost(team, assignment_of(result)) == told
+
+
+@pytest.mark.parametrize("filters", [("signed", "sealed"), pytest.param((), marks=pytest.mark.slow)])
+def test_four_queens(filters: tuple[str, ...]) -> None:
+    """All that happens is observed: who comes, and every message twice."""
+    events: list[AnyEvent] = []
+    result, _ = run_over_network(queens3d(4), "abt", Conditions(filters), events=events)
+    assert (result.verdict, result.witness) == (Verdict.NO_SOLUTION, "Robot1.1")
+    assert {e.robot for e in events if isinstance(e, Registered)} == set(queens3d(4).order)
+    sent = sum(isinstance(e, Sent) for e in events)
+    assert sent == sum(result.metrics.messages.values())
+    assert sum(isinstance(e, Received) for e in events) <= sent
+    assert not [e for e in events if isinstance(e, Refused | Lost)]
+
+
+def test_what_is_observed_of_a_solution_is_complete() -> None:
+    events: list[AnyEvent] = []
+    result, checked = run_over_network(CHAIN, "abt", events=events)
+    assert checked == (True, 0.0)
+    assert sum(isinstance(e, Sent) for e in events) == sum(isinstance(e, Received) for e in events)
+    decided = {e.robot: e.assignment for e in events if isinstance(e, Decided)}
+    assert decided == result.assignments
+
+
+def test_a_private_run_tells_no_values() -> None:
+    result, _ = run_over_network(CHAIN, "abt", Conditions(private=True))
+    assert result.verdict is Verdict.SOLUTION
+    assert not any(result.assignments.values())
+    assert all(findings == NOTHING for findings in result.findings.values())
+
+
+def test_what_the_robots_check_is_what_the_checker_checks() -> None:
+    """Where values are wrong as well: RX1 is told that RX0 has its own."""
+    with LocalNetwork(CHAIN, protocol_named("abt")) as network:
+        result = network.search(TIMEOUT_S)
+        wrong = {**result.assignments, "RX0": {"X0": result.assignments["RX1"]["X1"]}}
+        assert list(objections(CHAIN, {name: v for values in wrong.values() for name, v in values.items()}))
+        assert network.master.checked(wrong) == (False, 0.0)
+
+
+def test_limits() -> None:
+    with LocalNetwork(queens3d(4), protocol_named("abt")) as network:
+        result = network.search(messages=20)
+        assert result.verdict is Verdict.UNKNOWN
+        assert sum(result.metrics.messages.values()) >= 20
+
+
+def test_when_the_time_is_over_there_is_what_was_decided_so_far() -> None:
+    def searched(limit: float) -> RunResult:
+        with LocalNetwork(CHAIN, Held, brief=Brief(settings={"file": "/nowhere"})) as network:
+            return network.search(timeout=limit)
+
+    result = once(lambda result: len(result.assignments) == len(CHAIN.order), searched)
+    assert result.verdict is Verdict.UNKNOWN
+    assert not result.lost
+    assert set(result.assignments) == set(CHAIN.order)
+
+
+def test_a_problem_that_is_too_much_for_a_robot() -> None:
+    """It says so, and the run ends with that."""
+    with LocalNetwork(CHAIN, Overwhelmed) as network, pytest.raises(TooMuch, match="this is too much for RX2"):
+        network.search(TIMEOUT_S)
+
+
+def test_a_robot_that_breaks() -> None:
+    with LocalNetwork(CHAIN, Broken) as network, pytest.raises(RobotsLost, match="RX2 was lost: ValueError: out of"):
+        network.search(TIMEOUT_S)

@@ -1,0 +1,299 @@
+"""Attacks on a run across machines: each is refused and reported, and the run goes on to its right verdict."""
+
+from __future__ import annotations
+
+import socket
+import ssl
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, suppress
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import pytest
+
+from robochoc.authority.admission import Household
+from robochoc.authority.certificates import leaf_certificate, moment, new_key
+from robochoc.authority.identity import Identity
+from robochoc.communication.control import Conclusion
+from robochoc.communication.network.access import letter_key
+from robochoc.communication.network.control_messages import Ask, Register, Said
+from robochoc.communication.network.framing import LARGEST_LETTER, MASTER
+from robochoc.communication.network.inbox import Arrived
+from robochoc.communication.network.profile import profile_of
+from robochoc.communication.network.robot import NetworkRobot
+from robochoc.communication.network.router import Router
+from robochoc.communication.network.transport import CannotConnect, Post
+from robochoc.model.message import encode
+from robochoc.model.outcome import Verdict
+from robochoc.protocols.abt import Ok
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled_team import CompiledRobot
+from tests.support.held import CHAIN, Held
+from tests.support.network_runs import NetworkRun, free_endpoint, letter, put
+
+A_DAY_S = 86_400
+JUNK = 10_000
+SLOW = pytest.mark.slow
+SOON_S = 0.5
+
+
+@pytest.fixture(scope="module", name="run")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[NetworkRun]:
+    """A team in the middle of its search. However it was attacked, it has to come to its right verdict."""
+    with NetworkRun(tmp_path_factory.mktemp("run"), seconds=None) as run:
+        run.wait_for_progress()
+        yield run
+        assert run.let_go().verdict is Verdict.SOLUTION
+        assert run.held == (True, 0.0)
+    assert not run.losses
+    assert all(not ending.failed for ending in run.endings.values()), run.endings
+
+
+def shaken(endpoint: str) -> socket.socket:
+    host, _, port = endpoint.rpartition(":")
+    return socket.create_connection((host, int(port)), 5)
+
+
+# Who is not let in
+
+
+def test_a_robot_that_is_not_of_the_team(run: NetworkRun) -> None:
+    with run.post("Intruder") as post:
+        post.send(MASTER, letter(run, "Intruder", MASTER, Register(profile_of(CHAIN.robots[0]), "x")))
+        put(post, letter_key("RX0", "Intruder"))
+        run.wait_for_refusal("Intruder", "connect", "not registered with the Authority")
+        run.wait_for_progress()
+        assert post.inbox.empty()
+    assert "Intruder" not in run.master.members.robots
+
+
+def test_a_certificate_of_another_authority(run: NetworkRun) -> None:
+    other = Household(CHAIN.order).identity("RX0")
+    with pytest.raises(CannotConnect, match="does not let RX0 in"):
+        Post(run.endpoint, other, patience_s=SOON_S)
+    run.wait_for_refusal("somebody", "connect", "does not believe the master")
+    with pytest.raises(CannotConnect):  # this one does not mind whom it talks to
+        Post(run.endpoint, replace(other, ca=run.household.identity("RX0").ca), patience_s=SOON_S)
+    run.wait_for_refusal("somebody", "connect", "its certificate is not of this Authority")
+    run.wait_for_progress()
+
+
+def test_a_certificate_that_has_expired(run: NetworkRun) -> None:
+    with pytest.raises(CannotConnect):
+        Post(run.endpoint, out_of_date(run.household, "RX0"), patience_s=SOON_S)
+    run.wait_for_refusal("somebody", "connect", "its certificate has expired")
+    run.wait_for_progress()
+
+
+def out_of_date(household: Household, name: str) -> Identity:
+    key, now = new_key(), time.time()
+    times = (moment(now - 2 * A_DAY_S), moment(now - A_DAY_S))
+    issuer = (household._certificate, household._key)  # noqa: SLF001
+    identity = household.identity(name)
+    return replace(identity, key=key, certificate=leaf_certificate(issuer, key.public_key(), name, None, times))
+
+
+def test_no_certificate(run: NetworkRun) -> None:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname = False
+    context.verify_mode = ssl.CERT_NONE
+    with shaken(run.endpoint) as raw, suppress(OSError), context.wrap_socket(raw) as connection:
+        connection.sendall(b"anything")
+        connection.recv(1)
+    run.wait_for_refusal("somebody", "connect", "has shown no certificate")
+    run.wait_for_progress()
+
+
+@pytest.mark.parametrize(
+    "content", [b"GET / HTTP/1.1\r\n\r\n", bytes(100_000), b"\x16\x03\x01\xff\xff" + b"\xff" * 1000]
+)
+def test_what_is_not_tls(run: NetworkRun, content: bytes) -> None:
+    with shaken(run.endpoint) as raw, suppress(OSError):
+        raw.sendall(content)
+        raw.recv(1)
+    run.wait_for_refusal("somebody", "connect", "does not speak TLS")
+    run.wait_for_progress()
+
+
+def test_many_connections_that_say_nothing(run: NetworkRun) -> None:
+    """Nobody has to wait for them; when they hang up, each is refused in turn."""
+    with ExitStack() as stack:
+        mute = [stack.enter_context(shaken(run.endpoint)) for _ in range(12)]
+        mute[0].sendall(b"\x16\x03")
+        with run.post("RX3"):
+            run.wait_for_progress()
+    run.wait_for_refusal("somebody", "connect", r"hung up in the middle of the handshake \(10 times so far\)")
+    run.wait_for_progress()
+
+
+def test_a_robot_that_poses_as_the_master(run: NetworkRun) -> None:
+    """Its certificate is of the same Authority; but it is not one for a server at this address."""
+    endpoint = free_endpoint()
+    router = Router(endpoint, run.household.identity("RX3"), lambda _: None, 10_000)
+    with closing(router):
+        router.open({"RX0": ()})
+        with pytest.raises(CannotConnect):
+            run.post("RX0", endpoint=endpoint, patience_s=SOON_S)
+
+
+# What those who are let in may not do
+
+
+def test_a_forged_sender(run: NetworkRun) -> None:
+    with run.post("RX3") as post:
+        put(post, letter_key("RX2", "RX1"), letter(run, "RX1", "RX2", Said(1, 0, encode(Ok((0,))))))
+        put(post, letter_key(MASTER, "RX1"), letter(run, "RX1", MASTER, Conclusion(1, "no-solution")))
+        put(post, letter_key("RX2", MASTER))
+        run.wait_for_refusal("RX3", "put rc/msg/RX2/RX1", "no rule")
+        run.wait_for_refusal("RX3", "put rc/msg/MASTER/RX1", "no rule")
+        run.wait_for_refusal("RX3", "put rc/msg/RX2/MASTER", "no rule")
+        run.wait_for_progress()
+
+
+@pytest.mark.parametrize("key", ["rc/msg/RX1/*", "rc/msg/*/RX1", "rc/**", "**", "rc/msg/RX1/RX0/@adv/**"])
+def test_reading_the_letters_of_others(run: NetworkRun, key: str) -> None:
+    heard: list[Any] = []
+    with run.post("RX3") as post:
+        session = post._session  # noqa: SLF001
+        subscriber = session.declare_subscriber(key, heard.append)
+        assert not list(session.get(key))
+        run.wait_for_refusal("RX3", f"declare subscriber {key}".replace("*", r"\*"), "no rule")
+        run.wait_for_refusal("RX3", f"query {key}".replace("*", r"\*"), "no rule")
+        run.wait_for_progress()
+        assert not heard
+        del subscriber
+
+
+def test_a_robot_that_writes_to_one_it_has_nothing_to_do_with(run: NetworkRun) -> None:
+    """RX0 and RX3 share no constraint, and the protocol says that it goes `beyond` none."""
+    assert not Held.traits.beyond
+    with run.post("RX3") as post:
+        put(post, letter_key("RX0", "RX3"), letter(run, "RX3", "RX0", Said(1, 0, encode(Ok((0,))))))
+        run.wait_for_refusal("RX3", "put rc/msg/RX0/RX3", "no rule")
+        run.wait_for_progress()
+
+
+def test_posing_as_there(run: NetworkRun) -> None:
+    with run.post("RX3") as post:
+        token = post._session.liveliness().declare_token("rc/live/RX0")  # noqa: SLF001
+        run.wait_for_refusal("RX3", "liveliness token rc/live/RX0", "no rule")
+        del token
+
+
+def test_thousands_of_forbidden_letters(run: NetworkRun) -> None:
+    """They cost a few events, that say how many there were."""
+    before = len(run.refusals)
+    with run.post("RX2") as post:
+        for _ in range(JUNK):
+            put(post, letter_key("RX1", "RX0"), b"junk")
+        run.wait_for_refusal("RX2", "put rc/msg/RX1/RX0", r"no rule .*1,000 times so far")
+    assert len(run.refusals) < before + 20
+    run.wait_for_progress()
+
+
+# What those who are let in send to whom they may
+
+
+def test_a_letter_of_an_earlier_run(run: NetworkRun) -> None:
+    with run.post("RX1") as post:
+        post.send("RX2", letter(run, "RX1", "RX2", Said(1, 0, encode(Ok((0,)))), of_run="0123456789abcdef"))
+        post.send(MASTER, letter(run, "RX1", MASTER, Conclusion(1, "no-solution"), of_run="0123456789abcdef"))
+        run.wait_for_refusal("RX1", "letter to RX2", "replay: it was written in another run")
+        run.wait_for_refusal("RX1", "letter to the master", "replay: it was written in another run")
+    run.wait_for_progress()
+
+
+def test_a_letter_that_comes_twice(run: NetworkRun) -> None:
+    """Recorded where it may be read, and sent again by the one session that may write in its sender's name."""
+    with run.post("RX0") as reader, run.post("RX1") as writer:
+        recorded = next(
+            item.content
+            for item in iter(lambda: reader.inbox.get(timeout=10), None)
+            if isinstance(item, Arrived) and item.sender == "RX1"
+        )
+        writer.send("RX0", recorded)
+        run.wait_for_refusal("RX1", "letter to RX0", r"replay: letter \d+ has come before")
+    run.wait_for_progress()
+
+
+def test_a_letter_from_the_future(run: NetworkRun) -> None:
+    with run.post("RX1") as post:
+        post.send("RX2", letter(run, "RX1", "RX2", Said(1, 0, encode(Ok((0,)))), number=10**6))
+        run.wait_for_refusal("RX1", "letter to RX2", "is missing before letter 1000000")
+        post.send("RX2", letter(run, "RX1", "RX2", Said(10**6, 0, encode(Ok((0,))))))
+        run.wait_for_refusal("RX1", "letter to RX2", "it is of epoch 1000000")
+
+
+DEEP = b"\x93\xa3run\x01" + b"\x91" * 100_000
+
+
+@pytest.mark.parametrize("content", [b"", b"\xc1", b"\xff" * 1000, DEEP, b"\x93\xa1\xff\x01\x92\xa4Said\x01", b"\x90"])
+@pytest.mark.parametrize("receiver", ["RX0", MASTER])
+def test_malformed_letters(run: NetworkRun, content: bytes, receiver: str) -> None:
+    before = len(run.refusals)
+    with run.post("RX1") as post:
+        post.send(receiver, content)
+        run.wait_for_refusal("RX1", "letter to (RX0|the master)", "malformed")
+        run.wait_for_progress()
+    assert len(run.refusals) <= before + 2
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\xc1", b"\x01", msgspec.msgpack.encode(["Ok", "text"]), b"\x91\xa2\xff\xff"]
+)
+def test_a_peer_that_speaks_no_protocol(run: NetworkRun, content: bytes) -> None:
+    """Such a letter does not take the place of the right one."""
+    with run.post("RX2") as post:
+        post.send("RX1", letter(run, "RX2", "RX1", Said(1, 0, content)))
+        run.wait_for_refusal("RX2", "letter to RX1", "no message of the protocol")
+    run.wait_for_progress()
+
+
+def test_letters_that_are_too_large(run: NetworkRun) -> None:
+    """What zenoh takes is refused aloud; what is more than that ends the connection of who has sent it."""
+    with run.post("RX1") as post:
+        post.send("RX2", bytes(LARGEST_LETTER + 1))
+        post.send(MASTER, bytes(LARGEST_LETTER + 1))
+        run.wait_for_refusal("RX1", "letter to RX2", "has 8,388,609 bytes, more than")
+        run.wait_for_refusal("RX1", "letter to the master", "has 8,388,609 bytes, more than")
+        put(post, letter_key(MASTER, "RX1"), bytes(5 * LARGEST_LETTER))
+        run.wait_for_progress()
+
+
+@pytest.mark.parametrize("receiver", ["RX0", MASTER])
+def test_thousands_of_junk_letters(run: NetworkRun, receiver: str) -> None:
+    before = len(run.refusals)
+    content = {"RX0": b"\x00junk", MASTER: b"\x01junk"}[receiver]
+    with run.post("RX1") as post:
+        for _ in range(JUNK):
+            post.send(receiver, content)
+        run.wait_for_refusal(
+            "RX1", f"letter to {'RX0' if receiver == 'RX0' else 'the master'}", r"malformed.*\(10,000 times so far\)"
+        )
+        run.wait_for_progress()
+    assert len(run.refusals) < before + 20
+
+
+def test_a_robot_of_a_name_that_is_there_already(run: NetworkRun) -> None:
+    with run.post("RX2") as post:
+        robot = NetworkRobot(CompiledRobot(CHAIN["RX2"]), run.household.identity("RX2"), post, protocol_named)
+        ending = robot.run()
+    assert ending.failed
+    assert ending.why == "the master does not take RX2: a robot called RX2 is registered already"
+    run.wait_for_refusal("RX2", "register", "a robot called RX2 is registered already")
+    run.wait_for_progress()
+    assert run.master.members.robots["RX2"].gone is None, "the first one is there as before"
+
+
+def protocol_named(_name: str) -> type[Protocol]:
+    return Held
+
+
+def test_who_asks_the_directory_without_end(run: NetworkRun) -> None:
+    with run.post("RX3") as post:
+        for number in range(JUNK):
+            post.send(MASTER, letter(run, "RX3", MASTER, Ask(number, "(")))
+        run.wait_for_refusal("RX3", "ask the Directory", r"\(1,000 times so far\)")
+    run.wait_for_progress()

@@ -1,0 +1,53 @@
+"""What the master says at the end reaches all, also who was away for a moment, or has only just come."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from robochoc.communication.network.control_messages import Bye, Joined, Leave, Register, Welcome
+from robochoc.communication.network.framing import MASTER, Letters, Opened
+from robochoc.communication.network.inbox import Arrived
+from robochoc.communication.network.profile import profile_of
+from robochoc.communication.network.transport import Post
+from tests.support.held import CHAIN
+from tests.support.network_runs import SLICE_S, NetworkRun
+from tests.support.relays import Relay
+
+
+def test_robots_that_are_away_for_a_moment_hear_the_masters_farewell(tmp_path: Path) -> None:
+    """Behind a router that has been opened anew, everybody is."""
+    with NetworkRun(tmp_path, absent=CHAIN.order) as run, Relay(run.endpoint) as relay:
+        for name in CHAIN.order[:-1]:
+            run.start(name, relay.endpoint)
+        members = run.master.members.robots
+        run.wait_until(lambda: len(members) == len(CHAIN.order) - 1, "robots do not register")
+        relay.cut()
+        run.wait_until(lambda: all(member.gone for member in members.values()), "they do not go")
+        run.give_up()
+        time.sleep(2 * SLICE_S)
+        relay.mend()
+        run.wait_until(lambda: all(member.left for member in members.values()), "the master does not wait for them")
+    assert [ending.why for ending in run.endings.values()] == ["the run is over"] * len(members)
+
+
+def test_who_joins_while_the_master_says_farewell_hears_it(tmp_path: Path) -> None:
+    """Not before: it may not have been welcomed yet, and would take it for another run's."""
+    with NetworkRun(tmp_path, absent=CHAIN.order) as run, run.post("RX0") as post:
+        letters = Letters("RX0")
+        post.send(MASTER, letters.write(MASTER, Register(profile_of(CHAIN["RX0"]), "a life")))
+        run.give_up()
+        welcomes = [heard(post, letters) for _ in range(4)]  # until it answers
+        assert {type(opened.word) for opened in welcomes} == {Welcome}
+        letters.begin(run.master.run)
+        post.send(MASTER, letters.write(MASTER, Joined("a life", b"")))
+        while isinstance((opened := heard(post, letters)).word, Welcome):
+            pass
+        assert opened == Opened(1, Leave("the run is over", failed=False))
+        post.send(MASTER, letters.write(MASTER, Bye()))
+
+
+def heard(post: Post, letters: Letters) -> Opened:
+    item = post.inbox.get(timeout=10)
+    assert isinstance(item, Arrived)
+    return letters.read(MASTER, item.content)

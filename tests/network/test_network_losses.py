@@ -1,0 +1,72 @@
+"""What robots on a network show: when others are lost, and when others want to see more than their files say."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from robochoc.communication.network.local import LocalNetwork
+from robochoc.communication.network.settings import Conditions
+from robochoc.formats import PREDEFINED
+from robochoc.journal.events import AnyEvent, Lost, Sent
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint
+from robochoc.run.registry import protocol_named
+from robochoc.run.scenario import Journey, Played
+from robochoc.solver.agent_problem import Brief
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.verification.checker import objections
+from tests.support.complex_problems import complex_team
+from tests.support.held import Held
+from tests.support.loose_problems import untold_interface
+
+DIFFER = PREDEFINED["ne"]
+TEAM = complex_team(
+    {"V": ["v", "w"], "A": ["a"], "B": ["b"]},
+    {"v": [1, 2], "w": [1, 2, 3], "a": [1, 2], "b": [1, 2]},
+    [Constraint("C", DIFFER, pair, pair) for pair in (("v", "a"), ("w", "b"))],
+)
+"""Who is without B shows w to nobody."""
+
+
+@pytest.mark.slow
+def test_those_who_are_left_go_on_with_the_values_that_they_had(tmp_path: Path) -> None:
+    """They still show what B saw, and whoever reads their values knows."""
+    events: list[AnyEvent] = []
+    go = tmp_path / "go"
+
+    def observe(event: AnyEvent) -> None:
+        if isinstance(event, Sent) and not any(isinstance(one, Sent) for one in events):
+            os.kill(network.processes["B"].pid or 0, signal.SIGKILL)
+        if isinstance(event, Lost):
+            go.touch()
+        events.append(event)
+
+    brief = Brief(settings={"file": str(go)})
+    journey = Journey(TEAM, None, CompiledTeam, lambda: None, brief=brief)
+    played: list[Played] = []
+    with LocalNetwork(
+        journey.compiled(), Held, observer=observe, conditions=Conditions(survive=True), brief=brief
+    ) as network:
+        for one in journey.go(network, lambda _: None):
+            played.append(one)
+            shown = {name: member.robot.interface for name, member in network.master.members.robots.items()}
+            assert shown == {robot.name: robot.interface for robot in one.compiled.team.robots}
+    first, second = played
+    assert list(first.result.lost) == ["B"]
+    assert second.compiled.team["V"].interface == ("v", "w")
+    assert second.result.verdict is Verdict.SOLUTION
+    assert second.result.assignments["V"]["v"] != second.result.assignments["A"]["a"]
+
+
+@pytest.mark.slow
+def test_who_is_asked_to_show_more_is_not_misread() -> None:
+    """Others once took x for y: ABT found no solution."""
+    team = untold_interface()
+    with LocalNetwork(team, protocol_named("abt")) as network:
+        result = network.search(60)
+    assert result.verdict is Verdict.SOLUTION
+    assert not list(objections(team, {**result.assignments["A"], **result.assignments["B"]}))

@@ -1,0 +1,124 @@
+"""What the master makes of what it is told, and how refusals are counted: without a network."""
+
+from __future__ import annotations
+
+import threading
+
+from robochoc.communication.control import Conclusion, Counters, Ready
+from robochoc.communication.network.refusals import KINDS, LONGEST, WHO, Refusals
+from robochoc.communication.network.router import Log, Refusal
+from robochoc.communication.network.search_state import Tally, is_of
+from robochoc.journal.events import Decided, Received, Refused
+from robochoc.model.outcome import Verdict
+from tests.support.clocks import working
+
+
+def test_what_a_robot_tells_of_others() -> None:
+    """Also somebody who is of the team may only tell of itself."""
+    assert is_of(Decided(t=0, robot="A", assignment={}, clock=0), "A")
+    assert not is_of(Decided(t=0, robot="A", assignment={}, clock=0), "B")
+    assert is_of(Received(t=0, sender="A", receiver="B", type="Ok", clock=0), "B")
+    assert not is_of(Received(t=0, sender="A", receiver="B", type="Ok", clock=0), "A")
+    assert not is_of(Refused(t=0, who="A", what="", why=""), "A")
+
+
+def test_what_a_tally_does_not_take() -> None:
+    tally = Tally(2, ["A", "B"])
+    for word in (Conclusion(2, "maybe"), Conclusion(1, "no-solution"), Counters(1, 0, 5, 5), Ready(1)):
+        tally.hear("A", word)
+    tally.hear("C", Conclusion(2, "no-solution"))
+    assert tally.verdict is None
+    assert tally.counters.sent == 0
+    assert not tally.ready
+    tally.ordered = True
+    tally.hear("A", Conclusion(2, "no-solution"))
+    assert tally.verdict is Verdict.NO_SOLUTION
+
+
+def test_messages_that_are_missing_are_told_only_when_nothing_moves_any_more() -> None:
+    tally = Tally(1, ["A", "B"])
+    tally.hear("A", Counters(1, 0, 3, 0))
+    assert tally.missing(0, 10) == 0
+    tally.hear("B", Counters(1, 0, 0, 2))
+    assert [tally.missing(now, 10) for now in (1, 5, 10.9)] == [0, 0, 0]
+    for now in (12, 13):
+        assert tally.missing(now, 10) == 0
+        assert tally.wave_due
+        wave = tally.counters.begin_wave()
+        tally.hear("A", Counters(1, wave, 3, 0))
+        assert tally.missing(now + 50, 10) == 0, "B has not answered"
+        tally.hear("B", Counters(1, wave, 0, 2))
+    assert tally.missing(14, 10) == 1
+    tally.hear("B", Counters(1, 0, 0, 3))
+    assert tally.missing(15, 10) == 0
+
+
+# What is refused is counted
+
+
+def test_refusals_are_told_in_powers_of_ten_and_remembered_up_to_a_number() -> None:
+    told: list[Refused] = []
+    refusals = Refusals(lambda who, what, why: told.append(Refused(t=0, who=who, what=what, why=why)))
+    for _ in range(1234):
+        refusals.note("A", "put", "no")
+    assert [one.why for one in told] == ["no", *(f"no ({n} times so far)" for n in ("10", "100", "1,000"))]
+    told.clear()
+    for number in range(1000):
+        refusals.note("A", f"put {number}", "no")
+    assert len(told) < KINDS + 5
+    assert told[-1].what == "other things"
+    assert "(100 times so far)" in told[-1].why
+    told.clear()
+    for number in range(2 * WHO):
+        refusals.note(f"B{number}", "x" * 10**6, "y\n")
+    assert len(told) < WHO + 10
+    assert told[-1].who == "others"
+    assert len(told[0].what) == LONGEST
+    assert told[0].why == "y\\n"
+
+
+def test_refusals_of_several_threads() -> None:
+    told: list[str] = []
+    refusals = Refusals(lambda _who, _what, why: told.append(why))
+
+    def work() -> None:
+        for _ in range(2500):
+            refusals.note("A", "put", "no")
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert told[-1] == "no (10,000 times so far)"
+
+
+LINE = (
+    b"2026-01-01T00:00:00Z TRACE  rx-0 ThreadId(07) zenoh::net::routing::interceptor::access_control: "
+    b"ab12 on Interface(lo)+CertCommonName(RX3)+Transport(Tls)+ab12 is %s to Put (ingress) on rc/msg/RX2/RX1\n"
+)
+CACHED = (
+    b"2026-01-01T00:00:00Z TRACE  rx-0 ThreadId(07) zenoh::net::routing::interceptor::access_control: "
+    b"Using cached result: %s is unauthorized to Put (ingress) on rc/msg/RX2/RX1\n"
+)
+INTERCEPTED = b"2026-01-01T00:00:00Z TRACE  rx-0 ThreadId(07) zenoh::net::routing::interceptor: Msg intercepted!\n"
+
+
+def test_the_routers_log() -> None:
+    log = Log({"RX3"})
+    refusal = Refusal("RX3", "put rc/msg/RX2/RX1", "no rule of the Authority allows it")
+    assert list(log.refusals(LINE % b"authorized")) == []
+    assert list(log.refusals(LINE % b"unauthorized")) == [], "that is only looked up"
+    assert list(log.refusals(LINE % b"unauthorized" + INTERCEPTED)) == [refusal]
+    assert list(log.refusals(CACHED % b"ab12" + INTERCEPTED)) == [refusal]
+    assert list(log.refusals(CACHED % b"cd34" + INTERCEPTED)) == [], "of somebody who has no rules at all"
+    accepted = b"DEBUG acc-0 zenoh_link_tls::unicast: Accepted TLS connection on 1: 2. Common Name: %s.\n"
+    assert list(log.refusals(accepted % b"RX3" + accepted % b"MASTER")) == []
+    assert [one.who for one in log.refusals(accepted % b"RX4")] == ["RX4"]
+
+
+def test_a_large_log_is_read_quickly() -> None:
+    log = Log({"RX3"})
+    block = (LINE % b"authorized") * 40_000 + (LINE % b"unauthorized" + INTERCEPTED) * 20_000
+    with working(2):
+        assert sum(1 for _ in log.refusals(block)) == 20_000

@@ -1,0 +1,167 @@
+"""Traitors: robots that are of the team, or hold the keys of one, and routers that change what they carry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from robochoc.communication.network.control_messages import Copies, Denied, Register, Said, Word
+from robochoc.communication.network.framing import MASTER, Letters
+from robochoc.communication.network.inbox import Arrived
+from robochoc.communication.network.profile import Profile, profile_of
+from robochoc.communication.network.settings import Conditions
+from robochoc.communication.network.transport import Post
+from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.model.message import encode
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Kind
+from robochoc.protocols.abt import Ok
+from tests.support.held import CHAIN, TRIANGLE, Held
+from tests.support.network_runs import NetworkRun, letter
+
+# Revoked in the middle of a run
+
+
+@pytest.mark.parametrize("filters", [("signed", "sealed"), pytest.param((), marks=pytest.mark.slow)])
+def test_a_robot_is_revoked_and_the_others_are_told_of_it(tmp_path: Path, filters: tuple[str, ...]) -> None:
+    with NetworkRun(tmp_path, conditions=Conditions(filters, survive=True, patience_s=2)) as run:
+        run.wait_for_progress()
+        run.household.revoke("RX2")
+        result = run.wait_for_result()
+        run.wait_for_refusal("RX2", "take part", "its certificate was revoked")
+        run.wait_for_refusal("RX2", "connect", "not registered with the Authority")
+    assert result.verdict is Verdict.UNKNOWN
+    assert result.lost == {"RX2": "its certificate was revoked"}
+    assert [lost.robot for lost in run.losses] == ["RX2"]
+    assert run.endings["RX2"].why == "the master does not answer RX2: is it enrolled there, and not revoked?"
+    assert not any(run.endings[name].failed for name in ("RX0", "RX1", "RX3")), run.endings
+
+
+@pytest.mark.slow
+def test_a_robot_is_revoked_and_the_run_ends(tmp_path: Path) -> None:
+    with NetworkRun(tmp_path, conditions=Conditions(patience_s=3)) as run:
+        run.wait_for_progress()
+        run.household.revoke("RX2")
+        with pytest.raises(RobotsLost, match="RX2 was lost: its certificate was revoked"):
+            run.wait_for_result()
+
+
+# Lies, before the search
+
+
+changed = msgspec.structs.replace
+LIES: dict[str, Callable[[Profile], Profile]] = {
+    "the variable X0 is RX0's, and RX3's too": lambda p: changed(p, variables={"X0": ((0, 1),)}),
+    "RX3 calls RX0 its parent, which does not list it": lambda p: changed(p, parents=("RX2", "RX0")),
+    "RX2 calls RX3 its child, which does not list it": lambda p: changed(p, parents=()),
+    "its file is 'RX0''s, and its certificate RX3's": lambda p: changed(p, name="RX0"),
+    "X3 has 1,000,000,000,000,000,001 values": lambda p: changed(p, variables={"X3": ((0, 10**18),)}),
+    "the ranges of X3 are not ascending": lambda p: changed(p, variables={"X3": ((5, 1),)}),
+    "is no name": lambda p: changed(p, variables={"../x": ((0, 1),)}),
+    "it names itself": lambda p: changed(p, children=("RX3",)),
+    "too many neighbours": lambda p: changed(p, children=tuple(f"N{i}" for i in range(20_000))),
+    "a team is one or the other": lambda p: changed(p, kind=Kind.DISWCSP),
+}
+
+
+def test_profiles_that_lie(tmp_path: Path) -> None:
+    """Somebody with the key of RX3 tells what cannot be; then RX3 comes, tells the truth, and is taken."""
+    truth = profile_of(CHAIN["RX3"])
+    with NetworkRun(tmp_path, absent=["RX3"]) as run:
+        run.wait_until(lambda: len(run.master.members.robots) == 3, "the others do not come")
+        with run.post("RX3") as post:
+            for number, (why, lie) in enumerate(LIES.items()):
+                post.send(MASTER, letter(run, "RX3", MASTER, Register(lie(truth), str(number))))
+                run.wait_for_refusal("RX3", "register", why.replace("'", "."))
+                assert told(post, str(number)), f"it is told so: {why}"
+        run.start("RX3")
+        run.wait_for_progress()
+        assert run.let_go().verdict is Verdict.SOLUTION
+
+
+def told(post: Post, visit: str) -> bool:
+    """Whether the master denies the registration `visit`."""
+    letters = Letters(post.name)
+    while isinstance(item := post.inbox.get(timeout=10), Arrived):
+        word = letters.read(item.sender, item.content).word
+        if isinstance(word, Denied) and word.visit == visit:
+            return True
+    return False
+
+
+def test_what_the_directory_cannot_take_does_not_keep_a_robot_out(tmp_path: Path) -> None:
+    boastful = changed(profile_of(CHAIN["RX3"]), topics=("x" * 10_000, *map(str, range(200))))
+    with NetworkRun(tmp_path, absent=["RX3"]) as run, run.post("RX3") as post:
+        post.send(MASTER, letter(run, "RX3", MASTER, Register(boastful, "1")))
+        run.wait_for_refusal("RX3", "be in the directory", "unrecognised-parameter-value")
+        assert "RX3" in run.master.members.robots
+        run.give_up()
+
+
+# Whoever carries the letters
+
+
+@pytest.mark.parametrize(
+    "filters", [("sealed",), *(pytest.param(f, marks=pytest.mark.slow) for f in (("signed",), ("signed", "sealed")))]
+)
+def test_a_router_that_changes_letters(tmp_path: Path, filters: tuple[str, ...]) -> None:
+    """It can put on any key. What it makes up, changes or moves elsewhere is not genuine, whoever it is from."""
+    with NetworkRun(tmp_path, TRIANGLE, Conditions(filters)) as run:
+        run.wait_for_progress()
+        with run.post("RX0") as reader, run.post("RX1") as carrier:
+            true = recorded_said(reader)
+            made_up = encode(Ok((0,)))
+            altered = true.content[:-1] + bytes([true.content[-1] ^ 1])
+            for content in (made_up, altered, true.content, b""):
+                carrier.send("RX2", letter(run, "RX1", "RX2", Said(1, 0, content)))
+            for why in {"signed": ["signature is wrong"], "sealed": ["was changed", "too short"]}[filters[-1]]:
+                run.wait_for_refusal("RX1", "letter to RX2", why)
+        run.wait_for_progress()
+        assert run.let_go().verdict is Verdict.NO_SOLUTION
+
+
+@pytest.mark.parametrize("filters", [(), ("sealed",)])
+def test_constraints_that_others_have_to_know_are_sealed_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, filters: tuple[str, ...]
+) -> None:
+    monkeypatch.setattr(Held, "traits", replace(Held.traits, everywhere=True))
+    sent: list[bytes] = []
+    write = Letters.write
+
+    def recorded(letters: Letters, receiver: str, word: Word) -> bytes:
+        content = write(letters, receiver, word)
+        if isinstance(word, Copies):
+            sent.append(content)
+        return content
+
+    monkeypatch.setattr(Letters, "write", recorded)
+    with NetworkRun(tmp_path, TRIANGLE, Conditions(filters)) as run:
+        assert run.let_go().verdict is Verdict.NO_SOLUTION
+    assert len(sent) == 3
+    assert any(b"ne(X" in content for content in sent) is not bool(filters)
+
+
+def recorded_said(reader: Post) -> Said:
+    letters = Letters(reader.name)
+    while isinstance(item := reader.inbox.get(timeout=10), Arrived):
+        word = letters._of_robot.decode(item.content).word if item.sender != MASTER else None  # noqa: SLF001
+        if isinstance(word, Said):
+            return word
+    raise AssertionError
+
+
+@pytest.mark.slow
+def test_a_message_that_is_lost_for_good_ends_the_run(tmp_path: Path) -> None:
+    """With the key of RX2 somebody has said nothing, in a letter that bears the number of RX2's first one."""
+    with NetworkRun(tmp_path, conditions=Conditions(patience_s=3)) as run:
+        run.wait_for_progress()
+        with run.post("RX2") as post:
+            post.send("RX3", letter(run, "RX2", "RX3", Said(0, 0, b"")))
+            post.send("RX3", letter(run, "RX2", "RX3", Said(0, 0, b"")))
+            run.wait_for_refusal("RX2", "letter to RX3", "letter 1 has come before")
+        with pytest.raises(RobotsLost, match="MASTER was lost: 1 messages between robots were lost for good"):
+            run.let_go()

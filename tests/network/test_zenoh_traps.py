@@ -1,0 +1,209 @@
+"""What zenoh does by default, or without a word, and must not do to us."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from robochoc.authority.admission import Household
+from robochoc.communication.control import Failed
+from robochoc.communication.network import transport as post
+from robochoc.communication.network.access import ALL, access_control
+from robochoc.communication.network.framing import LARGEST_LETTER, MASTER, Letters, TooLarge
+from robochoc.communication.network.inbox import Arrived, Item
+from robochoc.communication.network.local import LocalNetwork
+from robochoc.communication.network.members import Members, NotTaken
+from robochoc.communication.network.profile import profile_of
+from robochoc.communication.network.router import Router
+from robochoc.communication.network.settings import LEASE_MS
+from robochoc.communication.network.transport import Post
+from robochoc.communication.network.zenoh_config import RX_BYTES, config
+from robochoc.generators.random_csp import random_csp
+from robochoc.protocols.abt import ABT
+from tests.support.clocks import waiting
+from tests.support.program import ROOT
+
+PATIENCE_S = 30.0
+REACH = {"A": (ALL,), "B": (ALL,)}
+LISTENS = "0A"
+LOOPBACK = "0100007F"
+
+
+def free() -> str:
+    with socket.create_server(("127.0.0.1", 0)) as trial:
+        return f"127.0.0.1:{trial.getsockname()[1]}"
+
+
+@pytest.fixture(scope="module")
+def household() -> Household:
+    return Household(("A", "B"))
+
+
+@pytest.fixture(scope="module")
+def router(household: Household) -> Iterator[Router]:
+    opened = Router(free(), household.master_identity(("127.0.0.1",)), None, LEASE_MS)
+    opened.open(REACH)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def posts(household: Household, router: Router) -> Iterator[tuple[Post, Post]]:
+    join = partial(Post, router.endpoint, watch=(), patience_s=PATIENCE_S)
+    with join(household.identity("A")) as a, join(household.identity("B")) as b:
+        yield a, b
+
+
+def letter(of: Post) -> Item:
+    return of.inbox.get(timeout=PATIENCE_S)
+
+
+# What is open
+
+
+def open_sockets(process: int) -> tuple[set[str], set[str]]:
+    """The addresses that a process listens on, and those of its sockets that take datagrams, from /proc."""
+    links = []
+    for descriptor in Path(f"/proc/{process}/fd").iterdir():
+        try:
+            links.append(str(descriptor.readlink()))
+        except FileNotFoundError:
+            continue
+    own = {link[8:-1] for link in links if link.startswith("socket:[")}
+
+    def rows(table: str) -> list[list[str]]:
+        lines = Path(f"/proc/{process}/net/{table}").read_text().splitlines()[1:]
+        return [row for row in map(str.split, lines) if row[9] in own]
+
+    listening = {row[1] for table in ("tcp", "tcp6") for row in rows(table) if row[3] == LISTENS}
+    return listening, {row[1] for table in ("udp", "udp6") for row in rows(table)}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_nothing_listens_but_the_router_and_nothing_looks_for_others() -> None:
+    with LocalNetwork(random_csp(3, 2, 1.0, 0.3, 1, connected=True), ABT) as session:
+        session.search(PATIENCE_S)
+        port = int(session.master.endpoint.rpartition(":")[2])
+        robots = [process.pid for process in session.processes.values()]
+        router = next(
+            int(child)
+            for child in Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
+            if b"network.router" in Path(f"/proc/{child}/cmdline").read_bytes()
+        )
+        before = open_sockets(os.getpid())
+        assert open_sockets(router) == ({f"{LOOPBACK}:{port:04X}"}, set())
+        assert len(robots) == 3
+        for robot in robots:
+            assert robot
+            assert open_sockets(robot) == (set(), set())
+    assert open_sockets(os.getpid()) == before, "the master's own session listens nowhere"
+
+
+def test_the_router_is_ours_whatever_is_in_the_working_directory(
+    household: Household, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is given the master's key."""
+    (tmp_path / "zenoh.py").write_text("raise SystemExit('not ours')")
+    monkeypatch.chdir(tmp_path)
+    opened = Router(free(), household.master_identity(("127.0.0.1",)), None, LEASE_MS)
+    opened.open(REACH)
+    opened.close()
+
+
+# What is dropped without a word
+
+
+def test_letters_wait_for_a_receiver_that_does_not_look(posts: tuple[Post, Post]) -> None:
+    sender, receiver = posts
+    for number in range(5_000):
+        sender.send("B", number.to_bytes(2) * 200)
+    sender.send("B", b"last")
+    came = [letter(receiver) for _ in range(5_001)]
+    assert came == [*(Arrived("A", number.to_bytes(2) * 200) for number in range(5_000)), Arrived("A", b"last")]
+
+
+def test_the_largest_letter_arrives(posts: tuple[Post, Post]) -> None:
+    sender, receiver = posts
+    content = os.urandom(LARGEST_LETTER)
+    sender.send("B", content)
+    assert letter(receiver) == Arrived("A", content)
+
+
+def test_a_larger_one_is_refused_before_it_is_sent() -> None:
+    assert RX_BYTES > LARGEST_LETTER
+    letters = Letters("A", "run")
+    with pytest.raises(TooLarge, match=r"a message of A to MASTER has 8,388,\d+ bytes, more than 8,388,608"):
+        letters.write(MASTER, Failed("x" * LARGEST_LETTER))
+    assert letters.next_number(MASTER) == 1, "what was not sent leaves no gap"
+
+
+def test_what_was_sent_in_an_outage_arrives_without_a_heartbeat(
+    router: Router, posts: tuple[Post, Post], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The receiver asks for it as it sees the sender again. So heartbeats, which cost much, can be rare."""
+    monkeypatch.setattr(post, "HEARTBEAT_S", 3600)
+    sender, receiver = posts
+    sender.send("B", b"before")
+    assert letter(receiver) == Arrived("A", b"before")
+    router.close()
+    sent = [Arrived("A", number.to_bytes(2)) for number in range(50)]
+    for each in sent:
+        sender.send("B", each.content)
+    router.open(REACH)
+    assert [letter(receiver) for _ in sent] == sent
+
+
+# What hangs
+
+
+def test_a_program_forks_after_a_network_run_runs_another_and_ends() -> None:
+    with subprocess.Popen(
+        [sys.executable, str(ROOT / "support" / "zenoh_program.py")],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as program:
+        assert program.stdout
+        said = [program.stdout.readline().strip() for _ in range(4)]
+        with waiting(5):  # it takes some hundredths of a second; a machine may be busy
+            assert program.wait(PATIENCE_S) == 0
+    assert said == ["solution"] * 3 + ["closed"]
+
+
+def test_sessions_open_and_close_at_once(household: Household, router: Router) -> None:
+    with waiting(5):  # it takes some hundredths of a second; a machine may be busy
+        for _ in range(5):
+            with Post(router.endpoint, household.identity("A"), watch=(), patience_s=PATIENCE_S) as one:
+                one.send("B", b"hello")
+
+
+def test_a_router_that_may_not_look_for_others_does_not_wait_for_them() -> None:
+    """By default it waits for half a second, and all robots with it."""
+    delay = json.loads(config({"mode": "router"}).get_json("scouting/delay"))
+    assert delay == 0
+
+
+# What is more than a name
+
+
+@pytest.mark.parametrize("name", ["*", "**", "A*", "A/B", "$*", "@adv", "A#", "A?b", "", "MASTER"])
+def test_what_is_no_part_of_a_key_is_no_name(name: str) -> None:
+    with pytest.raises(ValueError, match="is no name of a robot on a network"):
+        access_control({"A": (), name: ()})
+
+
+def test_a_profile_names_nobody_who_is_no_part_of_a_key() -> None:
+    profile = profile_of(random_csp(3, 2, 1.0, 0.3, 1, connected=True).robots[0])
+    bad = type(profile)(
+        profile.name, profile.kind, ("*",), (), profile.variables, {}, profile.weight, profile.dearest, ()
+    )
+    with pytest.raises(NotTaken, match=r"'\*' is no name"):
+        Members().register(profile.name, bad, "visit")

@@ -1,0 +1,212 @@
+"""One test per rule of AFC-tree (Wahbi et al., Constraints 18(3), 2013, Section 4), named for it."""
+
+from __future__ import annotations
+
+import doctest
+from random import Random
+
+import pytest
+
+import robochoc.protocols.afc_tree
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Value
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.protocols.afc_ng import CPA, AFCng, Nogood, Solved
+from robochoc.protocols.afc_tree import Accept, AFCTree
+from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.agent_problem import parts
+from robochoc.solver.compiled import LocalProblem
+from robochoc.verification.checker import objections
+from tests.support.agents import told, value
+from tests.support.problems import random_team, team_of
+
+DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
+
+
+def different(names: str, pairs: str, values: int) -> Team:
+    """A robot for each letter; each of `pairs` takes different ones of `values` values."""
+    constraints = [Constraint("C", DIFFERENT, (pair[0], pair[1]), (pair[0], pair[1])) for pair in pairs.split()]
+    return team_of({name: range(1, values + 1) for name in names}, constraints)
+
+
+def fork(values: int = 3) -> Team:
+    """B and C below A; D and E below C, of which E also knows A."""
+    return different("ABCDE", "AB AC CD CE AE", values)
+
+
+def created(team: Team, name: str) -> AFCTree:
+    part = parts(team, tree=True)[name]
+    return AFCTree(LocalProblem(part), PriorityOrder(part.order, part.links))
+
+
+def agent(team: Team, name: str) -> AFCTree:
+    """The protocol object of one robot, started, with nothing left to say."""
+    afc = created(team, name)
+    afc.start()
+    afc.outbox.clear()
+    return afc
+
+
+def cpa(*assignments: tuple[int, int]) -> CPA:
+    """A CPA of robots with one variable each: their values and counters."""
+    return CPA([((value,), counter) for value, counter in assignments])
+
+
+def test_every_root_begins() -> None:
+    team = different("ABCD", "AC BD", 2)
+    said = {}
+    for name in team.order:
+        afc = created(team, name)
+        afc.start()
+        said[name] = afc.outbox
+    assert said == {"RA": [("RC", cpa((1, 1)))], "RB": [("RD", cpa((1, 1)))], "RC": [], "RD": []}
+
+
+def test_a_cpa_goes_to_tree_children_and_to_those_below_that_share_a_constraint() -> None:
+    afc = created(fork(), "RA")
+    afc.start()
+    assert afc.outbox == [(name, cpa((1, 1))) for name in ("RB", "RC", "RE")]
+
+
+def test_a_tree_child_without_a_constraint_with_the_sender_gets_its_cpa() -> None:
+    afc = created(different("ABC", "AC BC", 2), "RA")
+    afc.start()
+    assert [receiver for receiver, _ in afc.outbox] == ["RB", "RC"]
+
+
+def test_a_cpa_holds_the_values_of_one_branch_only() -> None:
+    assert agent(fork(), "RD").above == ["RA", "RC"]
+    said = told(agent(fork(), "RD"), ("RC", cpa((1, 1), (2, 1))))
+    assert said == [("RC", Accept([1, 1], {"RD": (1,)}))]
+
+
+def test_only_the_tree_parent_s_cpa_lets_a_robot_assign() -> None:
+    afc = agent(fork(), "RE")
+    assert told(afc, ("RA", cpa((1, 1)))) == []
+    assert list(afc.store) == [{"RA": (1,)}]
+    told(afc, ("RC", cpa((1, 1), (2, 1))))
+    assert value(afc) == (3,)
+
+
+def test_all_children_of_a_robot_assign_at_once() -> None:
+    team = fork()
+    for name in ("RB", "RC"):
+        afc = agent(team, name)
+        assert told(afc, ("RA", cpa((1, 1))))
+        assert value(afc) == (2,)
+
+
+def test_backtrack_goes_to_the_lowest_ancestor_among_the_causes() -> None:
+    afc = agent(fork(2), "RE")
+    assert told(afc, ("RC", cpa((1, 1), (2, 1)))) == [("RC", Nogood({"RA": (1,)}, (2,)))]
+    assert afc.view == {"RA": (1,)}
+
+
+def test_constraints_with_ancestors_that_have_not_moved_are_not_checked_again() -> None:
+    afc = agent(fork(), "RE")
+    told(afc, ("RC", cpa((1, 1), (2, 1))))
+    checks = afc.problem.checks
+    told(afc, ("RC", cpa((1, 1), (3, 2))))
+    assert afc.problem.checks == checks + 2
+
+
+def test_a_leaf_accepts_the_cpa_that_it_has_a_value_for() -> None:
+    said = told(agent(fork(), "RB"), ("RA", cpa((1, 4))))
+    assert said == [("RA", Accept([4], {"RB": (2,)}))]
+
+
+def test_a_robot_accepts_once_all_its_children_have() -> None:
+    afc = agent(fork(), "RC")
+    told(afc, ("RA", cpa((1, 1))))
+    assert told(afc, ("RD", Accept([1, 1], {"RD": (1,)}))) == []
+    said = told(afc, ("RE", Accept([1, 1], {"RE": (3,)})))
+    assert said == [("RA", Accept([1], {"RC": (2,), "RD": (1,), "RE": (3,)}))]
+
+
+@pytest.mark.parametrize("counters", [[1, 1], [2, 2]])
+def test_an_accept_of_another_cpa_is_ignored(counters: list[int]) -> None:
+    afc = agent(fork(), "RC")
+    told(afc, ("RA", cpa((1, 1))), ("RD", Accept([1, 1], {"RD": (1,)})))
+    told(afc, ("RA", cpa((2, 2))))
+    told(afc, ("RD", Accept([2, 1], {"RD": (2,)})))
+    assert told(afc, ("RE", Accept(counters, {"RE": (3,)}))) == []
+
+
+def test_a_new_value_needs_new_accepts() -> None:
+    afc = agent(fork(), "RC")
+    told(afc, ("RA", cpa((1, 1))))
+    told(afc, ("RD", Accept([1, 1], {"RD": (1,)})), ("RE", Nogood({"RA": (1,)}, (2,))))
+    assert value(afc) == (3,)
+    assert told(afc, ("RE", Accept([1, 2], {"RE": (2,)}))) == []
+    assert told(afc, ("RD", Accept([1, 2], {"RD": (1,)}))) != []
+
+
+def test_a_root_with_all_accepts_tells_its_part_the_solution() -> None:
+    afc = agent(fork(), "RA")
+    told(afc, ("RB", Accept([1], {"RB": (2,)})))
+    said = told(afc, ("RC", Accept([1], {"RC": (2,), "RD": (1,), "RE": (3,)})))
+    solution: dict[str, Value] = {"RA": (1,), "RB": (2,), "RC": (2,), "RD": (1,), "RE": (3,)}
+    assert said == [(name, Solved(solution)) for name in ("RB", "RC", "RD", "RE")]
+
+
+def test_who_is_told_a_solution_takes_its_value_and_is_silent() -> None:
+    afc = agent(fork(), "RC")
+    told(afc, ("RA", cpa((1, 1))))
+    solution: dict[str, Value] = {"RA": (1,), "RB": (2,), "RC": (3,), "RD": (1,), "RE": (2,)}
+    packet = (("RA", Solved(solution)), ("RD", Accept([1, 1], {"RD": (1,)})), ("RE", Accept([1, 1], {"RE": (3,)})))
+    assert told(afc, *packet, ("RA", cpa((2, 2)))) == []
+    assert value(afc) == (3,)
+
+
+def test_a_robot_alone_is_a_part_of_its_own_and_solves_it_in_silence() -> None:
+    afc = created(different("ABC", "AC", 2), "RB")
+    afc.start()
+    assert afc.assignment == {"B": 1}
+    assert afc.outbox == []
+    assert afc.over
+
+
+def test_a_part_without_solution_ends_the_search_of_all() -> None:
+    team = different("ABCDE", "AC BD BE DE", 2)
+    assert Simulation(team, AFCTree, Concurrent(0)).run(60).verdict is Verdict.NO_SOLUTION
+
+
+def test_an_order_without_its_tree_is_refused() -> None:
+    team = fork()
+    with pytest.raises(ValueError, match="pseudo-tree"):
+        AFCTree(LocalProblem(parts(team)["RA"]), PriorityOrder(team.order))
+
+
+class Undetected(AFCTree):
+    """Never says that it accepts."""
+
+    def _detect_solution(self) -> None:
+        """The values have to be right without it."""
+
+
+def test_the_values_form_a_solution_when_nobody_speaks_even_without_accepts() -> None:
+    chance = Random("undetected")
+    solved = 0
+    for seed in range(150):
+        team = random_team(chance)
+        result = Simulation(team, Undetected, RandomChannels(seed)).run(60)
+        if result.verdict is Verdict.SOLUTION:
+            solved += 1
+            assert not list(objections(team, {n: v for own in result.assignments.values() for n, v in own.items()}))
+    assert solved > 50
+
+
+def test_branches_are_searched_at_the_same_time() -> None:
+    """Ten triangles below one robot: AFC-ng checks one after the other, AFC-tree all at once."""
+    names = "ABCDEFGHIJKLMNOPQRSTU"
+    pairs = [f"A{one} A{two} {one}{two}" for one, two in zip(names[1::2], names[2::2], strict=True)]
+    team = different(names, " ".join(pairs), 3)
+    tree, chain = (Simulation(team, protocol, Concurrent(0)).run(60).metrics for protocol in (AFCTree, AFCng))
+    assert tree.checks == chain.checks
+    assert tree.ncccs * 2 < chain.ncccs
+
+
+def test_the_docstring_shows_what_happens() -> None:
+    assert doctest.testmod(robochoc.protocols.afc_tree).failed == 0

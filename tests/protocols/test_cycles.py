@@ -1,0 +1,184 @@
+"""What all synchronous local searches have in common: phases, cycles, the trail, the end."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from random import Random
+
+import pytest
+
+from robochoc.communication.host import BadSettings, settings_of
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Assignment, Constraint, Relation, Semantics, Team
+from robochoc.protocols.cycles import CycleProtocol, Value
+from robochoc.protocols.dsa import DSA
+from robochoc.protocols.findings import Trail
+from robochoc.protocols.maxsum import MaxSum
+from robochoc.protocols.mgm import MGM
+from robochoc.protocols.mgm2 import MGM2
+from robochoc.run.incumbent import best_of
+from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run.registry import protocol_named
+from robochoc.solver.agent_problem import Brief
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.verification.checker import objections
+from robochoc.verification.objective import aside_cost
+from tests.support.agents import told
+from tests.support.cost_problems import random_cost_team, random_hard_team
+from tests.support.courses import any_schedule, course_of, domains_of, played, robot_of, started
+from tests.support.problems import team_of
+
+ALL = pytest.mark.parametrize("protocol", [DSA, MGM, MGM2, MaxSum])
+DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
+
+
+def chain(*, names: str = "ABC", values: int = 3) -> Team:
+    """Each differs from the next; a last robot D that nobody knows."""
+    constraints = [Constraint("C", DIFFERENT, pair, pair) for pair in pairwise(names)]
+    return team_of(dict.fromkeys(f"{names}D", range(1, values + 1)), constraints)
+
+
+def test_a_phase_is_over_when_all_neighbours_have_been_heard() -> None:
+    robot = robot_of(DSA, chain(), "RB")
+    assert started(robot) == [("RA", Value((1,))), ("RC", Value((1,)))]
+    assert told(robot, ("RA", Value((1,)))) == []
+    assert robot.cycle == 0
+    assert told(robot, ("RC", Value((1,)))) == [("RA", Value((2,))), ("RC", Value((2,)))]
+    assert robot.cycle == 1
+
+
+def test_what_a_neighbour_says_ahead_is_kept_for_its_phase() -> None:
+    robot = robot_of(DSA, chain(), "RB")
+    started(robot)
+    assert told(robot, ("RA", Value((2,))), ("RA", Value((1,)))) == []
+    assert told(robot, ("RC", Value((2,)))) == [("RA", Value((1,))), ("RC", Value((1,)))]
+    assert told(robot, ("RC", Value((2,)))) == [("RA", Value((3,))), ("RC", Value((3,)))]
+
+
+def test_a_packet_may_end_two_phases() -> None:
+    robot = robot_of(DSA, chain(), "RB")
+    started(robot)
+    told(robot, ("RA", Value((1,))), ("RA", Value((1,))), ("RC", Value((1,))), ("RC", Value((1,))))
+    assert robot.cycle == 2
+
+
+def test_the_trail_has_an_entry_for_each_change() -> None:
+    robot = robot_of(DSA, chain(names="AB"), "RB")
+    started(robot)
+    for value in (1, 1, 3, 2):
+        told(robot, ("RA", Value((value,))))
+    assert robot.findings.trail == Trail([(0, 0), (1, 1), (4, 0)], 4)
+
+
+def test_after_so_many_cycles_a_robot_is_silent() -> None:
+    robot = robot_of(DSA, chain(names="AB"), "RB")
+    robot.settings = settings_of(DSA, {"cycles": "2"})  # type: ignore[assignment]
+    started(robot)
+    assert told(robot, ("RA", Value((1,))))
+    assert told(robot, ("RA", Value((2,)))) == []
+    assert robot.cycle == 2
+
+
+@ALL
+def test_a_robot_without_neighbours_takes_its_cheapest_value_at_once(protocol: type[CycleProtocol]) -> None:
+    prices = Relation("P", 1, Semantics.SOFT, ((1,), (2,), (3,)), (4, 0, 2))
+    team = team_of({"A": (1, 2, 3)}, [Constraint("P", prices, ("A",), ("A",))])
+    robot = robot_of(protocol, team, "RA")
+    assert started(robot) == []
+    assert robot.assignment == {"A": 2}
+    assert robot.findings.trail == Trail([(0, 0)], 100)
+
+
+@ALL
+def test_a_robot_with_an_empty_domain_ends_the_search(protocol: type[CycleProtocol]) -> None:
+    robot = robot_of(
+        protocol, team_of({"A": (1,), "B": ()}, [Constraint("C", DIFFERENT, ("A", "B"), ("A", "B"))]), "RB"
+    )
+    assert started(robot) == []
+    assert robot.verdict is Verdict.NO_SOLUTION
+
+
+@ALL
+def test_parts_of_the_team_that_know_nothing_of_each_other_end_with_the_same_cycle(
+    protocol: type[CycleProtocol],
+) -> None:
+    result = played(chain(), protocol, Concurrent(0), cycles=7)
+    assert {found.trail.cycle for found in result.findings.values() if found.trail} == {7}
+
+
+@ALL
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in (1, 2))])
+def test_whatever_the_delays_the_course_is_the_same(protocol: type[CycleProtocol], batch: int) -> None:
+    chance = Random(f"delays {protocol.__name__} {batch}")
+    for seed in range(20):
+        team = chance.choice((random_cost_team, random_hard_team))(chance)
+        if all(domains_of(team).values()):
+            one, other = (played(team, protocol, any_schedule(chance), seed, cycles=9) for _ in range(2))
+            assert one.verdict is other.verdict
+            if one.verdict is Verdict.SOLUTION:
+                assert one.findings == other.findings
+                assert one.metrics.messages == other.metrics.messages
+
+
+@ALL
+def test_the_answer_is_the_cheapest_cycle(protocol: type[CycleProtocol]) -> None:
+    chance = Random(f"cheapest {protocol.__name__}")
+    name = {DSA: "dsa", MGM: "mgm", MGM2: "mgm2", MaxSum: "maxsum"}[protocol]
+    assert protocol_named(name) is protocol
+    for seed in range(20):
+        team = random_cost_team(chance)
+        if all(domains_of(team).values()):
+            result = played(team, protocol, Concurrent(seed), seed, cycles=12)
+            if result.verdict is Verdict.NO_SOLUTION:
+                continue
+            costs = [sum(c.price(values) for c in team.constraints()) for values in course_of(team, result)]
+            options = Options(protocol=name, runtime=Runtime.SIMULATOR, seed=seed, settings={"cycles": "12"})
+            outcome = solve(team, options)
+            assert outcome.cost == (None if min(costs) == float("inf") else min(costs))
+
+
+@ALL
+def test_who_may_step_aside_does_so_rather_than_break_anything(protocol: type[CycleProtocol]) -> None:
+    chance = Random(f"aside {protocol.__name__}")
+    aside = 0
+    for seed in range(40):
+        team = random_hard_team(chance)
+        price = aside_cost(team)
+        brief = Brief(seed, {"cycles": "25"}, aside=price)
+        result = Simulation(team, protocol, any_schedule(chance), brief=brief).search()
+        assert result.verdict is Verdict.SOLUTION
+        found = best_of(CompiledTeam(team), result, price)
+        assert found
+        assert not list(objections(team, found.assignment, _absent(team, found.assignment)))
+        aside += len(_absent(team, found.assignment)) > 0
+    assert aside > 10
+
+
+def _absent(team: Team, assignment: Assignment) -> tuple[str, ...]:
+    return tuple(robot.name for robot in team.robots if robot.variables[0].name not in assignment)
+
+
+def test_that_all_was_in_vain_is_said() -> None:
+    team = team_of(dict.fromkeys("AB", (1,)), [Constraint("C", DIFFERENT, ("A", "B"), ("A", "B"))])
+    outcome = solve(team, Options(protocol="dsa", runtime=Runtime.SIMULATOR, settings={"cycles": "3"}))
+    assert outcome.verdict is Verdict.UNKNOWN
+    assert outcome.reason == "dsa has come to its end, and all that it came by breaks a hard constraint"
+
+
+@ALL
+@pytest.mark.parametrize("cycles", ["0", "-1", "x"])
+def test_there_is_at_least_one_cycle(protocol: type[CycleProtocol], cycles: str) -> None:
+    with pytest.raises(BadSettings, match=f"cycles is {cycles}; it must be 1 or more" if cycles != "x" else "int"):
+        settings_of(protocol, {"cycles": cycles})
+
+
+def test_what_is_set_is_not_set_of_the_protocol_that_says_who_steps_aside() -> None:
+    team = team_of(dict.fromkeys("AB", (1,)), [Constraint("C", DIFFERENT, ("A", "B"), ("A", "B"))])
+    options = Options(
+        protocol="maxsum", runtime=Runtime.SIMULATOR, settings={"cycles": "3"}, withdraw=Withdrawal.MAXIMAL
+    )
+    outcome = solve(team, options)
+    assert outcome.verdict is Verdict.SOLUTION
+    assert len(outcome.withdrawn) == 1

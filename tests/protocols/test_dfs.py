@@ -1,0 +1,305 @@
+"""The pseudo-tree that robots build: the rules of `protocols/dfs.py` one by one, and what it promises, on any graph."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from random import Random
+from typing import ClassVar
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robochoc.communication.run_result import RunResult
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Message
+from robochoc.model.outcome import Place, Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.protocols.dfs import Back, Token, TreeMessage, TreeProtocol, Wave
+from robochoc.protocols.findings import Findings
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.traits import Traits
+from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.solver.agent_problem import parts
+from robochoc.solver.compiled import LocalProblem
+from tests.support.agents import told
+from tests.support.problems import team_of
+
+
+class Hello(Message, frozen=True):
+    """Somebody has begun."""
+
+
+class Greeter(TreeProtocol):
+    """Greets all neighbours when it begins; `made` are all that there are, by name."""
+
+    messages = TreeMessage | Hello
+    traits = Traits(costs=True, everywhere=True)
+    made: ClassVar[dict[str, Greeter]] = {}
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.begun = 0
+        self.decided = 0
+        self.greeted: list[str] = []
+        self.early = 0
+        self.made[problem.agent] = self
+
+    def receive(self, sender: str, message: Message) -> None:
+        self.early += isinstance(message, Hello) and not self.placed
+        super().receive(sender, message)
+
+    def begin(self) -> None:
+        assert self.placed
+        assert not self.greeted
+        self.begun += 1
+        self.value = 0
+        for name in (*self.ancestors, *self.descendants):
+            self.send(name, Hello())
+
+    def hear(self, sender: str, message: Message) -> None:
+        assert self.begun
+        assert message == Hello()
+        self.greeted.append(sender)
+
+    def decide(self) -> None:
+        assert self.begun
+        self.decided += 1
+
+
+def graph(names: str, scopes: str) -> Team:
+    """A robot for each letter, and a constraint over each of `scopes`."""
+
+    def constraint(scope: str) -> Constraint:
+        return Constraint("C", Relation("R", len(scope), Semantics.CONFLICTS, ()), tuple(scope), tuple(scope))
+
+    return team_of(dict.fromkeys(names, (1,)), [constraint(scope) for scope in scopes.split()])
+
+
+def random_graph(chance: Random) -> Team:
+    """1 to 10 robots, in one part or several, with constraints over two to four of them."""
+    names = "ABCDEFGHIJ"[: chance.randint(1, 10)]
+    density = chance.choice((0.1, 0.2, 0.4, 0.8, 1))
+    scopes = [first + second for first, second in itertools.combinations(names, 2) if chance.random() < density]
+    if len(names) > 3 and chance.random() < 0.4:
+        scopes += ["".join(chance.sample(names, chance.choice((3, 4)))) for _ in range(2)]
+    return graph(names, " ".join(scopes))
+
+
+def neighbours_of(team: Team) -> dict[str, set[str]]:
+    """Who shares a constraint with whom."""
+    met: dict[str, set[str]] = {name: set() for name in team.order}
+    for constraint in team.constraints():
+        owners = {team.owner[name] for name in constraint.variables}
+        for name in owners:
+            met[name] |= owners - {name}
+    return met
+
+
+def expected(team: Team) -> dict[str, Place]:
+    """The tree that a depth-first search without any messages finds."""
+    met = neighbours_of(team)
+    strength = {name: (len(met[name]), -rank) for rank, name in enumerate(team.order)}
+    places: dict[str, Place] = {}
+
+    def visit(name: str, parent: str | None) -> None:
+        above = tuple(other for other in team.order if other in places and other in met[name] and other != parent)
+        places[name] = Place(parent, above)
+        while left := [other for other in met[name] if other not in places]:
+            visit(max(left, key=strength.__getitem__), name)
+
+    for name in sorted(team.order, key=strength.__getitem__, reverse=True):
+        if name not in places:
+            visit(name, None)
+    return places
+
+
+def above(places: Mapping[str, Place], name: str) -> Iterator[str]:
+    """Those on the way from `name` to its root."""
+    parent = places[name].parent
+    while parent is not None:
+        yield parent
+        parent = places[parent].parent
+
+
+def played(team: Team, schedule: Schedule) -> tuple[RunResult, dict[str, Greeter]]:
+    Greeter.made.clear()
+    return Simulation(team, Greeter, schedule).search(), dict(Greeter.made)
+
+
+def schedule_of(chance: Random) -> Schedule:
+    seed = chance.getrandbits(32)
+    return RandomChannels(seed) if chance.random() < 0.5 else Concurrent(seed, chance.choice((0, 3, 20, 200)))
+
+
+@given(chance=st.randoms(use_true_random=False))
+@settings(max_examples=100, deadline=None)
+def test_every_schedule_builds_the_tree_of_a_depth_first_search(chance: Random) -> None:
+    """The root has the most neighbours of its part, a token goes to the neighbour with the most; ties by priority."""
+    team = random_graph(chance)
+    result, _ = played(team, schedule_of(chance))
+    assert result.verdict is Verdict.SOLUTION
+    assert {name: found.place for name, found in result.findings.items()} == expected(team)
+
+
+@given(chance=st.randoms(use_true_random=False))
+@settings(max_examples=60, deadline=None)
+def test_neighbours_stand_one_above_the_other(chance: Random) -> None:
+    """All robots of an n-ary constraint stand on one branch, as any two of them do."""
+    team = random_graph(chance)
+    result, robots = played(team, schedule_of(chance))
+    places = {name: found.place for name, found in result.findings.items() if found.place is not None}
+    met = neighbours_of(team)
+    for name, robot in robots.items():
+        ancestors = set(above(places, name))
+        descendants = {other for other in places if name in above(places, other)}
+        assert set(robot.ancestors) == met[name] & ancestors
+        assert set(robot.descendants) == met[name] & descendants
+        assert met[name] <= ancestors | descendants
+        assert set(robot.children) == {other for other, place in places.items() if place.parent == name}
+        for names in (robot.pseudo_parents, robot.children, robot.pseudo_children):
+            assert list(names) == sorted(names, key=team.order.index)
+
+
+@given(chance=st.randoms(use_true_random=False))
+@settings(max_examples=60, deadline=None)
+def test_a_token_passes_twice_between_a_robot_and_its_parent_and_a_wave_along_each_edge_both_ways(
+    chance: Random,
+) -> None:
+    team = random_graph(chance)
+    result, robots = played(team, schedule_of(chance))
+    joined = sum(robot.parent is not None for robot in robots.values())
+    edges = sum(map(len, neighbours_of(team).values()))
+    messages = result.metrics.messages
+    assert messages.get("Token", 0) == messages.get("Back", 0) == joined
+    assert messages.get("Wave", 0) >= edges
+    assert messages.get("Hello", 0) == edges
+
+
+def test_each_begins_once_and_what_comes_early_is_kept_for_then() -> None:
+    chance = Random("early")
+    early = 0
+    for _ in range(80):
+        team = random_graph(chance)
+        _, robots = played(team, schedule_of(chance))
+        met = neighbours_of(team)
+        for name, robot in robots.items():
+            assert robot.begun == 1
+            assert robot.decided
+            assert sorted(robot.greeted) == sorted(met[name])
+            early += robot.early
+    assert early > 100
+
+
+def test_unconnected_parts_have_a_root_each() -> None:
+    result, _ = played(graph("ABCDEF", "AB BC DE"), RandomChannels(0))
+    places = {name: found.place for name, found in result.findings.items()}
+    assert places == {
+        "RA": Place("RB"),
+        "RB": Place(None),
+        "RC": Place("RB"),
+        "RD": Place(None),
+        "RE": Place("RD"),
+        "RF": Place(None),
+    }
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_processes_build_the_same_tree(seed: int) -> None:
+    team = random_graph(Random(f"processes {seed}"))
+    outcome = solve(team, Options(protocol="adopt", runtime=Runtime.PROCESSES, timeout=60))
+    assert outcome.tree == expected(team)
+
+
+# One robot alone
+
+TEAM = graph("ABCDE", "AB BC BD CD DE")
+"""B and D have three neighbours, C has two; A and E are leaves."""
+
+
+def robot(name: str, team: Team = TEAM) -> Greeter:
+    return Greeter(LocalProblem(parts(team, everywhere=True)[name]), PriorityOrder(team.order))
+
+
+def started(name: str) -> Greeter:
+    """The protocol object of one robot, started, with nothing left to say."""
+    greeter = robot(name)
+    greeter.start()
+    greeter.outbox.clear()
+    return greeter
+
+
+def test_every_robot_stands_for_election() -> None:
+    greeter = robot("RC")
+    greeter.start()
+    assert greeter.outbox == [("RB", Wave(2, "RC")), ("RD", Wave(2, "RC"))]
+    assert greeter.findings == Findings()
+
+
+def test_a_robot_alone_is_its_own_tree_and_says_nothing() -> None:
+    greeter = robot("RA", graph("AB", ""))
+    greeter.start()
+    assert greeter.outbox == []
+    assert (greeter.begun, greeter.decided) == (1, 1)
+    assert greeter.findings.place == Place(None)
+
+
+def test_a_robot_without_values_ends_the_search() -> None:
+    team = team_of({"A": (), "B": (1,)}, [])
+    greeter = robot("RA", team)
+    greeter.start()
+    assert greeter.verdict is Verdict.NO_SOLUTION
+    assert told(greeter, ("RB", Wave(1, "RB"))) == []
+    assert greeter.begun == 0
+
+
+def test_a_stronger_candidate_s_wave_goes_on() -> None:
+    assert told(started("RC"), ("RB", Wave(3, "RB"))) == [("RD", Wave(3, "RB"))]
+
+
+@pytest.mark.parametrize("weaker", [Wave(1, "RA"), Wave(3, "RD")])
+def test_a_weaker_candidate_s_wave_ends(weaker: Wave) -> None:
+    """Of equals, the one that is lower in the order is weaker."""
+    greeter = started("RC")
+    told(greeter, ("RB", Wave(3, "RB")))
+    assert told(greeter, ("RD", weaker)) == []
+
+
+def test_back_from_all_neighbours_a_wave_goes_back_to_who_told_it_first() -> None:
+    greeter = started("RC")
+    said = told(greeter, ("RB", Wave(3, "RB")), ("RD", Wave(3, "RD")), ("RD", Wave(3, "RB")))
+    assert said == [("RD", Wave(3, "RB")), ("RB", Wave(3, "RB"))]
+
+
+def test_who_gets_the_own_wave_back_from_all_neighbours_is_the_root_and_sends_the_token() -> None:
+    greeter = started("RB")
+    others = (("RA", Wave(1, "RA")), ("RC", Wave(2, "RC")), ("RD", Wave(3, "RD")))
+    assert told(greeter, *others) == []
+    own = Wave(3, "RB")
+    assert told(greeter, ("RA", own), ("RC", own)) == []
+    assert told(greeter, ("RD", own)) == [("RD", Token(["RB"]))]
+
+
+def test_the_token_comes_back_when_all_neighbours_are_in_the_tree() -> None:
+    greeter = started("RC")
+    told(greeter, ("RB", Wave(3, "RB")), ("RD", Wave(3, "RD")))
+    said = told(greeter, ("RD", Token(["RB", "RD"])))
+    assert said[0] == ("RD", Back(["RB", "RD", "RC"]))
+    assert greeter.findings.place == Place("RD", ("RB",))
+
+
+def test_a_robot_begins_when_all_below_it_have_their_places() -> None:
+    greeter = started("RD")
+    waves = (("RB", Wave(3, "RB")), ("RC", Wave(2, "RC")), ("RE", Wave(1, "RE")))
+    told(greeter, *waves)
+    assert told(greeter, ("RB", Token(["RB"])), ("RC", Hello())) == [("RC", Token(["RB", "RD"]))]
+    assert told(greeter, ("RC", Back(["RB", "RD", "RC"]))) == [("RE", Token(["RB", "RD", "RC"]))]
+    assert not greeter.placed
+    assert greeter.decided == 0
+    said = told(greeter, ("RE", Back(["RB", "RD", "RC", "RE"])))
+    assert said[0] == ("RB", Back(["RB", "RD", "RC", "RE"]))
+    assert [receiver for receiver, message in said if message == Hello()] == ["RB", "RC", "RE"]
+    assert greeter.greeted == ["RC"]
+    assert greeter.decided == 1

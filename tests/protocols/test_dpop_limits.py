@@ -1,0 +1,190 @@
+"""What DPOP refuses: tables that do not fit, costs that are not exact, and what no robot says."""
+
+from __future__ import annotations
+
+import math
+import re
+import tracemalloc
+
+import msgspec
+import pytest
+
+from robochoc.communication.simulator.schedule import RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Message, encode
+from robochoc.model.problem import Constraint, Relation, Semantics
+from robochoc.protocols.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
+from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.solver.agent_problem import Brief
+from robochoc.solver.encoding import TooMuch, Unsupported
+from robochoc.solver.exact import EXACT
+from tests.support.agents import told
+from tests.support.cost_problems import with_costs
+from tests.support.dpop_robots import PRODUCT, begun, dimensions, domain, leaf, products
+from tests.support.problems import ON_ONE_MACHINE, team_of
+
+
+def test_over_the_limit_the_root_says_who_needs_how_much_before_any_table_is_made() -> None:
+    robot = begun(products("ABC", "AB BC AC"), "RA", below="B", further="C")
+    says = "RC needs 5,000,000,000 bytes for its tables, more than 1,073,741,824: the robots' pseudo-tree has induced"
+    with pytest.raises(TooMuch, match=re.escape(f"{says} width 7 (--set memory=BYTES raises the limit)")):
+        told(robot, ("RB", dimensions({"RA": 3}, width=7, most=Need(5_000_000_000, "RC"))))
+    assert robot.problem.checks == 0
+
+
+def test_a_robot_s_arrays_never_take_more_than_it_has_told() -> None:
+    """And what its children have told it goes as soon as it is not needed any more."""
+    names, size = "ABCDE", 20
+    team = products(names, "AD BD CD DE", range(size))
+    robot = begun(team, "RD", "CBA", "E")
+    robot.problem.tables({f"R{name}": domain(range(size)).values for name in "ABC"})  # prices are remembered
+    ((_, said),) = told(
+        robot,
+        *((f"R{name}", domain(range(size))) for name in "ABC"),
+        ("RE", dimensions({f"R{name}": size for name in "DCBA"}, dearest=200)),
+    )
+    assert isinstance(said, Dimensions)
+    table = UTIL(1, bytes(size**4))
+    tracemalloc.start()
+    try:
+        told(robot, ("RC", Proceed(["RC", "RB", "RA"])))
+        ((_, sent),) = told(robot, ("RE", table))
+        left, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert sent == UTIL(1, bytes(size**3))
+    assert said.most.bytes > size**4
+    assert peak < said.most.bytes + 50_000
+    assert left < 2 * size**3 + 30_000
+
+
+def test_sizes_do_not_overflow() -> None:
+    robot = begun(products("AB", "AB"), "RA", below="B")
+    with pytest.raises(TooMuch, match=r"RA needs more than 10\^308 bytes"):
+        told(robot, ("RB", dimensions({f"R{number}": 10**9 for number in range(99)})))
+    robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
+    sizes = {f"R{number}": 10**9 for number in range(9)}
+    ((_, said),) = told(robot, ("RA", domain()), ("RC", dimensions({"RB": 3, **sizes})))
+    assert isinstance(said, Dimensions)
+    assert said.most.bytes == pytest.approx(3e81 * 3)  # a byte for a cell's cost, one for the choice, one on its way
+    assert msgspec.msgpack.decode(encode(said), type=Dimensions) == said
+
+
+def test_costs_that_may_not_be_exact_end_the_run() -> None:
+    robot = begun(products("AB", "AB"), "RA", below="B")
+    with pytest.raises(TooMuch, match=r"costs could add up to 2\^53 or more"):
+        told(robot, ("RB", dimensions({"RA": 3}, dearest=EXACT)))
+
+
+@pytest.mark.parametrize("factor", [1, 60, 5000, 10**8, 10**14])
+def test_costs_are_exact_up_to_there(factor: int) -> None:
+    """With one, two, four and eight bytes a cost."""
+    costs = tuple((cost + 1) * factor + cost for cost in PRODUCT.costs)
+    dear = Relation("R", 2, Semantics.SOFT, PRODUCT.tuples, costs, 0)
+    pairs = ("AB", "BC", "AC")
+    constraints = [Constraint("C", dear, tuple(pair), tuple(pair)) for pair in pairs]
+    team = with_costs(team_of(dict.fromkeys("ABC", (2, 3)), constraints))
+    assert solve(team, Options(protocol="dpop", runtime=Runtime.SIMULATOR)).cost == 3 * (5 * factor + 4)
+
+
+@pytest.mark.parametrize("withdraw", [None, Withdrawal.FEWEST])
+def test_a_run_over_the_limit_says_the_same_in_every_runtime(withdraw: Withdrawal | None) -> None:
+    team = products("ABCDE", "AB BC AC AD BD CD AE")
+    said = []
+    for runtime in ON_ONE_MACHINE:
+        options = Options(protocol="dpop", runtime=runtime, settings={"memory": "100"}, withdraw=withdraw)
+        with pytest.raises(Unsupported) as refused:
+            solve(team, options)
+        said.append(str(refused.value))
+    assert said[0] == said[1]
+    assert re.match(r"R[CD] needs [\d,]+ bytes for its tables, more than 100: .* induced width 3 ", said[0])
+    assert "dpop" not in said[0]
+
+
+@pytest.mark.parametrize("memory", ["0", "-1", "much"])
+def test_what_is_no_number_of_bytes_is_refused(memory: str) -> None:
+    with pytest.raises(Unsupported, match=r"--set: .*memory"):
+        solve(products("AB", "AB"), Options(protocol="dpop", settings={"memory": memory}))
+
+
+# What is no message of a well-behaved robot
+
+
+def test_a_table_that_was_not_asked_for_is_refused() -> None:
+    robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
+    told(robot, ("RA", domain()), ("RC", dimensions({"RB": 3})))
+    with pytest.raises(ValueError, match="RC was not asked for a table"):
+        told(robot, ("RC", UTIL(1, bytes(3))))
+
+
+@pytest.mark.parametrize("costs", [b"", bytes(4), bytes([10, 0, 0])])
+def test_a_table_of_another_size_or_costs_above_the_bound_is_refused(costs: bytes) -> None:
+    robot = begun(products("AB", "AB"), "RA", below="B")
+    told(robot, ("RB", dimensions({"RA": 3})))
+    with pytest.raises(ValueError, match=r"no piece|more than the most"):
+        told(robot, ("RB", UTIL(1, costs)))
+
+
+def test_children_that_contradict_each_other_are_refused() -> None:
+    robot = begun(products("ABCD", "AB BC BD"), "RB", "A", "CD")
+    with pytest.raises(ValueError, match="RC says that RA has 4 values"):
+        told(robot, ("RA", domain()), ("RC", dimensions({"RA": 4})), ("RD", dimensions({"RA": 3})))
+
+
+@pytest.mark.parametrize(
+    ("sender", "message"), [("RC", dimensions({"RB": 9})), ("RA", dimensions({})), ("RC", domain())]
+)
+def test_who_speaks_twice_or_out_of_place_is_refused(sender: str, message: Message) -> None:
+    robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
+    told(robot, ("RC", dimensions({"RB": 3})))
+    with pytest.raises(ValueError, match=f"{sender} had nothing to say"):
+        told(robot, (sender, message))
+
+
+def test_who_has_no_room_does_not_proceed() -> None:
+    """Though a root should never let it."""
+    robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
+    told(robot, ("RA", domain()), ("RC", dimensions({"RB": 3, **{f"R{number}": 10**9 for number in range(9)}})))
+    with pytest.raises(ValueError, match="no room"):
+        told(robot, ("RA", Proceed(["RA", *(f"R{number}" for number in range(9))])))
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        dimensions({f"R{number}": 2 for number in range(100_000)}),
+        dimensions({"RA": 3}, width=-5),
+        dimensions({"RA": 3}, most=Need(math.nan, "RC")),
+        dimensions({"RA": 3}, most=Need(-1, "RC")),
+    ],
+)
+def test_dimensions_that_cannot_be_are_refused(said: Dimensions) -> None:
+    robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
+    with pytest.raises(ValueError, match="cannot be"):
+        told(robot, ("RC", said))
+
+
+def test_axes_that_are_not_the_separator_s_are_refused() -> None:
+    with pytest.raises(ValueError, match="is none"):
+        told(leaf(products("ABC", "AB BC AC")), ("RB", Proceed(["RB"])))
+
+
+@pytest.mark.parametrize("assignment", [[], [0], [0, 3], [-1, 0]])
+def test_values_that_are_none_are_refused(assignment: list[int]) -> None:
+    robot = leaf(products("ABC", "AB BC AC"))
+    told(robot, ("RB", Proceed(["RB", "RA"])))
+    with pytest.raises(ValueError, match="are no values of RB, RA"):
+        told(robot, ("RB", VALUE(assignment)))
+
+
+def test_a_value_that_comes_twice_is_refused() -> None:
+    robot = leaf(products("ABC", "AB BC AC"))
+    told(robot, ("RB", Proceed(["RB", "RA"])), ("RB", VALUE([0, 0])))
+    with pytest.raises(ValueError, match="RC has a value already"):
+        told(robot, ("RB", VALUE([0, 0])))
+
+
+def test_the_limit_is_the_robots_too() -> None:
+    """As the run's settings reach them."""
+    with pytest.raises(TooMuch):
+        Simulation(products("AB", "AB"), DPOP, RandomChannels(0), brief=Brief(settings={"memory": "9"})).run()

@@ -1,0 +1,77 @@
+"""DynABT in sessions: complex robots, and changes in quick succession; held against brute force."""
+
+from __future__ import annotations
+
+from collections import Counter
+from random import Random
+
+import pytest
+
+from robochoc.communication.run_result import RunResult
+from robochoc.communication.session import Epoch
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import AddAgent, Team
+from robochoc.run.registry import protocol_named
+from robochoc.run.scenario import Journey
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.explanation import Void, void
+from robochoc.verification.checker import objections
+from tests.conformance.test_complex_teams import compiled_by_hand
+from tests.support.changes import random_journey, stages
+from tests.support.complex_changes import random_complex_journey
+from tests.support.problems import solutions
+
+
+def random_schedule(chance: Random) -> Schedule:
+    seed = chance.getrandbits(30)
+    return chance.choice((RandomChannels(seed), *(Concurrent(seed, delay) for delay in (0, 3, 20, 200))))
+
+
+def played(team: Team, schedule: Schedule) -> Counter[Verdict]:
+    """The verdicts of all epochs that came to their end; each is right."""
+    journey = Journey(team, None, compiled_by_hand, lambda: None)
+    seen = Counter[Verdict]()
+    with Simulation(journey.compiled(), protocol_named("dynabt"), schedule) as session:
+        epochs = list(journey.go(session, lambda _: None))
+    for now, (then, result, *_) in zip(stages(team), epochs, strict=True):
+        assert now.order == then.order
+        if result.verdict is not Verdict.UNKNOWN:
+            check(now, result)
+            seen[result.verdict] += 1
+    return seen
+
+
+def check(team: Team, result: RunResult) -> None:
+    assert result.verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION)
+    if result.verdict is Verdict.SOLUTION:
+        assignment = {name: value for own in result.assignments.values() for name, value in own.items()}
+        assert not list(objections(team, assignment))
+
+
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 20))])
+def test_complex_robots_agree_with_brute_force_after_each_change(batch: int) -> None:
+    chance = Random(f"dynabt complex {batch}")
+    seen = Counter[Verdict]()
+    for _ in range(26):
+        seen += played(random_complex_journey(chance), random_schedule(chance))
+    assert min(seen[Verdict.SOLUTION], seen[Verdict.NO_SOLUTION]) > 30, seen
+    assert seen.total() > 200
+
+
+def test_the_problem_may_change_again_before_the_search_goes_on() -> None:
+    """So it is when robots are lost before all have taken in an event."""
+    chance = Random("twice")
+    for _ in range(20):
+        team = random_journey(chance, 8)
+        now, *later = stages(team)
+        with Simulation(now, protocol_named("dynabt"), random_schedule(chance)) as session:
+            check(now, session.search())
+            for event, new in zip(team.scenario, later, strict=True):
+                fresh = frozenset(change.robot.name for change in event.changes if isinstance(change, AddAgent))
+                keys, agents = void(now, new)
+                session.change(Epoch(CompiledTeam(new), Void(keys, agents | fresh), fresh))
+                now = new
+                if chance.random() < 0.6 or new is later[-1]:
+                    check(now, session.search())

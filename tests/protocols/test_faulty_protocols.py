@@ -1,0 +1,91 @@
+"""Runs within one program, of protocols that do what a protocol must not do, or more than one usually does."""
+
+from __future__ import annotations
+
+import multiprocessing
+import re
+import sys
+
+import pytest
+
+from robochoc.communication.processes.processes import ProcessesRun
+from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.journal.events import AnyEvent, Lost
+from robochoc.model.outcome import Verdict
+from robochoc.protocols.protocol import Protocol
+from tests.support.faults import open_descriptors
+from tests.support.faulty_protocols import (
+    FLOOD,
+    TEAM,
+    AsksForStranger,
+    Floods,
+    HangsUp,
+    Leaves,
+    Raises,
+    RaisesAtOnce,
+    SaysMuch,
+    Speaks,
+    Spins,
+    TalksNonsense,
+)
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+
+
+def speaking(protocol: type[Protocol], *, timeout: float | None = None) -> tuple[Verdict, dict[str, int]]:
+    """Let a team of four speak `protocol`; whatever comes of it, nothing may be left in this process."""
+    before = open_descriptors()
+    try:
+        result = ProcessesRun(TEAM, protocol).run(timeout)
+    finally:
+        assert multiprocessing.active_children() == []
+        assert open_descriptors() == before
+    return result.verdict, dict(result.metrics.messages)
+
+
+FIRST, SECOND, *_ = (robot.name for robot in TEAM.robots)
+
+
+@pytest.mark.parametrize(
+    ("protocol", "lost", "why"),
+    [
+        (Raises, FIRST, r"ValueError: out of ideas \(.*faulty_protocols.py:\d+\)"),
+        (RaisesAtOnce, FIRST, r"ValueError: no ideas at all"),
+        (Leaves, FIRST, r"its process ended with status 7"),
+        (HangsUp, FIRST, r"its process cannot be reached any more"),
+        (AsksForStranger, FIRST, r"it wanted to talk to 'Robot9.9', which is no robot of the team"),
+        (TalksNonsense, SECOND, rf"BadMessage: {FIRST} sent {SECOND} what is no message"),
+    ],
+)
+def test_a_robot_that_fails_is_named(protocol: type[Protocol], lost: str, why: str) -> None:
+    with pytest.raises(RobotsLost) as caught:
+        speaking(protocol)
+    assert lost in caught.value.robots
+    assert re.search(why, caught.value.robots[lost])
+
+
+def test_observers_hear_who_was_lost() -> None:
+    events: list[AnyEvent] = []
+    with pytest.raises(RobotsLost) as caught:
+        ProcessesRun(TEAM, Leaves, observer=events.append).run()
+    assert {event.robot: event.why for event in events if isinstance(event, Lost)} == caught.value.robots
+
+
+def test_more_than_pipes_hold() -> None:
+    assert speaking(Floods) == (Verdict.SOLUTION, {"Word": 2 * FLOOD})
+
+
+def test_a_message_of_a_megabyte() -> None:
+    assert speaking(SaysMuch) == (Verdict.SOLUTION, {"Word": len(TEAM.robots)})
+
+
+def test_deaf_robots_do_not_outlive_the_time_limit() -> None:
+    verdict, _ = speaking(Spins, timeout=0.5)
+    assert verdict is Verdict.UNKNOWN
+
+
+def test_many_runs_leave_nothing_open() -> None:
+    before = open_descriptors()
+    for _ in range(30):
+        speaking(Speaks)
+    assert open_descriptors() == before

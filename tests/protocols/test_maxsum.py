@@ -1,0 +1,256 @@
+"""One test per rule of Max-Sum (Farinelli, Rogers, Petcu, Jennings, AAMAS 2008), named for it."""
+
+from __future__ import annotations
+
+import doctest
+import itertools
+from random import Random
+
+import numpy as np
+import pytest
+
+import robochoc.protocols.maxsum
+from robochoc.communication.host import BadSettings, settings_of
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.protocols import maxsum_factor
+from robochoc.protocols.cycles import Domain
+from robochoc.protocols.maxsum import MaxSum, MaxSumSettings, Q, R
+from robochoc.protocols.maxsum_factor import Factor
+from robochoc.solver import cost_table
+from robochoc.solver.encoding import Unsupported
+from tests.support.agents import told, value
+from tests.support.cost_problems import DEAREST, least_cost, random_cost_team
+from tests.support.courses import any_schedule, burden_of, course_of, domains_of, played, robot_of, started
+from tests.support.problems import team_of
+
+COSTS = Relation("C", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1), (2, 2)), (3, 1, 4, 6))
+HARD = Relation("H", 2, Semantics.CONFLICTS, ((2, 1), (2, 2)))
+TWO = Domain([(1,), (2,)])
+
+
+def chain(first: Relation = COSTS, second: Relation = COSTS) -> Team:
+    """B between A, whose function it holds, and C, who holds the other one."""
+    constraints = [Constraint("F", first, ("A", "B"), ("A", "B")), Constraint("S", second, ("B", "C"), ("B", "C"))]
+    return team_of(dict.fromkeys("ABC", (1, 2)), constraints)
+
+
+def middle(team: Team, **settings: float) -> MaxSum:
+    """B, without preferences, once it has told its domain."""
+    robot = robot_of(MaxSum, team, "RB")
+    robot.settings = MaxSumSettings(preference=0, **{"damping": 0.0, **settings})  # type: ignore[arg-type]
+    assert started(robot) == [("RC", TWO)]
+    return robot
+
+
+def test_domains_go_to_those_who_hold_the_functions() -> None:
+    assert started(robot_of(MaxSum, chain(), "RA")) == [("RB", TWO)]
+    assert started(robot_of(MaxSum, chain(), "RC")) == []
+
+
+def test_r_is_the_least_that_a_value_costs_by_what_the_others_told() -> None:
+    robot = middle(chain())
+    assert told(robot, ("RA", TWO)) == [("RA", R([[1, 4]]))]
+    told(robot, ("RC", R([[0, 0]])))
+    robot.edges = [[5, 0]]
+    assert told(robot, ("RA", Q([[0, 0]]))) == [("RA", R([[1, 6]]))]
+
+
+def test_q_is_what_a_value_costs_by_all_other_functions_less_the_least() -> None:
+    robot = middle(chain())
+    told(robot, ("RA", TWO))
+    assert told(robot, ("RC", R([[9, 2]]))) == [("RC", Q([[2, 0]]))]  # by the own function 3 and 1
+    assert robot.edges == [[7, 0], [2, 0]]
+
+
+def test_the_value_is_that_which_costs_least_by_all_functions() -> None:
+    robot = middle(chain())
+    told(robot, ("RA", TWO))
+    told(robot, ("RC", R([[2, 3]])))
+    assert value(robot) == (2,)
+    told(robot, ("RA", Q([[0, 5]])), ("RC", R([[0, 3]])))
+    assert value(robot) == (1,)
+
+
+def test_a_cycle_is_r_of_all_functions_and_then_q_of_all_variables() -> None:
+    robot = middle(chain())
+    assert told(robot, ("RC", R([[0, 0]]))) == []
+    assert [receiver for receiver, _ in told(robot, ("RA", TWO))] == ["RA", "RC"]
+    assert robot.cycle == 1
+    assert [type(message) for _, message in told(robot, ("RA", Q([[0, 0]])))] == [R]
+
+
+def test_in_the_last_cycle_no_q_is_said() -> None:
+    robot = middle(chain(), cycles=1)
+    told(robot, ("RA", TWO))
+    assert told(robot, ("RC", R([[0, 0]]))) == []
+    assert robot.over
+
+
+def test_damping_keeps_a_share_of_the_last_q() -> None:
+    robot = middle(chain(), damping=0.75)
+    told(robot, ("RA", TWO))
+    assert told(robot, ("RC", R([[0, 0]]))) == [("RC", Q([[2, 0]]))]
+    robot.edges = [[0, 0], [8, 0]]
+    assert told(robot, ("RA", Q([[0, 0]])), ("RC", R([[0, 0]])))[-1] == ("RC", Q([[6.5, 0]]))
+
+
+def test_preferences_are_drawn_by_lot() -> None:
+    robot = robot_of(MaxSum, chain(), "RA", 0.75, 0.5)
+    robot.settings = MaxSumSettings(preference=0.5)
+    started(robot)
+    assert robot.preferred == [0.375, 0.25]
+    assert value(robot) == (2,)
+
+
+def test_what_the_own_value_costs_by_itself_is_a_preference() -> None:
+    prices = Relation("P", 1, Semantics.SOFT, ((1,),), (7,))
+    team = team_of(
+        dict.fromkeys("AB", (1, 2)),
+        [Constraint("C", COSTS, ("A", "B"), ("A", "B")), Constraint("P", prices, ("A",), ("A",))],
+    )
+    robot = robot_of(MaxSum, team, "RA")
+    started(robot)
+    assert value(robot) == (2,)
+    assert told(robot, ("RB", R([[0, 0]]))) == [("RB", Q([[7, 0]]))]
+
+
+def test_constraints_over_the_same_robots_are_one_function() -> None:
+    pair = ("A", "B")
+    team = team_of(dict.fromkeys(pair, (1, 2)), [Constraint(name, COSTS, pair, pair) for name in ("C", "D")])
+    robot = robot_of(MaxSum, team, "RB")
+    started(robot)
+    assert told(robot, ("RA", TWO)) == [("RA", R([[2, 8]]))]
+
+
+def test_what_one_robot_says_to_another_goes_in_one_message() -> None:
+    triple = Relation("T", 3, Semantics.SOFT, ((1, 1, 1),), (4,))
+    scope = ("A", "B", "C")
+    pair = ("A", "C")
+    constraints = [Constraint("P", COSTS, pair, pair), Constraint("T", triple, scope, scope)]
+    robot = robot_of(MaxSum, team_of(dict.fromkeys("ABC", (1, 2)), constraints), "RC")
+    started(robot)
+    assert told(robot, ("RA", TWO), ("RB", TWO)) == [("RA", R([[1, 4], [0, 0]])), ("RB", R([[0, 0]]))]
+
+
+def test_a_value_that_breaks_a_hard_constraint_is_out_and_nothing_is_subtracted_from_that() -> None:
+    robot = middle(chain(HARD))
+    assert told(robot, ("RA", TWO)) == [("RA", R([[0, INFINITE]]))]
+    assert told(robot, ("RC", R([[INFINITE, 3]]))) == [("RC", Q([[0, 0]]))]
+    assert robot.edges[0] == [INFINITE, 0]
+    assert value(robot) == (2,)
+
+
+def test_damping_leaves_what_is_out_out() -> None:
+    robot = middle(chain(), damping=0.5)
+    told(robot, ("RA", TWO))
+    told(robot, ("RC", R([[INFINITE, 3]])))
+    told(robot, ("RA", Q([[0, 0]])), ("RC", R([[INFINITE, 3]])))
+    assert robot.edges[0] == [INFINITE, 0]
+
+
+def test_a_robot_all_of_whose_values_are_out_has_proven_that_there_is_no_solution() -> None:
+    robot = middle(chain())
+    told(robot, ("RA", TWO))
+    assert told(robot, ("RC", R([[INFINITE, INFINITE]]))) == []
+    assert robot.verdict is Verdict.NO_SOLUTION
+    assert told(robot, ("RA", Q([[0, 0]]))) == []
+
+
+def test_values_that_are_alike_do_not_freeze_the_search() -> None:
+    differ = Relation("D", 2, Semantics.SOFT, ((1, 1), (2, 2), (3, 3)), (1, 1, 1))
+    ring = [("A", "B"), ("B", "C"), ("C", "D"), ("D", "E"), ("A", "E")]
+    team = team_of(dict.fromkeys("ABCDE", (1, 2, 3)), [Constraint("C", differ, pair, pair) for pair in ring])
+    for seed in range(20):
+        course = course_of(team, played(team, MaxSum, Concurrent(0), seed, cycles=30))
+        assert min(burden_of(team, values) for values in course) == (0, 0)
+
+
+@pytest.mark.parametrize("batch", range(2))
+def test_on_a_tree_the_end_is_an_optimum(batch: int) -> None:
+    """With preferences too small to matter. A robot is told off for a tree that breaks something whatever it does."""
+    chance = Random(f"trees {batch}")
+    soluble = 0
+    for seed in range(100):
+        team = random_tree(chance)
+        least = least_cost(team)
+        result = played(team, MaxSum, any_schedule(chance), seed, cycles=14, damping=0, preference=0.001)
+        assert (result.verdict is Verdict.NO_SOLUTION) is (least == INFINITE)
+        if least < INFINITE:
+            soluble += 1
+            assert burden_of(team, course_of(team, result)[-1]) == (0, least)
+    assert soluble > 60
+
+
+def random_tree(chance: Random) -> Team:
+    """Each robot but the first shares a table with one before it."""
+    domains = {f"X{number}": range(1, chance.randint(2, 4)) for number in range(chance.randint(2, 7))}
+    constraints = []
+    for number, name in enumerate(list(domains)[1:], 1):
+        pair = (f"X{chance.randrange(number)}", name)
+        rows = list(itertools.product(*(domains[one] for one in pair)))
+        costs = tuple(INFINITE if chance.random() < 0.15 else chance.randint(0, DEAREST) for _ in rows)
+        relation = Relation("R", 2, Semantics.SOFT, tuple(rows), costs)
+        constraints.append(Constraint("C", relation, pair, pair))
+    return team_of(domains, constraints)
+
+
+def test_what_is_proven_is_true() -> None:
+    chance = Random("proofs")
+    proofs = 0
+    for seed in range(150):
+        team = random_cost_team(chance)
+        if all(domains_of(team).values()):
+            result = played(team, MaxSum, Concurrent(seed), seed, cycles=8)
+            if result.verdict is Verdict.NO_SOLUTION:
+                proofs += 1
+                assert least_cost(team) == INFINITE
+    assert proofs > 5
+
+
+@pytest.mark.parametrize("arity", [2, 3])
+def test_tables_in_lists_and_in_numpy_say_the_same(arity: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what brute force says."""
+    random = np.random.default_rng(arity)
+    shape = (2, 3, 4)[:arity]
+    charges = random.integers(0, 9, shape).astype(float)
+    charges[0] = INFINITE
+    rows = [random.integers(0, 9, size).astype(float).tolist() for size in shape]
+    said = Factor([f"R{axis}" for axis in range(arity - 1)], charges).r(rows)
+    monkeypatch.setattr(maxsum_factor, "SMALL", 0)
+    assert Factor([f"R{axis}" for axis in range(arity - 1)], charges).r(rows) == said
+    for axis, row in enumerate(said):
+        for place, least in enumerate(row):
+            cells = (cell for cell in itertools.product(*map(range, shape)) if cell[axis] == place)
+            others = (
+                charges[cell] + sum(rows[other][cell[other]] for other in range(arity) if other != axis)
+                for cell in cells
+            )
+            assert least == min(others)
+
+
+def test_a_table_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cost_table, "MOST_TUPLES", 3)
+    robot = middle(chain())
+    with pytest.raises(Unsupported, match="has 4 entries, more than 3"):
+        told(robot, ("RA", TWO))
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "rule"),
+    [
+        ("damping", "1", "from 0 to below 1"),
+        ("damping", "-0.5", "from 0 to below 1"),
+        ("damping", "nan", "from 0 to below 1"),
+        ("preference", "-1", "a number, 0 or more"),
+        ("preference", "inf", "a number, 0 or more"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(name: str, given: str, rule: str) -> None:
+    with pytest.raises(BadSettings, match=rule):
+        settings_of(MaxSum, {name: given})
+
+
+def test_the_example_in_the_documentation() -> None:
+    assert doctest.testmod(robochoc.protocols.maxsum).failed == 0

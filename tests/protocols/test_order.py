@@ -1,0 +1,155 @@
+"""The total order, and the pseudo-tree that it induces (Dechter, "Constraint Processing", 2003, Section 4.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robochoc.model.problem import Team
+from robochoc.protocols.order import PriorityOrder, PseudoTree
+from robochoc.solver.agent_problem import Part, parts
+from robochoc.solver.compile import Compiler
+from robochoc.solver.compiled_team import CompiledTeam
+from tests.support.complex_problems import random_complex_team
+from tests.support.problems import random_team, teams
+
+EVERY = settings(max_examples=50, deadline=None)
+complex_teams = st.integers(0, 2**32).map(lambda seed: random_complex_team(Random(seed)))
+
+
+def parts_of(team: Team) -> dict[str, Part]:
+    """What each robot is told of the others, of their tree too."""
+    with Compiler() as compiler:
+        return parts(CompiledTeam(team, lambda robot: compiler.compile(robot).domain), tree=True)
+
+
+def order_of(team: Team) -> PriorityOrder:
+    """The order of `team` with its tree, as a robot is told of it."""
+    part = parts_of(team)[team.order[0]]
+    return PriorityOrder(part.order, part.links)
+
+
+def tree_of(team: Team) -> PseudoTree:
+    tree = order_of(team).tree
+    assert tree is not None
+    return tree
+
+
+def induced(links: Mapping[str, str]) -> PseudoTree:
+    """The tree for robots in the order of `links`, names of one letter."""
+    return PseudoTree.induced(tuple(links), links)
+
+
+def connected(team: Team) -> dict[str, set[str]]:
+    """For each robot all robots of its part of the team."""
+    part = {name: {name} for name in team.order}
+    for constraint in team.constraints():
+        joined = set().union(*(part[team.owner[name]] for name in constraint.variables))
+        for name in joined:
+            part[name] = joined
+    return part
+
+
+def test_the_lowest_robot_stands_last_in_the_order() -> None:
+    assert PriorityOrder("BAC").lowest({"A", "B"}) == "A"
+    with pytest.raises(ValueError, match="empty"):
+        PriorityOrder("BAC").lowest(())
+
+
+def test_depth_is_the_place_of_the_lowest_robot_and_before_all_for_none() -> None:
+    assert PriorityOrder("BAC").depth({"A", "B"}) == 1
+    assert PriorityOrder("BAC").depth(()) == -1
+
+
+def test_no_tree_is_made_unless_asked_for() -> None:
+    assert PriorityOrder("BAC").tree is None
+
+
+def test_a_tree_parent_is_the_lowest_of_those_above() -> None:
+    assert induced({"A": "", "B": "A", "C": "AB"}).parents == {"A": None, "B": "A", "C": "B"}
+
+
+def test_robots_without_a_constraint_between_them_stand_on_branches_of_their_own() -> None:
+    tree = induced({"A": "", "B": "A", "C": "A", "D": "B"})
+    assert tree.children == {"A": ["B", "C"], "B": ["D"], "C": [], "D": []}
+
+
+def test_what_a_robot_has_to_agree_with_is_handed_up_to_its_tree_parent() -> None:
+    tree = induced({"A": "", "B": "", "C": "AB"})
+    assert tree.parents == {"A": None, "B": "A", "C": "B"}
+
+
+def test_ancestors_go_up_to_the_root_and_descendants_down_each_after_its_parent() -> None:
+    tree = induced({"A": "", "B": "A", "C": "A", "D": "B", "E": "D"})
+    assert tree.ancestors("E") == ["D", "B", "A"]
+    assert tree.ancestors("A") == []
+    assert sorted(tree.descendants("A")) == ["B", "C", "D", "E"]
+    assert tree.descendants("B") == ["D", "E"]
+    assert tree.descendants("E") == []
+
+
+def test_a_robot_alone_is_a_root() -> None:
+    assert set(induced({"A": "", "B": "", "C": "A"}).roots) == {"A", "B"}
+
+
+@EVERY
+@given(teams | complex_teams)
+def test_the_robots_of_every_constraint_stand_on_one_branch(team: Team) -> None:
+    tree = tree_of(team)
+    for constraint in team.constraints():
+        robots = sorted({team.owner[name] for name in constraint.variables}, key=team.order.index)
+        *above, lowest = robots
+        assert set(above) <= set(tree.ancestors(lowest))
+
+
+@EVERY
+@given(teams | complex_teams)
+def test_priority_decreases_along_every_branch(team: Team) -> None:
+    tree = tree_of(team)
+    for name, parent in tree.parents.items():
+        assert parent is None or team.order.index(parent) < team.order.index(name)
+
+
+@EVERY
+@given(teams | complex_teams)
+def test_a_robot_is_below_exactly_its_ancestors(team: Team) -> None:
+    tree = tree_of(team)
+    for name in team.order:
+        for other in team.order:
+            assert (other in tree.ancestors(name)) is (name in tree.descendants(other))
+
+
+@EVERY
+@given(teams | complex_teams)
+def test_each_unconnected_part_has_one_root_its_highest_robot(team: Team) -> None:
+    highest = {min(part, key=team.order.index) for part in connected(team).values()}
+    assert set(tree_of(team).roots) == highest
+
+
+@EVERY
+@given(teams | complex_teams)
+def test_a_subtree_has_to_agree_with_its_root_s_tree_parent(team: Team) -> None:
+    """Or else the root could stand higher, and more could go on at once."""
+    tree = tree_of(team)
+    met = [{team.owner[variable] for variable in constraint.variables} for constraint in team.constraints()]
+    for name, parent in tree.parents.items():
+        subtree = {name, *tree.descendants(name)}
+        assert parent is None or any(parent in robots and robots & subtree for robots in met)
+
+
+@EVERY
+@given(teams)
+def test_every_robot_induces_the_same_tree(team: Team) -> None:
+    trees = [PriorityOrder(part.order, part.links).tree for part in parts_of(team).values()]
+    assert len({str(tree and tree.parents) for tree in trees}) == 1
+
+
+def test_random_teams_have_trees_with_branches_and_several_roots() -> None:
+    """Or else the properties above would say little."""
+    trees = [tree_of(random_team(Random(seed))) for seed in range(100)]
+    assert sum(len(tree.roots) > 1 for tree in trees) > 10
+    assert sum(any(len(children) > 1 for children in tree.children.values()) for tree in trees) > 10

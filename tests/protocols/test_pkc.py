@@ -1,0 +1,270 @@
+"""Partially known constraints: ABT in a single phase (Brito et al., Constraints 14, 2009), and what it lets be seen."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from robochoc.communication.processes.processes import ProcessesRun
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.formats.folder import write_team
+from robochoc.formats.team import read_team
+from robochoc.generators.queens3d import queens3d
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Model, Relation, Semantics, Team
+from robochoc.protocols.abt import ABT, Nogood, Ok
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.solver.agent_problem import parts
+from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.encoding import Unsupported
+from robochoc.verification.checker import objections
+from tests.conformance.test_complex_teams import compiled_by_hand
+from tests.support.agents import told
+from tests.support.complex_problems import complex_team, random_complex_team
+from tests.support.pkc_bytes import changed_elsewhere, nothing_hidden, restated, run, watched
+from tests.support.pkc_problems import pkc_parts, random_pkc_team, with_part, with_private_parts
+from tests.support.problems import ON_ONE_MACHINE, random_team, solutions, team_of
+from tests.support.program import ROOT
+
+SECRETS = ROOT / "docs" / "examples" / "secrets"
+
+
+def part(pair: str, *forbidden: tuple[int, int], name: str = "C") -> Constraint:
+    """One robot's part of a PKC over the variables named by two letters."""
+    called = "R" + "_".join(f"{one}.{other}" for one, other in forbidden)
+    relation = Relation(called, 2, Semantics.CONFLICTS, forbidden)
+    return Constraint(name, relation, tuple(pair), tuple(pair), Model.PKC)
+
+
+def pair_team(below: Constraint | None, above: Constraint | None, values: int = 2) -> Team:
+    """A above B, which share a PKC of these two parts."""
+    domains = dict.fromkeys("AB", range(1, values + 1))
+    team = team_of(domains, [below or part("AB")])
+    return team if above is None else with_part(team, "RA", "RB", above)
+
+
+def agent(team: Team, name: str) -> ABT:
+    """The protocol object of one robot, started, with nothing left to say."""
+    abt = ABT(LocalProblem(parts(team)[name]), PriorityOrder(team.order))
+    abt.start()
+    abt.outbox.clear()
+    return abt
+
+
+# The rules
+
+
+def test_the_value_goes_up_too_where_a_pkc_is_shared_and_only_there() -> None:
+    constraints = [part("AC"), replace(part("BC", name="T"), model=Model.TKC)]
+    team = team_of(dict.fromkeys("ABC", (1, 2)), constraints)
+    abt = ABT(LocalProblem(parts(team)["RC"]), PriorityOrder(team.order))
+    abt.start()
+    assert abt.outbox == [("RA", Ok((1,)))]
+
+
+def test_the_value_goes_up_where_only_the_parent_holds_a_part() -> None:
+    shown = replace(part("AB", name="T"), model=Model.TKC)
+    team = with_part(team_of(dict.fromkeys("AB", (1, 2)), [shown]), "RA", "RB", part("AB", (1, 1)))
+    assert LocalProblem(parts(team)["RB"]).partners == ("RA",)
+
+
+def test_a_lower_robot_checks_its_own_part() -> None:
+    abt = agent(pair_team(part("AB", (1, 1)), part("AB")), "RB")
+    assert told(abt, ("RA", Ok((1,)))) == [("RA", Ok((2,)))]
+
+
+def test_a_higher_robot_refuses_a_pair_that_its_part_forbids() -> None:
+    abt = agent(pair_team(part("AB"), part("AB", (1, 2))), "RA")
+    assert told(abt, ("RB", Ok((1,)))) == []
+    assert told(abt, ("RB", Ok((2,)))) == [("RB", Nogood({"RA": (1,)}, (2,)))]
+
+
+def test_a_lower_value_is_no_part_of_the_view() -> None:
+    abt = agent(pair_team(part("AB"), part("AB")), "RA")
+    told(abt, ("RB", Ok((1,))))
+    assert abt.view == {}
+
+
+def test_a_new_own_value_is_held_against_what_lower_robots_told() -> None:
+    abt = agent(pair_team(part("AB"), part("AB", (2, 1))), "RA")
+    assert told(abt, ("RB", Ok((1,)))) == []
+    said = told(abt, ("RB", Nogood({}, (1,))))
+    assert said == [("RB", Ok((2,))), ("RB", Nogood({"RA": (2,)}, (1,)))]
+
+
+def test_each_pair_is_checked_once() -> None:
+    abt = agent(pair_team(part("AB"), part("AB")), "RA")
+    told(abt, ("RB", Ok((1,))))
+    assert abt.problem.checks == 1
+    told(abt)
+    assert abt.problem.checks == 1
+
+
+def test_a_refused_value_is_forgotten_until_it_is_told_again() -> None:
+    abt = agent(pair_team(part("AB"), part("AB", (1, 2))), "RA")
+    told(abt, ("RB", Ok((2,))))
+    assert told(abt) == []
+    assert told(abt, ("RB", Ok((2,)))) == [("RB", Nogood({"RA": (1,)}, (2,)))]
+
+
+def test_the_refused_robot_accepts_as_in_abt() -> None:
+    abt = agent(pair_team(part("AB"), part("AB")), "RB")
+    told(abt, ("RA", Ok((1,))))
+    assert told(abt, ("RA", Nogood({"RA": (1,)}, (1,)))) == [("RA", Ok((2,)))]
+
+
+def test_the_refused_robot_answers_a_nogood_that_rests_on_an_old_value() -> None:
+    abt = agent(pair_team(part("AB"), part("AB")), "RB")
+    told(abt, ("RA", Ok((2,))))
+    assert told(abt, ("RA", Nogood({"RA": (1,)}, (1,)))) == [("RA", Ok((1,)))]
+
+
+def test_a_refusal_names_only_the_variables_that_the_part_looks_at() -> None:
+    domains = dict.fromkeys(("a", "A", "b", "B"), (1, 2))
+    shown = [replace(part(pair, name="T"), model=Model.TKC) for pair in ("ab", "AB")]
+    team = complex_team({"RA": ["a", "A"], "RB": ["b", "B"]}, domains, shown)
+    problem = LocalProblem(parts(with_part(team, "RA", "RB", part("AB", (1, 2))))["RA"])
+    assert problem.refuses(0, "RB", (1, 2)) == {"RA": (None, 1), "RB": (None, 2)}
+    assert problem.refuses(0, "RB", (2, 1)) is None
+
+
+def test_two_parts_that_leave_nothing_together_have_no_solution() -> None:
+    team = pair_team(part("AB", (1, 1), (2, 2)), part("AB", (1, 2), (2, 1)))
+    outcome = solve(team, Options(protocol="abt", runtime=Runtime.SIMULATOR))
+    assert outcome.verdict is Verdict.NO_SOLUTION
+
+
+def test_who_steps_aside_cannot_be_found_with_pkc() -> None:
+    team = pair_team(part("AB", (1, 1)), part("AB"))
+    with pytest.raises(Unsupported, match="PKC"):
+        solve(team, Options(runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL))
+
+
+# The truth
+
+
+def schedule(chance: Random) -> Schedule:
+    if chance.random() < 0.5:
+        return RandomChannels(chance.getrandbits(32))
+    return Concurrent(chance.getrandbits(32), chance.choice((0, 3, 20, 200)))
+
+
+def agrees(team: Team, protocol: type[Protocol], chance: Random) -> Verdict:
+    """Solve `team`; the verdict must be brute force's, and a solution must hold."""
+    result = Simulation(compiled_by_hand(team), protocol, schedule(chance)).run(60)
+    solvable = any(solutions(team))
+    assert result.verdict is (Verdict.SOLUTION if solvable else Verdict.NO_SOLUTION), team
+    if solvable:
+        flat = {name: value for own in result.assignments.values() for name, value in own.items()}
+        assert not list(objections(team, flat))
+    return result.verdict
+
+
+def test_abt_agrees_with_brute_force() -> None:
+    chance = Random("pkc abt")
+    seen = Counter(agrees(random_pkc_team(chance), ABT, chance) for _ in range(500))
+    assert min(seen.values()) > 125, seen
+
+
+def test_abt_agrees_where_all_is_split_and_n_ary_constraints_stay() -> None:
+    chance = Random("pkc split")
+    for _ in range(60):
+        agrees(with_private_parts(random_team(chance), chance), ABT, chance)
+
+
+def test_abt_agrees_on_complex_robots() -> None:
+    chance = Random("pkc complex")
+    for _ in range(40):
+        team = with_private_parts(random_complex_team(chance), chance)
+        agrees(team, ABT, chance)
+
+
+def test_splitting_keeps_the_solutions() -> None:
+    chance = Random("split")
+    for _ in range(50):
+        team = random_team(chance)
+        assert list(solutions(team)) == list(solutions(with_private_parts(team, chance)))
+
+
+def test_teams_with_parts_are_written_and_read_back(tmp_path: Path) -> None:
+    chance = Random("files")
+    for number in range(30):
+        team = random_pkc_team(chance)
+        write_team(team, tmp_path / f"{number}")
+        again = read_team(tmp_path / f"{number}")
+        assert pkc_parts(again) == pkc_parts(team)
+        for robot in team.robots:  # domains come back as the longest ranges
+            assert replace(again[robot.name], variables=()) == replace(robot, variables=())
+            assert [sorted(one.domain) for one in again[robot.name].variables] == [
+                sorted(one.domain) for one in robot.variables
+            ]
+
+
+# What is said
+
+
+@pytest.fixture(scope="module")
+def private_queens() -> Team:
+    """16 robots, no two of which know of each other why they may not attack."""
+    return with_private_parts(queens3d(4), Random("queens"))
+
+
+def asked_only(team: Team, seed: int, chance: Random) -> tuple[bool, bool]:
+    """Change what was not asked: no byte changes. Returns whether there was any, and whether what was asked matters."""
+    with pytest.MonkeyPatch.context() as patch:
+        asked = watched(team, patch)
+        before = run(team, ABT, seed)
+    nothing_hidden(ABT, before.envelopes)
+    elsewhere = changed_elsewhere(team, asked, chance)
+    assert run(elsewhere, ABT, seed).envelopes == before.envelopes
+    there = changed_elsewhere(team, asked, chance, there=True)
+    return elsewhere != team, run(there, ABT, seed).envelopes != before.envelopes
+
+
+def test_what_abt_says_depends_on_the_pairs_asked_about_and_on_nothing_else_of_a_part() -> None:
+    chance = Random("asked")
+    seen = Counter(asked_only(random_pkc_team(chance), chance.getrandbits(32), chance) for _ in range(60))
+    assert seen[True, True] > 30, seen
+
+
+def test_what_abt_says_of_queens_depends_on_the_pairs_asked_about(private_queens: Team) -> None:
+    assert asked_only(private_queens, 1, Random(1)) == (True, True)
+
+
+def test_how_a_part_is_stated_changes_no_byte() -> None:
+    chance = Random("stated")
+    for _ in range(50):
+        team, seed = random_pkc_team(chance), chance.getrandbits(32)
+        assert run(restated(team, chance), ABT, seed).envelopes == run(team, ABT, seed).envelopes
+
+
+def test_how_the_queens_parts_are_stated_changes_no_byte(private_queens: Team) -> None:
+    other = restated(private_queens, Random(2))
+    assert other != private_queens
+    assert run(other, ABT, 2).envelopes == run(private_queens, ABT, 2).envelopes
+
+
+def test_private_queens_have_no_solution(private_queens: Team) -> None:
+    shared = [constraint for robot in private_queens.robots for constraint in robot.shared]
+    assert {constraint.model for constraint in shared} == {Model.PKC}
+    assert len(pkc_parts(private_queens)) == 2 * len(shared)
+    assert run(private_queens, ABT, 0).result.verdict is Verdict.NO_SOLUTION
+    assert ProcessesRun(private_queens, ABT).run(60).verdict is Verdict.NO_SOLUTION
+
+
+# The example
+
+
+def test_the_example_is_solved() -> None:
+    team = read_team(SECRETS)
+    assert {model.model for model in pkc_parts(team).values()} == {Model.PKC}
+    for runtime in ON_ONE_MACHINE:
+        outcome = solve(team, Options(protocol="abt", runtime=runtime, timeout=60))
+        assert (outcome.verdict, outcome.verified) == (Verdict.SOLUTION, True)

@@ -1,0 +1,143 @@
+"""One test per rule of synchronous backtracking (Yokoo, Durfee, Ishida, Kuwabara 1998), named for it."""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.sbt import CPA, SBT, Backtrack
+from robochoc.solver.agent_problem import parts
+from robochoc.solver.compiled import LocalProblem
+from tests.support.problems import random_team, solutions, team_of
+
+DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
+
+
+def differ(left: str, right: str) -> Constraint:
+    return Constraint("C", DIFFERENT, (left, right), (left, right))
+
+
+def triangle(values: int = 3) -> Team:
+    """Three robots, each different from each; a fourth that only the first knows."""
+    domains = {name: range(1, values + 1) for name in ("A", "B", "C", "D")}
+    pairs = (("A", "B"), ("A", "C"), ("B", "C"), ("A", "D"))
+    return team_of(domains, [differ(*pair) for pair in pairs])
+
+
+def agent(team: Team, name: str) -> SBT:
+    """The protocol object of one robot, started."""
+    sbt = SBT(LocalProblem(parts(team)[name]), PriorityOrder(team.order))
+    sbt.start()
+    return sbt
+
+
+def told(sbt: SBT, sender: str, message: Message) -> list[tuple[str, Message]]:
+    """What `sbt` says to a message, and has not said before."""
+    sbt.outbox.clear()
+    sbt.receive(sender, message)
+    sbt.settle()
+    return list(sbt.outbox)
+
+
+def test_the_first_robot_makes_the_cpa_and_the_others_wait() -> None:
+    team = triangle()
+    assert agent(team, "RA").outbox == [("RB", CPA(((1,),)))]
+    assert [agent(team, name).outbox for name in ("RB", "RC", "RD")] == [[], [], []]
+
+
+def test_the_first_value_that_agrees_with_the_cpa_is_added_and_told_to_the_next_robot_only() -> None:
+    sbt = agent(triangle(), "RB")
+    assert told(sbt, "RA", CPA(((1,),))) == [("RC", CPA(((1,), (2,))))]
+    assert sbt.assignment == {"B": 2}
+
+
+def test_a_robot_without_a_value_sends_the_cpa_back_to_the_robot_before() -> None:
+    sbt = agent(triangle(2), "RC")
+    assert told(sbt, "RB", CPA(((1,), (2,)))) == [("RB", Backtrack())]
+    assert sbt.assignment == {}
+
+
+def test_backtracking_is_chronological() -> None:
+    """D's trouble is with A, and A only: still C is asked."""
+    sbt = agent(team_of({"A": (1,), "C": (1, 2), "D": (1,)}, [differ("A", "D")]), "RD")
+    assert told(sbt, "RC", CPA(((1,), (1,)))) == [("RC", Backtrack())]
+
+
+def test_the_robot_before_takes_its_next_value_and_does_not_check_the_first_ones_again() -> None:
+    sbt = agent(triangle(), "RB")
+    told(sbt, "RA", CPA(((1,),)))
+    before = sbt.problem.checks
+    assert told(sbt, "RC", Backtrack()) == [("RC", CPA(((1,), (3,))))]
+    assert sbt.problem.checks == before + 1
+
+
+def test_a_new_cpa_lets_all_values_be_tried_again() -> None:
+    sbt = agent(triangle(), "RB")
+    told(sbt, "RA", CPA(((1,),)))
+    assert told(sbt, "RC", Backtrack())
+    assert told(sbt, "RC", Backtrack()) == [("RA", Backtrack())]
+    assert told(sbt, "RA", CPA(((2,),))) == [("RC", CPA(((2,), (1,))))]
+
+
+def test_the_last_robot_concludes_that_a_solution_stands() -> None:
+    sbt = agent(triangle(), "RD")
+    assert told(sbt, "RC", CPA(((1,), (2,), (3,)))) == []
+    assert sbt.verdict is Verdict.SOLUTION
+    assert sbt.assignment == {"D": 2}
+
+
+def test_the_first_robot_concludes_that_there_is_none_when_its_domain_is_exhausted() -> None:
+    sbt = agent(triangle(2), "RA")
+    assert told(sbt, "RB", Backtrack()) == [("RB", CPA(((2,),)))]
+    assert told(sbt, "RB", Backtrack()) == []
+    assert sbt.verdict is Verdict.NO_SOLUTION
+
+
+def test_nothing_is_said_after_the_verdict() -> None:
+    sbt = agent(triangle(1), "RA")
+    told(sbt, "RB", Backtrack())
+    assert told(sbt, "RB", Backtrack()) == []
+
+
+def test_a_robot_with_an_empty_domain_says_so_at_once() -> None:
+    sbt = agent(team_of({"A": (1, 2), "B": ()}, []), "RB")
+    assert sbt.verdict is Verdict.NO_SOLUTION
+
+
+def test_a_robot_alone_is_the_first_and_the_last() -> None:
+    sbt = agent(team_of({"A": (1, 2)}, []), "RA")
+    assert (sbt.verdict, sbt.assignment) == (Verdict.SOLUTION, {"A": 1})
+
+
+def test_an_n_ary_constraint_is_checked_by_its_lowest_robot() -> None:
+    rows = Relation("even", 3, Semantics.SUPPORTS, ((1, 1, 2), (1, 2, 1), (2, 1, 1)))
+    scope = ("A", "B", "C")
+    team = team_of(dict.fromkeys("ABC", (1, 2)), [Constraint("E", rows, scope, scope)])
+    second, third = agent(team, "RB"), agent(team, "RC")
+    assert told(second, "RA", CPA(((1,),))) == [("RC", CPA(((1,), (1,))))]
+    assert second.problem.checks == 0
+    told(third, "RB", CPA(((1,), (1,))))
+    assert third.assignment == {"C": 2}
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_solution_is_the_first_one_in_the_order_of_robots_and_values(seed: int) -> None:
+    team = random_team(Random(seed))
+    truth = next(solutions(team), None)
+    result = Simulation(team, SBT, Concurrent(seed)).run()
+    assert result.verdict is (Verdict.NO_SOLUTION if truth is None else Verdict.SOLUTION)
+    if truth is not None:
+        assert {name: value for own in result.assignments.values() for name, value in own.items()} == truth
+
+
+def test_one_robot_acts_at_a_time_so_all_checks_stand_in_a_row() -> None:
+    for seed in range(20):
+        metrics = Simulation(random_team(Random(seed)), SBT, Concurrent(seed)).run().metrics
+        assert metrics.ncccs == metrics.checks

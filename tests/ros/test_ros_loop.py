@@ -1,0 +1,307 @@
+"""The closed loop: what robots report opens the next epoch, whoever they report to."""
+
+from __future__ import annotations
+
+import multiprocessing
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import pytest
+
+from robochoc.api import Problem
+from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.formats import read_team
+from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.model.problem import AddAgent, Event, RemoveAgent, RemoveValue, Team
+from robochoc.ros.closed_loop import Loop, drones_of
+from robochoc.ros.listening import Listening
+from robochoc.ros.reading import Reading
+from robochoc.ros.sink import Fields, Sink
+from robochoc.ros.source import Heard, Source, SourceFailed
+from robochoc.run.orchestrator import OnLoss, Options, Runtime, Withdrawal, solve
+from robochoc.solver.encoding import Unsupported
+from tests.conformance.test_epochs import pair
+from tests.support.clocks import waiting
+from tests.support.problems import ON_ONE_MACHINE
+from tests.support.program import ROOT
+
+HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")
+SIMULATED = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
+SECOND = 1_000_000_000
+PORTS = {"point": {"x": 3.0, "y": 1.0, "z": 3.0}}
+"""Where Port flies first."""
+
+# A field, whatever it is
+
+
+class Says:
+    """A field that says what it was told to say, and keeps what it is told."""
+
+    def __init__(self, *events: Event | None) -> None:
+        self.events = list(events)
+        self.told: list[tuple[tuple[str, ...], Epoch, float | None]] = []
+
+    def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
+        self.told.append((team.order, epoch, left_s))
+        return self.events.pop(0) if self.events else None
+
+
+def openings(outcome: Outcome) -> list[str]:
+    return [epoch.opened_by for epoch in outcome.epochs]
+
+
+@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
+def test_a_field_is_told_each_epoch_and_says_the_next(runtime: Runtime) -> None:
+    field = Says(Event((RemoveValue("A", 1),)), Event((RemoveAgent("RB"),)))
+    outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=runtime), field=field)
+    assert openings(outcome) == ["the start", "A without 1", "-RB"]
+    assert [(order, left_s) for order, _, left_s in field.told] == [(("RA", "RB"), None)] * 2 + [(("RA",), None)]
+    assert [epoch for _, epoch, _ in field.told] == [*outcome.epochs]
+    assert all(epoch.verified for epoch in outcome.epochs)
+    assert outcome.assignment == {"A": 2}
+
+
+def test_what_cannot_be_is_passed_over() -> None:
+    field = Says(Event((RemoveAgent("RX"), RemoveValue("A", 9), RemoveValue("A", 1))), Event((RemoveAgent("RX"),)))
+    outcome = solve(pair(values=3), SIMULATED, field=field)
+    assert openings(outcome) == ["the start", "A without 1", "nothing"]
+    team = pair(values=3)
+    there = Says(Event((AddAgent(team["RB"]),)))
+    assert openings(solve(team, SIMULATED, field=there)) == ["the start", "nothing"]
+
+
+def test_the_files_own_events_come_first() -> None:
+    team = pair(Event((RemoveValue("A", 1),)), values=3)
+    outcome = solve(team, SIMULATED, field=Says(Event((RemoveValue("A", 2), RemoveValue("A", 1)))))
+    assert openings(outcome) == ["the start", "A without 1", "A without 2"]
+    assert outcome.events == 2
+
+
+def test_without_a_field_a_problem_that_does_not_change_has_no_epochs() -> None:
+    assert solve(pair(values=3), SIMULATED).epochs == ()
+    assert len(solve(pair(values=3), SIMULATED, field=Says()).epochs) == 1
+
+
+def test_an_epoch_without_a_solution_may_be_followed_by_one_with() -> None:
+    values = tuple(RemoveValue("A", value) for value in (1, 2, 3))
+    outcome = solve(pair(values=3), SIMULATED, field=Says(Event(values), Event((RemoveAgent("RA"),))))
+    assert [epoch.verdict for epoch in outcome.epochs] == ["solution", "no-solution", "solution"]
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (Options(protocol="dynabt", withdraw=Withdrawal.FEWEST), "--withdraw"),
+        (Options(protocol="dynabt", runtime=Runtime.NETWORK), "--runtime network"),
+        (Options(protocol="central"), "--protocol central"),
+    ],
+)
+def test_what_a_changing_problem_cannot_have_is_refused(options: Options, named: str) -> None:
+    with pytest.raises(Unsupported, match=f"{named} is for problems that do not change"):
+        solve(pair(values=3), options, field=Says())
+
+
+def test_when_the_time_is_over_nothing_that_comes_is_heeded() -> None:
+    class Slow(Says):
+        def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
+            assert left_s is not None
+            time.sleep(left_s)
+            return super().__call__(team, epoch, left_s)
+
+    field = Slow(Event((RemoveValue("A", 1),)))
+    outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1), field=field)
+    assert (outcome.verdict, openings(outcome)) == (Verdict.UNKNOWN, ["the start", "A without 1"])
+    assert field.told[-1][2] == 0
+    assert "--timeout" in (outcome.reason or "")
+
+
+def test_when_all_messages_are_sent_nothing_that_comes_is_heeded() -> None:
+    field = Says()
+    outcome = solve(HANGAR, replace(SIMULATED, messages=3), field=field)
+    assert (outcome.verdict, field.told[-1][2]) == (Verdict.UNKNOWN, 0)
+
+
+class Striking(Says):
+    """Kills a robot's process while the team waits."""
+
+    def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
+        if not self.told:
+            victim = next(process for process in multiprocessing.active_children() if process.name == "RB")
+            victim.kill()
+            victim.join()
+        return super().__call__(team, epoch, left_s)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="as the runtime's other tests of faults")
+def test_a_robot_that_dies_while_the_team_waits_is_lost() -> None:
+    options = Options(protocol="dynabt")
+    event = Event((RemoveValue("A", 1),))
+    with pytest.raises(RobotsLost) as lost:
+        solve(pair(values=3), options, field=Striking(event))
+    assert "RB" in lost.value.robots
+    surviving = Options(protocol="dynabt", on_loss=OnLoss.WITHDRAW)
+    outcome = solve(pair(values=3), surviving, field=Striking(event))
+    assert openings(outcome) == ["the start", "A without 1", "the loss of RB"]
+    assert (outcome.lost, outcome.assignment) == (("RB",), {"A": 2})
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SourceFailed("the robots cannot be heard any more")])
+def test_no_process_outlives_a_field_that_fails(error: BaseException | type[BaseException]) -> None:
+    def fails(_team: Team, _epoch: Epoch, _left_s: float | None) -> Event | None:
+        assert len(multiprocessing.active_children()) == 2
+        raise error
+
+    with pytest.raises((KeyboardInterrupt, SourceFailed)):
+        solve(pair(values=3), Options(protocol="dynabt"), field=fails)
+    assert multiprocessing.active_children() == []
+
+
+# A loop with a source
+
+
+class Tape(Source):
+    """A source that gives what it was given; a live one whenever it comes, for nothing comes of itself."""
+
+    def __init__(self, *messages: Heard, live: bool = False) -> None:
+        super().__init__("tape")
+        self.messages = list(messages)
+        self.live = live
+        self.topics: Mapping[str, str] = {}
+
+    def listen(self, topics: Mapping[str, str]) -> None:
+        self.topics = topics
+
+    def next(self, wait_s: float) -> Heard | None:
+        if self.messages:
+            return self.messages.pop(0)
+        if self.live:
+            time.sleep(wait_s)
+        return None
+
+    def close(self) -> None:
+        """Nothing to leave."""
+
+
+class Kept(Sink):
+    """A sink that keeps what is published."""
+
+    def __init__(self, *, live: bool = False) -> None:
+        super().__init__("kept")
+        self.live = live
+        self.messages: list[tuple[str, Fields, int]] = []
+
+    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
+        assert kind
+        self.messages.append((topic, fields, at_ns))
+
+    def close(self) -> None:
+        """Nothing to write."""
+
+    def topics(self) -> list[str]:
+        return [topic for topic, _, _ in self.messages]
+
+
+def at(seconds: float, topic: str, fields: Mapping[str, object]) -> Heard:
+    kinds = Reading(drones_of(HANGAR), "map").topics
+    return Heard(topic, kinds.get(topic, ""), fields, round(seconds * SECOND))
+
+
+def listened(*messages: Heard, sink: Sink | None = None, team: Team = HANGAR) -> tuple[Outcome, Loop]:
+    senses = Listening(Tape(*messages), Reading(drones_of(team), "map"))
+    loop = Loop(team, [sink] if sink else [], senses)
+    return solve(team, SIMULATED, field=loop), loop
+
+
+def test_the_first_report_that_changes_the_problem_opens_an_epoch() -> None:
+    outcome, loop = listened(
+        at(1, "/nose/battery", {"percentage": 0.9}),
+        at(2, "/port/blocked", PORTS),
+        at(8, "/fin/out_of_order", {"data": "a motor"}),
+        at(9, "/tail/battery", {"percentage": 0.1}),
+    )
+    assert openings(outcome) == ["the start", "port without 3", "-Fin", "-Tail"]
+    assert outcome.assignment["port"] != 3
+    assert loop.team.scenario == tuple(loop.events)
+    assert len(loop.events) == outcome.events == 3
+
+
+def test_reports_within_half_a_second_belong_together() -> None:
+    messages = [at(2, "/port/blocked", PORTS), at(2.4, "/fin/out_of_order", {"data": ""})]
+    assert openings(listened(*messages)[0]) == ["the start", "port without 3, -Fin"]
+    later = [*messages, at(2.6, "/tail/battery", {"percentage": 0})]
+    assert openings(listened(*later)[0]) == ["the start", "port without 3, -Fin", "-Tail"]
+
+
+def test_reports_that_change_nothing_open_no_epoch() -> None:
+    outcome, loop = listened(at(1, "/port/blocked", {"point": {"x": 50, "y": 50, "z": 50}}), at(2, "/port/pose", {}))
+    assert openings(outcome) == ["the start"]
+    assert "it changes nothing" in loop.notes[0]
+
+
+def test_what_is_known_to_come_is_not_asked_for_again() -> None:
+    team = replace(HANGAR, scenario=(Event((RemoveAgent("Fin"),)),))
+    outcome, _ = listened(at(1, "/fin/out_of_order", {"data": ""}), at(3, "/fin/battery", {"percentage": 0}), team=team)
+    assert openings(outcome) == ["the start", "-Fin"]
+
+
+def test_a_recordings_time_is_the_clock_of_what_is_published() -> None:
+    sink = Kept()
+    listened(at(100, "/port/blocked", PORTS), at(107, "/nose/battery", {"percentage": 1.0}), sink=sink)
+    times = [at_ns / SECOND for _, _, at_ns in sink.messages]
+    assert times == [100.0] * 6 + [100.0] + [107.0] * 6 + [107.0]
+    assert sink.topics()[6::7] == ["/port/blocked", "/nose/battery"]
+
+
+def test_what_was_heard_over_a_ros_is_not_said_there_again() -> None:
+    sink = Kept(live=True)
+    _, loop = listened(at(100, "/port/blocked", PORTS), sink=sink)
+    assert set(sink.topics()) == {f"/{name.lower()}/waypoint" for name in HANGAR.order}
+    assert loop.outlets[0].told == "12 waypoints, 0 landings"
+
+
+def test_who_leaves_lands() -> None:
+    sink = Kept()
+    _, loop = listened(at(1, "/fin/out_of_order", {"data": "a motor"}), sink=sink)
+    assert loop.outlets[0].told == "11 waypoints, 1 landing, 1 report"
+    assert loop.mission is not None
+    assert [drone.name for drone in loop.mission.drones] == sorted(HANGAR.order)
+    assert [leg.opened_by for leg in loop.mission.legs] == ["the start", "-Fin"]
+    assert [goal.lands for goal in loop.mission.legs[1].goals.values()] == [True, False, False, False, False, False]
+
+
+def live(patience_s: float, *messages: Heard) -> tuple[Loop, Callable[[], int]]:
+    senses = Listening(Tape(*messages, live=True), Reading(drones_of(HANGAR), "map"), patience_s)
+    waited: list[float] = []
+    senses.idle = lambda: waited.append(time.monotonic())
+    return Loop(HANGAR, (), senses), lambda: len(waited)
+
+
+def test_a_live_source_is_waited_for_and_somebody_told_so() -> None:
+    loop, waited = live(0.5, at(time.time(), "/port/blocked", PORTS))
+    with waiting(30, at_least_s=0.9):
+        outcome = solve(HANGAR, SIMULATED, field=loop)
+    assert openings(outcome) == ["the start", "port without 3"]
+    assert waited() >= 2
+
+
+def test_waiting_is_bounded_by_the_time_for_all() -> None:
+    loop, _ = live(60)
+    with waiting(30):
+        outcome = solve(HANGAR, Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1.5), field=loop)
+    assert (outcome.verdict, openings(outcome)) == (Verdict.SOLUTION, ["the start"])
+
+
+def test_the_team_of_a_run_nobody_changed_is_as_its_files_have_it() -> None:
+    sink = Kept(live=True)
+    loop = Loop(HANGAR, [sink])
+    loop.publish(solve(HANGAR, SIMULATED))
+    assert (loop.team, loop.mission) == (HANGAR, None)
+    assert loop.outlets[0].told == "6 waypoints, 0 landings"
+
+
+def test_a_field_for_whoever_uses_the_library() -> None:
+    field = Says(Event((RemoveValue("port", 3),)))
+    outcome = Problem(HANGAR).solve("dynabt", "simulator", field=field)
+    assert openings(outcome) == ["the start", "port without 3"]

@@ -1,0 +1,228 @@
+"""What drones publish: waypoints in the type that their topic has, poses, and reports."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robochoc.flight.mission import Drone, Goal, Leg
+from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Topic
+from robochoc.ros import mappings
+from robochoc.ros.mappings import NoMapping, WaypointMapping, kinds, mapping_for, short_kind
+from robochoc.ros.names import REPORTS
+from robochoc.ros.publisher import NothingToPublish, Publisher
+from robochoc.ros.recordings.types import UnknownType, types_of
+from robochoc.ros.sink import Fields, Sink
+from robochoc.ros.waypoint import Waypoint
+from tests.support.offered import offered
+
+POSE = "geometry_msgs/PoseStamped"
+NOW = 1_700_000_000_250_000_000
+HEADER = {"stamp": NOW, "frame_id": "map"}
+DRONES = (
+    Drone("drone1.1", "Robot1.1", Topic("/drone1.1/waypoint1.1"), (0.0, 0.0, 0.0), 0),
+    Drone("drone1.2", "Robot1.2", Topic("/drone1.2/waypoint1.2", "geometry_msgs/Point"), (0.0, 1.0, 0.0), 0),
+    Drone("drone1.3", "Robot1.3", None, (0.0, 2.0, 0.0), 0),
+    Drone("drone1.4", "Robot1.4", Topic("/drone1.4/waypoint1.4"), (0.0, 3.0, 0.0), 0),
+)
+LEG = Leg(
+    "begin",
+    Verdict.SOLUTION,
+    {1: Goal((1.0, 2.0, 3.0)), 0: Goal((-2.0, 0.0, 0.0), lands=True), 2: Goal((4.0, 4.0, 4.0))},
+)
+LANDS = Leg("begin", Verdict.SOLUTION, {0: Goal((-2.0, 0.0, 0.0), lands=True)})
+
+
+class Heap(Sink):
+    """Keeps what it gets."""
+
+    def __init__(self) -> None:
+        super().__init__("")
+        self.advertised: list[dict[str, str]] = []
+        self.original: dict[str, str] = {}
+        self.said: list[tuple[str, str, Fields, int]] = []
+
+    def explain(self, original: Mapping[str, str]) -> None:
+        self.original = {**original}
+
+    def advertise(self, topics: Mapping[str, str]) -> None:
+        self.advertised.append({**topics})
+
+    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
+        self.said.append((topic, kind, fields, at_ns))
+
+    def close(self) -> None:
+        raise AssertionError("the publisher did not open it")
+
+
+def installed(monkeypatch: pytest.MonkeyPatch, **places: str) -> None:
+    """As if a package offered these mappings: types are written with a double underscore here."""
+    offered(monkeypatch, mappings.GROUP, **{name.replace("__", "/"): place for name, place in places.items()})
+    mapping_for.cache_clear()
+    monkeypatch.setattr(mappings, "mapping_for", mapping_for.__wrapped__)
+
+
+def target(waypoint: Waypoint) -> Fields:
+    return {"height": waypoint.at[2], "down": waypoint.lands, "due": waypoint.stamp}
+
+
+DEFINITION = f"""float64 height
+bool down
+time due
+my_msgs/Deep deep
+{"=" * 80}
+MSG: my_msgs/Deep
+int8[2] pair
+"""
+TARGET = WaypointMapping(target, DEFINITION)
+LOOSE = WaypointMapping(target, "float64 height\nother_msgs/Unknown what\n")
+WRONG = WaypointMapping(target, "(this is no definition)")
+NUMBER = 3
+
+
+def failing(waypoint: Waypoint) -> Fields:
+    raise ValueError(f"no {waypoint.at}")
+
+
+def test_who_flies_and_who_lands_publishes_and_nobody_else() -> None:
+    heap = Heap()
+    Publisher("team", DRONES, [heap]).decide(LEG, NOW)
+    landing = {"position": {"x": -2.0, "y": 0.0, "z": 0.0}, "orientation": {"w": 1.0}}
+    assert heap.said == [
+        ("/drone1_1/waypoint1_1", POSE, {"header": HEADER, "pose": landing}, NOW),
+        ("/drone1_2/waypoint1_2", "geometry_msgs/Point", {"x": 1.0, "y": 2.0, "z": 3.0}, NOW),
+    ]
+
+
+def test_all_is_advertised_once_to_every_sink() -> None:
+    heaps = [Heap(), Heap()]
+    publisher = Publisher("team", DRONES, heaps)
+    publisher.decide(LEG, NOW)
+    for heap in heaps:
+        (topics,) = heap.advertised
+        assert topics["/drone1_1/waypoint1_1"] == POSE
+        assert topics["/drone1_2/waypoint1_2"] == "geometry_msgs/Point"
+        assert {topic: kind for topic, kind in topics.items() if topic.startswith("/drone1_3/")} == {
+            f"/drone1_3/{token}": kind for token, kind in REPORTS.items()
+        }
+        assert len(topics) == 3 + len(REPORTS) * len(DRONES)
+        assert heap.original["/drone1_4/waypoint1_4"] == "/drone1.4/waypoint1.4"
+        assert len(heap.said) == 2
+
+
+def test_poses_of_all_drones() -> None:
+    heap = Heap()
+    publisher = Publisher("team", DRONES, [heap], frame="arena")
+    turned = np.tile([0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)], (4, 1))
+    publisher.poses(np.arange(12.0).reshape(4, 3), turned, NOW)
+    assert [topic for topic, *_ in heap.said] == [f"/drone1_{number}/pose" for number in (1, 2, 3, 4)]
+    _, kind, fields, at_ns = heap.said[2]
+    assert (kind, at_ns, fields["header"]["frame_id"]) == (POSE, NOW, "arena")
+    assert fields["pose"]["position"] == {"x": 6.0, "y": 7.0, "z": 8.0}
+    assert fields["pose"]["orientation"] == {"x": 0.0, "y": 0.0, "z": math.sqrt(0.5), "w": math.sqrt(0.5)}
+
+
+@pytest.mark.parametrize(
+    ("report", "topic", "part", "value"),
+    [
+        (Battery("drone1.2", 0.25), "battery", "percentage", 0.25),
+        (Blocked("drone1.2", (1.0, 2.0, 3.0)), "blocked", "point", {"x": 1.0, "y": 2.0, "z": 3.0}),
+        (Cleared("drone1.2", (1.0, 2.0, 3.0)), "cleared", "point", {"x": 1.0, "y": 2.0, "z": 3.0}),
+        (OutOfOrder("drone1.2", "a motor stopped"), "out_of_order", "data", "a motor stopped"),
+        (
+            Pose("drone1.2", (1.0, 2.0, 3.0)),
+            "pose",
+            "pose",
+            {"position": {"x": 1.0, "y": 2.0, "z": 3.0}, "orientation": {"w": 1.0}},
+        ),
+    ],
+)
+def test_reports(report: Report, topic: str, part: str, value: object) -> None:
+    heap = Heap()
+    Publisher("team", DRONES, [heap]).report(report, NOW)
+    ((where, kind, fields, at_ns),) = heap.said
+    assert (where, kind, at_ns) == (f"/drone1_2/{topic}", REPORTS[topic], NOW)
+    assert fields[part] == value
+    for version in (1, 2):
+        types = types_of(version)
+        assert types.decode(kind, types.encode(kind, fields))[part]
+
+
+def test_what_a_battery_does_not_measure_is_not_zero() -> None:
+    heap = Heap()
+    Publisher("team", DRONES, [heap]).report(Battery("drone1.1", 1.0), NOW)
+    assert math.isnan(heap.said[0][2]["voltage"])
+
+
+def test_a_team_without_topics_has_nothing_to_publish() -> None:
+    with pytest.raises(NothingToPublish, match="no drone of queens has a topic"):
+        Publisher("queens", DRONES[2:3], [Heap()])
+
+
+@pytest.mark.parametrize("kind", ["sensor_msgs/Image", "PoseStamped", "", "a/b/c", "geometry_msgs/srv/Pose"])
+def test_a_type_that_nobody_maps_is_refused(kind: str) -> None:
+    drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", kind))
+    with pytest.raises(NoMapping) as refused:
+        Publisher("team", [drone], [Heap()])
+    told = str(refused.value)
+    assert all(part in told for part in ("/drone1.1/waypoint1.1", "Robot1.1", repr(kind), POSE, "robochoc.waypoints"))
+
+
+@pytest.mark.parametrize("kind", kinds())
+@pytest.mark.parametrize("version", [1, 2])
+def test_every_built_in_type_is_a_type_of_ros_and_holds_the_place(kind: str, version: int) -> None:
+    mapping = mapping_for(kind.replace("/", "/msg/"))
+    assert mapping is not None
+    fields = mapping.fields(Waypoint(0, "/a/b", kind, (1.5, -2.5, 3.5), False, "map", NOW))
+    types = types_of(1 if version == 1 else 2)
+    told = str(types.decode(kind, types.encode(kind, fields)))
+    assert "'x': 1.5, 'y': -2.5, 'z': 3.5" in told
+    assert ("Stamped" in kind) == (str(NOW) in told)
+    assert ("Po" not in kind or "Point" in kind) or "'w': 1.0" in told
+
+
+def test_both_spellings_are_one_type() -> None:
+    assert short_kind("geometry_msgs/msg/PoseStamped") == short_kind(" geometry_msgs/PoseStamped") == POSE
+    assert short_kind("geometry_msgs/action/PoseStamped") == "geometry_msgs/action/PoseStamped"
+
+
+def test_a_package_brings_a_type_and_its_definition(monkeypatch: pytest.MonkeyPatch) -> None:
+    installed(monkeypatch, my_msgs__Target="test_ros_waypoints:TARGET")
+    heap = Heap()
+    drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", "my_msgs/msg/Target"))
+    Publisher("team", [drone], [heap]).decide(LANDS, NOW)
+    ((_, kind, fields, _),) = heap.said
+    assert fields == {"height": 0.0, "down": True, "due": NOW}
+    for version in (1, 2):
+        types = types_of(version)
+        assert types.decode(kind, types.encode(kind, fields)) == {**fields, "deep": {"pair": [0, 0]}}
+        assert "MSG: my_msgs/Deep\nint8[2] pair" in types.definition(kind).text
+
+
+@pytest.mark.parametrize("place", ["test_ros_waypoints:NUMBER", "test_ros_waypoints:missing", "no_such_module:x"])
+def test_a_broken_package_is_told(monkeypatch: pytest.MonkeyPatch, place: str) -> None:
+    installed(monkeypatch, my_msgs__Target=place)
+    drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", "my_msgs/Target"))
+    with pytest.raises(NoMapping, match=place):
+        Publisher("team", [drone], [Heap()])
+
+
+def test_a_mapping_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    installed(monkeypatch, my_msgs__Failing="test_ros_waypoints:failing")
+    drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", "my_msgs/Failing"))
+    publisher = Publisher("team", [drone], [Heap()])
+    with pytest.raises(NoMapping, match=r"my_msgs/Failing failed: ValueError: no \("):
+        publisher.decide(LANDS, NOW)
+
+
+@pytest.mark.parametrize(("name", "told"), [("LOOSE", "needs types that nobody defines"), ("WRONG", "brings is wrong")])
+def test_a_definition_that_cannot_be_used_is_told(monkeypatch: pytest.MonkeyPatch, name: str, told: str) -> None:
+    installed(monkeypatch, **{f"my_msgs__{name.title()}": f"test_ros_waypoints:{name}"})
+    with pytest.raises(UnknownType, match=told):
+        types_of(2).encode(f"my_msgs/{name.title()}", {})

@@ -1,0 +1,134 @@
+"""Random teams with costs, and the least cost by brute force."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from random import Random
+
+from robochoc.model.problem import INFINITE, Assignment, Constraint, Kind, Predicate, Relation, Robot, Semantics, Team
+from tests.support.complex_problems import random_complex_team
+from tests.support.problems import PREDICATES, random_team, team_of
+
+DEAREST = 9
+
+
+def random_cost_team(chance: Random, *, n_ary: bool = True) -> Team:
+    """A team of 3 to 8 robots: soft relations and soft predicates, hard constraints among them, unary costs."""
+    size = chance.choice((3, 4, 4, 5, 5, 6, 7, 8))
+    most = 3 if size > 6 else 4
+    domains = {
+        f"X{number:02}": sorted(chance.sample(range(-3, 6), chance.randint(1 if chance.random() < 0.2 else 2, most)))
+        for number in range(size)
+    }
+    density = chance.uniform(0.3, 0.9)
+    hard = chance.choice((0, 0.1, 0.3))
+    pairs = [pair for pair in itertools.combinations(domains, 2) if chance.random() < density]
+    constraints = [_random_constraint(chance, domains, pair, hard) for pair in pairs]
+    if n_ary and chance.random() < 0.5:
+        triples = [chance.sample(sorted(domains), 3) for _ in range(chance.randint(1, 2))]
+        constraints += [_soft_table(chance, domains, triple, hard) for triple in triples]
+    constraints += [_soft_table(chance, domains, (name,), hard / 2) for name in domains if chance.random() < 0.4]
+    return with_costs(team_of(domains, constraints, "costs"))
+
+
+def random_complex_cost_team(chance: Random) -> Team:
+    """The complex robots of `random_complex_team`, where about two thirds of the constraints have become soft."""
+    return softened(random_complex_team(chance), chance)
+
+
+def random_hard_team(chance: Random, *, n_ary: bool = True) -> Team:
+    """A team without costs, for protocols that minimise: a solution costs nothing."""
+    return random_team(chance, n_ary=n_ary)
+
+
+def with_costs(team: Team) -> Team:
+    """`team` as a DisWCSP."""
+    return replace(team, robots=tuple(replace(robot, kind=Kind.DISWCSP) for robot in team.robots))
+
+
+def softened(team: Team, chance: Random) -> Team:
+    """`team` as a DisWCSP in which about two thirds of the constraints only cost something."""
+
+    def soft(constraint: Constraint) -> Constraint:
+        if chance.random() < 0.35:
+            return constraint
+        definition = constraint.definition
+        if isinstance(definition, Predicate):
+            return replace(constraint, cost=chance.randint(1, DEAREST))
+        listed, other = chance.randint(0, DEAREST), chance.randint(0, DEAREST)
+        costs = tuple(chance.choice((listed, chance.randint(0, DEAREST), INFINITE)) for _ in definition.tuples)
+        return replace(
+            constraint,
+            definition=replace(definition, semantics=Semantics.SOFT, costs=costs, default_cost=other),
+        )
+
+    def of(robot: Robot) -> Robot:
+        parents = tuple(replace(p, constraints=tuple(map(soft, p.constraints))) for p in robot.parents)
+        return replace(robot, private=tuple(map(soft, robot.private)), parents=parents)
+
+    return with_costs(replace(team, robots=tuple(map(of, team.robots))))
+
+
+def least_cost(team: Team) -> float:
+    """The cost of the cheapest assignment, by trying them all; `INFINITE` when all break something hard."""
+    names = list(team.variables)
+    constraints = list(team.constraints())
+    combinations = itertools.product(*(team.variables[name].domain for name in names))
+    return min(
+        (cost_of(dict(zip(names, values, strict=True)), constraints) for values in combinations), default=INFINITE
+    )
+
+
+def cost_of(assignment: Assignment, constraints: Sequence[Constraint]) -> float:
+    total: float = 0
+    for constraint in constraints:
+        total += constraint.price(assignment)
+        if total == INFINITE:
+            break
+    return total
+
+
+def fewest_aside(team: Team) -> int:
+    """The least weight of robots that have to step aside so that the others have a solution, by brute force."""
+    constraints = list(team.constraints())
+    own = {robot.name: {variable.name for variable in robot.variables} for robot in team.robots}
+
+    def place(left: Sequence[Robot], assignment: Assignment, aside: int, best: int) -> int:
+        if aside >= best:
+            return best
+        if not left:
+            return aside
+        robot, *others = left
+        columns = [variable.domain for variable in robot.variables]
+        for values in itertools.product(*columns):
+            names = [variable.name for variable in robot.variables]
+            wider = {**assignment, **dict(zip(names, values, strict=True))}
+            met = (c for c in constraints if own[robot.name] & {*c.variables} and wider.keys() >= {*c.variables})
+            if all(constraint.allows(wider) for constraint in met):
+                best = place(others, wider, aside, best)
+        return place(others, assignment, aside + robot.weight, best)
+
+    return place(team.robots, {}, 0, sum(robot.weight for robot in team.robots) + 1)
+
+
+def _random_constraint(
+    chance: Random, domains: Mapping[str, Sequence[int]], pair: Sequence[str], hard: float
+) -> Constraint:
+    scope = list(pair)
+    chance.shuffle(scope)
+    if chance.random() < 0.6:
+        return _soft_table(chance, domains, scope, hard)
+    cost = INFINITE if chance.random() < hard else chance.randint(1, DEAREST)
+    return Constraint("C", chance.choice(PREDICATES), tuple(scope), tuple(scope), cost=cost)
+
+
+def _soft_table(chance: Random, domains: Mapping[str, Sequence[int]], scope: Sequence[str], hard: float) -> Constraint:
+    """Every tuple has a cost; those that are not listed have the default."""
+    rows = list(itertools.product(*(domains[name] for name in scope)))
+    listed = [row for row in rows if chance.random() < 0.8]
+    costs = tuple(INFINITE if chance.random() < hard else chance.randint(0, DEAREST) for _ in listed)
+    default = INFINITE if chance.random() < hard else chance.randint(0, DEAREST)
+    relation = Relation("R", len(scope), Semantics.SOFT, tuple(listed), costs, default)
+    return Constraint("C", relation, tuple(scope), tuple(scope))

@@ -1,0 +1,47 @@
+"""Robots of DPOP that have their places, and what they say."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.protocols.dpop import DPOP, Dimensions, Domain, Need
+from tests.support.agents import told
+from tests.support.cost_problems import with_costs
+from tests.support.problems import team_of
+from tests.support.trees import placed
+
+PRODUCT = Relation("R", 2, Semantics.SOFT, tuple(itertools.product((1, 2, 3), repeat=2)), (1, 2, 3, 2, 4, 6, 3, 6, 9))
+"""Two values cost their product."""
+FEW = Need(1, "RX")
+
+
+def products(names: str, pairs: str, values: Sequence[int] = (1, 2, 3)) -> Team:
+    """A robot for each letter; each of `pairs` pays the product of its values."""
+    constraints = [Constraint("C", PRODUCT, (pair[0], pair[1]), (pair[0], pair[1])) for pair in pairs.split()]
+    return with_costs(team_of(dict.fromkeys(names, values), constraints))
+
+
+def begun(team: Team, name: str, above: str = "", below: str = "", further: str = "") -> DPOP:
+    """One robot, with nothing left to say: below the first of `above`, with children `below` and pseudo-children."""
+    over, under, pseudo = ([f"R{letter}" for letter in letters] for letters in (above, below, further))
+    parent = over[0] if over else None
+    robot = placed(DPOP, team, name, parent, pseudo_parents=over[1:], children=under, pseudo_children=pseudo)
+    robot.outbox.clear()
+    return robot
+
+
+def domain(values: Iterable[int] = (1, 2, 3)) -> Domain:
+    return Domain([(value,) for value in values])
+
+
+def dimensions(sizes: dict[str, int], dearest: int = 9, width: int = 1, most: Need = FEW) -> Dimensions:
+    return Dimensions(sizes, dearest, width, most)
+
+
+def leaf(team: Team, name: str = "RC") -> DPOP:
+    """The lowest of three, which has told its separator."""
+    robot = begun(team, name, "BA")
+    told(robot, ("RB", domain()), ("RA", domain()))
+    return robot

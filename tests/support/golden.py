@@ -1,0 +1,85 @@
+"""The golden journals: fixed runs, kept in git. `make journals` rewrites them; a changed one is a changed protocol."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from robochoc.formats import read_team
+from robochoc.generators.queens3d import queens3d
+from robochoc.journal.events import Given
+from robochoc.journal.journal import Header, Recorder, lines_of, read_journal
+from robochoc.model.problem import Constraint, Kind, Relation, Semantics, Team
+from robochoc.run.orchestrator import Options, Runtime, ScheduleName, Withdrawal, solve
+from robochoc.run.registry import protocol_named, protocol_names
+from tests.support.problems import team_of
+from tests.support.program import ROOT
+
+FOLDER = ROOT / "tests" / "golden"
+PATROL = ROOT / "docs" / "examples" / "patrol"
+RESCUE = ROOT / "docs" / "examples" / "rescue"
+
+
+def odd_team(*, n_ary: bool = True) -> Team:
+    """Four robots, a ternary constraint among them: A + B + C is even, and neighbours differ."""
+    rows = tuple((a, b, c) for a in (1, 2, 3) for b in (1, 2, 3) for c in (1, 2, 3) if (a + b + c) % 2 == 0)
+    even = Relation("even", 3, Semantics.SUPPORTS, rows)
+    differ = Relation("differ", 2, Semantics.CONFLICTS, tuple((value, value) for value in (1, 2, 3)))
+    pairs = (("A", "B"), ("B", "C"), ("A", "C"), ("C", "D"))
+    constraints = [Constraint("C", differ, pair, pair) for pair in pairs]
+    scope = ("A", "B", "C")
+    if n_ary:
+        constraints.append(Constraint("E", even, scope, scope))
+    return team_of(dict.fromkeys("ABCD", (1, 2, 3)), constraints, "odd")
+
+
+@cache
+def fixed_teams(protocol: str) -> dict[str, Team]:
+    """Three small teams, by name; without the ternary constraint for a protocol that cannot take it.
+
+    A protocol that goes on when the problem changes also has one that does; one that minimises, one with costs.
+    """
+    traits = protocol_named(protocol).traits
+    teams = {"queens3d-2": queens3d(2), "queens3d-3-full": queens3d(3, "full"), "odd": odd_team(n_ary=traits.n_ary)}
+    if traits.costs:
+        teams["patrol"] = read_team(PATROL)
+    return {**teams, "rescue": read_team(RESCUE)} if traits.dynamic else teams
+
+
+def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
+    """The journal of the fixed run, of a few cycles, in its text form; it was written and read as a file is.
+
+    The wall-clock time, which is not fixed, is left out, and so are the robots' files, which are no protocol's.
+    """
+    withdraw = None if team.dynamic or team.kind is Kind.DISWCSP else Withdrawal.MAXIMAL
+    settings = {"cycles": "3"} if hasattr(protocol_named(protocol).settings, "cycles") else {}
+    options = Options(
+        protocol=protocol, runtime=Runtime.SIMULATOR, schedule=schedule, withdraw=withdraw, settings=settings
+    )
+    recorder = Recorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=0))
+    solve(team, options, observer=lambda event: None if isinstance(event, Given) else recorder(event))
+    return b"".join(lines_of(read_journal(recorder.content())))
+
+
+@cache
+def files() -> dict[str, tuple[str, str, ScheduleName]]:
+    """All golden journals of our own protocols: the protocol, the team and the schedule, by file name."""
+    return {
+        f"{protocol}/{team}-{schedule}.jsonl": (protocol, team, schedule)
+        for protocol in protocol_names()
+        if protocol_named(protocol).__module__.startswith("robochoc.")
+        for team in fixed_teams(protocol)
+        for schedule in ScheduleName
+    }
+
+
+def content(file: str) -> bytes:
+    """What the journal called `file` should be."""
+    protocol, team, schedule = files()[file]
+    return journal(fixed_teams(protocol)[team], protocol, schedule)
+
+
+if __name__ == "__main__":
+    for file in files():
+        (FOLDER / file).parent.mkdir(parents=True, exist_ok=True)
+        (FOLDER / file).write_bytes(content(file))
+        print(FOLDER / file)  # noqa: T201 - a script's output

@@ -1,0 +1,72 @@
+"""One robot, RB, between a parent RA and a child RC; a script says what it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import cast
+
+from robochoc.authority.identity import Identity
+from robochoc.communication.network.control_messages import (
+    Leave,
+    Register,
+    Task,
+    Welcome,
+    Word,
+)
+from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
+from robochoc.communication.network.manner import Manner
+from robochoc.communication.network.members import Members
+from robochoc.communication.network.profile import profile_of
+from robochoc.communication.network.robot import Ending, NetworkRobot
+from robochoc.communication.network.transport import Post
+from robochoc.formats import PREDEFINED
+from robochoc.model.message import encode
+from robochoc.model.problem import Constraint, Team
+from robochoc.protocols.abt import ABT, Ok
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.agent_problem import NO_BRIEF
+from robochoc.solver.compiled_team import CompiledRobot
+from tests.support.offices import RUN, Scripted
+from tests.support.problems import team_of
+
+UNPROVEN = cast("Identity", None)
+PATIENCE_S = 5.0
+LEAVE = Leave("over", failed=False)
+
+
+def differ() -> Team:
+    pairs = [("A", "B"), ("B", "C")]
+    return team_of(dict.fromkeys("ABC", (1, 2)), [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in pairs])
+
+
+def task(protocol: type[Protocol] = ABT, epoch: int = 1) -> Task:
+    members = Members()
+    for robot in differ().robots:
+        members.register(robot.name, profile_of(robot), "visit")
+    return members.tasks(epoch, protocol.__name__, protocol.traits, NO_BRIEF)["RB"]
+
+
+def ok(value: int) -> bytes:
+    return encode(Ok((value,)))
+
+
+Script = Callable[[Scripted, Word], Iterable[Word | Item]]
+
+
+def played(script: Script, protocol: type[Protocol] = ABT, patience_s: float = PATIENCE_S) -> tuple[Ending, Scripted]:
+    """How RB fares when all its words to the master are answered by `script`; it is welcomed, as a rule."""
+
+    def answers(word: Word) -> Iterator[Item]:
+        if isinstance(word, Register) and len(post.heard) == 1:
+            yield post.letter(Welcome(word.visit, RUN, (), observed=False, private=False))
+        for said in script(post, word):
+            yield said if isinstance(said, Arrived | Missed | Presence | Woken) else post.letter(said)
+
+    def named(name: str) -> type[Protocol]:
+        if name != protocol.__name__:
+            raise LookupError(f"no protocol {name!r}")
+        return protocol
+
+    post = Scripted("RB", answers)
+    robot = NetworkRobot(CompiledRobot(differ()["RB"]), UNPROVEN, cast("Post", post), named, Manner(patience_s))
+    return robot.run(), post

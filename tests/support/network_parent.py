@@ -1,0 +1,31 @@
+"""A team over the network on this machine, held for ever: `python network_parent.py`. Something happens to it."""
+
+from __future__ import annotations
+
+import signal
+import sys
+
+from robochoc.communication.network.local import LocalNetwork
+from robochoc.communication.run_result import Progress
+from robochoc.solver.agent_problem import Brief
+from tests.support.held import CHAIN, Held
+
+
+def main() -> None:
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    brief = Brief(settings={"file": "/nowhere"})
+    try:
+        with LocalNetwork(CHAIN, Held, brief=brief, progress=tell) as network:
+            network.search()
+    except KeyboardInterrupt:
+        sys.exit(128 + signal.SIGINT)
+
+
+def tell(progress: Progress) -> None:
+    if progress.messages:
+        sys.stdout.write("searching\n")
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

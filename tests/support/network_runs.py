@@ -1,0 +1,218 @@
+"""A run across machines whose robots are threads of the test: with a real router, real zenoh, and mutual TLS."""
+
+from __future__ import annotations
+
+import re
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import zenoh
+
+from robochoc.authority.admission import Household
+from robochoc.communication.network.control_messages import Word
+from robochoc.communication.network.framing import Letters
+from robochoc.communication.network.journal_server import Publication
+from robochoc.communication.network.local import LOOPBACK
+from robochoc.communication.network.manner import Manner
+from robochoc.communication.network.master import Master
+from robochoc.communication.network.members import Members
+from robochoc.communication.network.robot import Ending, NetworkRobot
+from robochoc.communication.network.settings import Conditions
+from robochoc.communication.network.transport import Post
+from robochoc.communication.run_result import RunResult
+from robochoc.journal.events import AnyEvent, Lost, Received, Refused
+from robochoc.model.problem import Team
+from robochoc.solver.agent_problem import Brief
+from robochoc.solver.compiled_team import CompiledRobot
+from tests.support.faults import wait_until
+from tests.support.held import CHAIN, Held
+
+WITHIN_S = 30.0
+SLICE_S = 0.2
+
+
+def free_endpoint() -> str:
+    """An address of this machine where nobody listens."""
+    with socket.create_server((LOOPBACK, 0)) as trial:
+        return f"{LOOPBACK}:{trial.getsockname()[1]}"
+
+
+def put(post: Post, key: str, content: bytes = b"anything") -> None:
+    """Put on a key that the post itself would not put on."""
+    post._session.put(key, content, congestion_control=zenoh.CongestionControl.BLOCK)  # noqa: SLF001
+
+
+def letter(run: NetworkRun, sender: str, receiver: str, word: Word, number: int = 1, of_run: str = "") -> bytes:
+    """A letter of this run as `sender` would write it."""
+    letters = Letters(sender, of_run or run.master.run)
+    letters._written[receiver] = number - 1  # noqa: SLF001
+    return letters.write(receiver, word)
+
+
+class NetworkRun:
+    """`team` searches by `Held`, and is held until `let_go`. `absent` robots do not come by themselves.
+
+    `master` and the household are there for tests to use; `events` is all that was observed.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        team: Team = CHAIN,
+        conditions: Conditions = Conditions(),
+        *,
+        absent: Iterable[str] = (),
+        seconds: float | None = 60,
+        publication: Publication | None = None,
+    ) -> None:
+        self.team = team
+        self.household = Household(team.order)
+        self.events: list[AnyEvent] = []
+        self.result: RunResult | None = None
+        self.error: Exception | None = None
+        self.held: tuple[bool, float] | None = None
+        self.endings: dict[str, Ending] = {}
+        self.threads: dict[str, threading.Thread] = {}
+        self.conditions = conditions
+        self._seconds = seconds
+        self._publication = publication
+        self._absent = set(absent)
+        self._gate = folder / "go"
+        self._given_up = False
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Self:
+        endpoint = free_endpoint()
+        identity = self.household.master_identity((LOOPBACK,))
+        members = Members(self.team.order)
+        master = Master(
+            self.household, identity, endpoint, members, self.conditions, observer=self.events.append, watched=True
+        )
+        if self._publication:
+            master.publish(self._publication)
+        self.master = self._stack.enter_context(master)
+        self.endpoint = endpoint
+        self._search = threading.Thread(target=self._run)
+        self._search.start()
+        for name in self.team.order:
+            if name not in self._absent:
+                self.start(name)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._gate.touch()
+        self._search.join()
+        for thread in self.threads.values():
+            thread.join()
+        self._stack.close()
+
+    # What a test does
+
+    def start(self, name: str, endpoint: str = "") -> None:
+        """The robot `name` comes."""
+        self.threads[name] = threading.Thread(target=self._take_part, args=[name, endpoint or self.endpoint])
+        self.threads[name].start()
+
+    def post(self, name: str, *, endpoint: str = "", patience_s: float = 10) -> Post:
+        """A connection of somebody who has an identity of `name` from the household."""
+        place, identity = endpoint or self.endpoint, self.household.identity(name)
+        return Post(place, identity, watch=(), patience_s=patience_s, lease_ms=self.conditions.lease_ms)
+
+    def let_go(self) -> RunResult:
+        """Let the team search to the end, and return what came of it."""
+        self._gate.touch()
+        return self.wait_for_result()
+
+    def give_up(self) -> None:
+        """End the run before all robots are there."""
+        self._given_up = True
+
+    def wait_for_result(self) -> RunResult:
+        """What came of the search, as soon as it is over."""
+        self._search.join(WITHIN_S)
+        assert not self._search.is_alive(), "the search does not end"
+        if self.error:
+            raise self.error
+        assert self.result
+        return self.result
+
+    def wait_for_refusal(self, who: str, what: str, why: str) -> Refused:
+        """The first refusal that these regular expressions are found in, as soon as there is one."""
+        found: list[Refused] = []
+
+        def look() -> bool:
+            found.extend(
+                one
+                for one in self.refusals
+                if re.fullmatch(who, one.who) and re.search(what, one.what) and re.search(why, one.why)
+            )
+            return bool(found)
+
+        try:
+            wait_until(look, "", WITHIN_S)
+        except AssertionError:
+            raise AssertionError(f"no refusal of {who}, {what}, {why} among {self.refusals}") from None
+        return found[0]
+
+    def wait_until(self, condition: Callable[[], bool], otherwise: str) -> None:
+        """Wait until `condition` holds."""
+        wait_until(condition, otherwise, WITHIN_S)
+
+    def wait_for_progress(self) -> None:
+        """Wait until three more messages of the search have come."""
+        before = self.received
+        wait_until(lambda: self.received >= before + 3, f"the search does not go on: {self.error}", WITHIN_S)
+
+    @property
+    def received(self) -> int:
+        """Messages of the search that were received so far."""
+        return sum(isinstance(event, Received) for event in list(self.events))
+
+    @property
+    def refusals(self) -> list[Refused]:
+        return [event for event in list(self.events) if isinstance(event, Refused)]
+
+    @property
+    def losses(self) -> list[Lost]:
+        return [event for event in list(self.events) if isinstance(event, Lost)]
+
+    @property
+    def router(self) -> int:
+        """The id of the router's process."""
+        process = self.master._gate._router._process  # noqa: SLF001
+        return process.pid if process else 0
+
+    # Its threads
+
+    def _run(self) -> None:
+        try:
+            deadline = time.monotonic() + WITHIN_S
+            while not self._given_up and time.monotonic() < deadline and not self.master.members.closed:
+                self.master.gather(time.monotonic() + SLICE_S)
+            if self.master.members.closed:
+                brief = Brief(settings={"file": str(self._gate)})
+                self.result = self.master.search("held", Held.traits, brief, self._seconds)
+                if not self.result.lost and self.result.assignments:
+                    self.held = self.master.checked(self.result.assignments)
+        except Exception as error:  # noqa: BLE001 - the test is told
+            self.error = error
+        self.master.leave("the run is over", failed=self.error is not None)
+
+    def _take_part(self, name: str, endpoint: str) -> None:
+        with self.post(name, endpoint=endpoint) as post:
+            robot = NetworkRobot(
+                CompiledRobot(self.team[name]),
+                self.household.identity(name),
+                post,
+                lambda _name: Held,
+                Manner(self.conditions.patience_s),
+            )
+            self.endings[name] = robot.run()

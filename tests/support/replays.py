@@ -1,0 +1,110 @@
+"""Recorded runs to be played again: random problems of every family that a protocol can take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from random import Random
+
+import msgspec
+
+from robochoc.journal.events import AnyEvent, Began
+from robochoc.journal.journal import Header, Journal, Recorder, read_journal
+from robochoc.model.orders import Order
+from robochoc.model.problem import Kind, Model, Team
+from robochoc.run.orchestrator import Options, Withdrawal, solve
+from robochoc.run.registry import protocol_named
+from robochoc.solver.ace import AceProcess
+from tests.conformance.test_conformance import random_schedule
+from tests.support.changes import random_journey
+from tests.support.complex_changes import random_complex_journey
+from tests.support.complex_problems import random_complex_team
+from tests.support.cost_problems import random_complex_cost_team, random_cost_team
+from tests.support.pkc_problems import random_pkc_team
+from tests.support.problems import random_team
+
+ENOUGH = 1500
+"""Messages after which a run may end."""
+
+
+def families(protocol: str) -> list[Callable[[Random], Team]]:
+    """What makes random teams that `protocol` can take."""
+    traits = protocol_named(protocol).traits
+    found: list[Callable[[Random], Team]] = [lambda chance: random_team(chance, n_ary=traits.n_ary)]
+    if traits.costs:
+        found.append(lambda chance: random_cost_team(chance, n_ary=traits.n_ary))
+    if traits.n_ary:
+        found.append(random_complex_cost_team if traits.costs else random_complex_team)
+        found.append(lambda chance: random_journey(chance, 4))
+    if traits.partially_known:
+        found.append(random_pkc_team)
+    if traits.n_ary and not traits.costs:
+        found.append(lambda chance: random_complex_journey(chance, 3))
+    return found
+
+
+def random_run(protocol: str, chance: Random, number: int) -> tuple[Team, Options]:
+    """A team of the families in turn, and options at random, as far as the protocol and the team leave a choice."""
+    makers = families(protocol)
+    team = makers[number % len(makers)](chance)
+    options = replace(random_schedule(chance), protocol=protocol, messages=ENOUGH)
+    if hasattr(protocol_named(protocol).settings, "cycles"):
+        options = replace(options, settings={"cycles": "8"})
+    if team.dynamic:
+        return team, options
+    parts = any(one.model is Model.PKC for one in team.constraints())
+    order = None if parts else chance.choice((None, Order.MIN_WIDTH, Order.RANDOM))
+    return team, replace(options, withdraw=withdrawal(protocol, team, chance), order=order)
+
+
+def withdrawal(protocol: str, team: Team, chance: Random) -> Withdrawal | None:
+    """Who may step aside, if anybody."""
+    traits = protocol_named(protocol).traits
+    parts = any(one.model is Model.PKC for one in team.constraints())
+    fewest = not parts and (traits.complete or not traits.costs)
+    maximal = not parts and team.kind is Kind.DISCSP
+    return chance.choice([None, None, *([Withdrawal.FEWEST] * fewest), *([Withdrawal.MAXIMAL] * maximal)])
+
+
+def recorded(team: Team, options: Options, solver: AceProcess | None = None) -> Journal:
+    """The journal of a run, as it is read."""
+    recorder = Recorder(header_of(team, options))
+    recorder.outcome = solve(team, options, observer=recorder, solver=solver)
+    return read_journal(recorder.content())
+
+
+def header_of(team: Team, options: Options) -> Header:
+    return Header(team=team.name, protocol=options.protocol, runtime=options.runtime, seed=options.seed)
+
+
+def in_text(journal: Journal) -> Journal:
+    """`journal` as its text form gives it back: what is not finite is null, and bytes are text."""
+    lines = [msgspec.json.encode(event) for event in journal.events]
+    return with_events(journal, [msgspec.json.decode(line, type=AnyEvent) for line in lines])
+
+
+def in_binary(events: list[AnyEvent]) -> list[AnyEvent]:
+    """`events` as a binary form gives them back: numbers and bytes are what they were, and tuples are lists."""
+    return [msgspec.msgpack.decode(msgspec.msgpack.encode(event), type=AnyEvent) for event in events]
+
+
+def with_events(journal: Journal, events: Sequence[AnyEvent]) -> Journal:
+    return replace(journal, events=tuple(events))
+
+
+def as_told(team: Team, options: Options) -> tuple[Journal, list[AnyEvent]]:
+    """The journal of a run, and its events as they were told: in the order in which a journal has them."""
+    told: list[AnyEvent] = []
+    recorder = Recorder(header_of(team, options))
+
+    def observe(event: AnyEvent) -> None:
+        told.append(event)
+        recorder(event)
+
+    solve(team, options, observer=observe)
+    runs: list[list[AnyEvent]] = []
+    for event in told:
+        if isinstance(event, Began):
+            runs.append([])
+        runs[-1].append(event)
+    return read_journal(recorder.content()), [event for run in runs for event in sorted(run, key=lambda one: one.t)]

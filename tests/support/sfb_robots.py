@@ -1,0 +1,70 @@
+"""Robots of SFB, alone or introduced to each other, and what they say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from robochoc.model.message import Message
+from robochoc.model.problem import Team
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.sfb import SFB, CPAs, SFBSettings
+from robochoc.solver.agent_problem import parts
+from robochoc.solver.compiled import LocalProblem
+from tests.support.agents import told
+from tests.support.trees import Costs, priced
+
+CHAIN: Costs = {"AB": (3, 1, 0, 2), "BC": (0, 4, 2, 1), "A": (0, 1)}
+"""RA and RB, RB and RC; the cheapest is RA 2, RB 1, RC 1, for 1."""
+
+
+def team(costs: Costs) -> Team:
+    """Robots RA, RB, ...: for each scope in `costs` what its combinations of values cost."""
+    return priced("".join(sorted({*"".join(costs)})), costs)
+
+
+def agents(problem: Team, settings: SFBSettings | None = None) -> dict[str, SFB]:
+    """The protocol objects of all robots, not started."""
+    order = PriorityOrder(problem.order)
+    found = {name: SFB(LocalProblem(part), order) for name, part in parts(problem, everywhere=True).items()}
+    for robot in found.values():
+        robot.settings = settings or robot.settings
+    return found
+
+
+def introduced(
+    problem: Team, settings: SFBSettings | None = None, *, begun: bool = True
+) -> tuple[dict[str, SFB], list[CPAs]]:
+    """All robots know each other's values; and what the first one says then. `begun`: as if a CPA had gone before."""
+    robots = agents(problem, settings)
+    for robot in robots.values():
+        robot.first_sent = begun
+    said: list[CPAs] = []
+    todo = []
+    for robot in robots.values():
+        robot.start()
+        todo += [(robot.problem.agent, *one) for one in robot.outbox]
+        robot.outbox.clear()
+    while todo:
+        sender, receiver, message = todo.pop(0)
+        if isinstance(message, CPAs):
+            said.append(message)
+        else:
+            todo += [(receiver, *one) for one in told(robots[receiver], (sender, message))]
+    return robots, said
+
+
+def rows(message: Message) -> list[list[int]]:
+    """What `message` holds, as numbers of one byte each."""
+    assert isinstance(message, CPAs)
+    width = len(message.rows) // message.count
+    return [list(message.rows[place : place + width]) for place in range(0, len(message.rows), width)]
+
+
+def cpas(*partial: Sequence[int], least: int = 11, ceiling: int = 11) -> CPAs:
+    """A message of CPAs in problems whose costs fit into a byte."""
+    return CPAs(len(partial), bytes([number for row in partial for number in row]), least, ceiling)
+
+
+def row(bound: int) -> list[int]:
+    """A CPA for RB in CHAIN, with that bound."""
+    return [bound, bound, 1, 0, 0, 0, 0]

@@ -1,0 +1,135 @@
+"""Enrolment: strangers, junk, and those who take their time; the service goes on."""
+
+from __future__ import annotations
+
+import socket
+import ssl
+import threading
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robochoc.authority.certificates import new_key, signing_request
+from robochoc.authority.enrolment import enrol
+from robochoc.authority.enrolment_server import EnrolmentServer
+from robochoc.authority.frames import (
+    LARGEST_BYTES,
+    BadFrame,
+    Denied,
+    Exchange,
+    Introduce,
+    Redeem,
+    Renew,
+    decode_question,
+)
+from tests.support.clocks import waiting
+from tests.support.desks import SOON_S, Desk, answered, drip, framed, trusting
+
+
+def test_oversized_requests_are_not_even_read(desk: Desk) -> None:
+    for size in (LARGEST_BYTES + 1, 2**31, 2**32 - 1):
+        answer = answered(desk, size.to_bytes(4, "big"))
+        assert isinstance(answer, Denied)
+        assert "allowed" in answer.why
+    assert "allowed" in desk.refusal(3)
+
+
+DEEP = b"\x82\xa4type\xa6Redeem\xa6secret" + b"\x91" * 16000
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\xc1",
+        b"\xff" * LARGEST_BYTES,
+        b"GET / HTTP/1.1\r\n\r\n",
+        DEEP,
+        msgspec.msgpack.encode({"type": "Redeem", "secret": b"x"}),
+        msgspec.msgpack.encode({"type": "Redeem", "secret": b"x", "request": b"", "more": 1}),
+        msgspec.msgpack.encode({"type": "Redeem", "secret": "text", "request": 1}),
+        msgspec.msgpack.encode({"type": "Certified", "certificate": b""}),
+        msgspec.msgpack.encode({"type": b"\xff"}),
+        msgspec.msgpack.encode([]),
+    ],
+)
+def test_malformed_requests(desk: Desk, content: bytes) -> None:
+    assert isinstance(answered(desk, framed(content)), Denied)
+    assert "no question" in desk.refusal()
+
+
+@given(st.binary(max_size=200))
+def test_no_bytes_make_decoding_fail_otherwise(content: bytes) -> None:
+    try:
+        question = decode_question(content)
+    except BadFrame:
+        return
+    assert isinstance(question, Introduce | Redeem | Renew)
+
+
+def test_an_unknown_token(desk: Desk) -> None:
+    question = Redeem(b"guess", signing_request(new_key(), "A"))
+    answer = answered(desk, framed(msgspec.msgpack.encode(question)))
+    assert isinstance(answer, Denied)
+    assert "unknown" in desk.refusal()
+
+
+def test_plain_tcp_and_old_tls_are_refused(desk: Desk) -> None:
+    with socket.create_connection(desk.place, SOON_S) as plain:
+        plain.sendall(framed(msgspec.msgpack.encode(Introduce())) * 10)
+        with pytest.raises((OSError, BadFrame)):
+            Exchange(plain, SOON_S).answer()
+    assert "TLS failed" in desk.refusal()
+    context = trusting(desk)
+    context.maximum_version = ssl.TLSVersion.TLSv1_2
+    with pytest.raises(ssl.SSLError):
+        answered(desk, b"", context)
+    assert "TLS failed" in desk.refusal(2)
+
+
+def test_slow_ones_are_hung_up_on_and_others_are_served_meanwhile_and_after(desk: Desk, tmp_path: Path) -> None:
+    """One does nothing, one drips bytes of a handshake, one bytes of a request: in time all of them are gone."""
+    tokens = desk.authority.enrol_all(["A", "B"])
+    with ExitStack() as stack:
+        mute = stack.enter_context(socket.create_connection(desk.place, SOON_S))
+        half = stack.enter_context(socket.create_connection(desk.place, SOON_S))
+        half.sendall(b"\x16\x03\x01")
+        plain = stack.enter_context(socket.create_connection(desk.place, SOON_S))
+        slow = stack.enter_context(trusting(desk).wrap_socket(plain))
+        with waiting(2.5):
+            with waiting(0.9):  # that is, nobody had to be waited for
+                assert enrol(*desk.place, tokens["A"], tmp_path / "a", "A").name == "A"
+            drip(slow, framed(bytes(1000)))
+        assert "more than 1 s" in desk.refusal(3)
+        assert mute.recv(1) == b""
+    assert enrol(*desk.place, tokens["B"], tmp_path / "b", "B").name == "B"
+
+
+def test_who_fills_all_places_delays_others_no_longer_than_the_patience(desk: Desk, tmp_path: Path) -> None:
+    token = desk.authority.enrol("A")
+    with ExitStack() as stack:
+        for _ in range(4):
+            stack.enter_context(socket.create_connection(desk.place, SOON_S))
+        assert enrol(*desk.place, token, tmp_path / "a", "A").name == "A"
+
+
+def test_closing_hangs_up_on_everybody_at_once(tmp_path: Path) -> None:
+    desk = Desk(tmp_path / "authority")
+    desk.server = EnrolmentServer(desk.authority, desk.master, connections=2)
+    before = threading.active_count()
+    with ExitStack() as stack:
+        with ExitStack() as serving:
+            serving.enter_context(desk.server)
+            for _ in range(3):
+                stack.enter_context(socket.create_connection(desk.place, SOON_S))
+            while threading.active_count() < before + 3:
+                time.sleep(0.005)
+            with waiting(2):
+                serving.close()
+        assert threading.active_count() == before
+    assert desk.seen.events == [], "what we do ourselves is no refusal"

@@ -1,0 +1,128 @@
+"""The host: clocks, counts, decoding, events; and the local problem that counts the checks."""
+
+from __future__ import annotations
+
+import pytest
+
+from robochoc.communication.host import BadMessage, Host
+from robochoc.journal.events import AnyEvent, Concluded, Decided, Received, Sent, Settled
+from robochoc.model.message import Envelope, Message, encode
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.protocols.abt import ABT, AddLink, Nogood, Ok
+from robochoc.protocols.first_fit import Placed
+from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.agent_problem import parts
+from robochoc.solver.compiled import LocalProblem
+from tests.support.problems import team_of
+
+DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2)))
+
+
+def chain() -> Team:
+    pairs = (("A", "B"), ("B", "C"))
+    return team_of(dict.fromkeys("ABC", (1, 2)), [Constraint("C", DIFFERENT, pair, pair) for pair in pairs])
+
+
+def host(name: str) -> Host:
+    team = chain()
+    problem = LocalProblem(parts(team)[name])
+    return Host(ABT(problem, PriorityOrder(team.order)))
+
+
+def test_the_clock_takes_up_the_message_s_and_counts_own_checks() -> None:
+    b = host("RB")
+    b.start()
+    assert b.clock == 0
+    (said,) = b.handle([Envelope("RA", "RB", encode(Ok((1,))), clock=7)])
+    # B = 1 was checked and broken, then B = 2 was checked: two checks on top of A's seven.
+    assert b.clock == 9
+    assert said.clock == 9
+    assert b.metrics().checks == 2
+
+
+class Chatty(ABT):
+    """Says something before, between and after its checks."""
+
+    def receive(self, sender: str, message: Message) -> None:
+        self.send("RA", AddLink())
+        super().receive(sender, message)
+        self._consistent(0, self.view)
+        self.send("RA", AddLink())
+
+    def settle(self) -> None:
+        self._consistent(1, self.view)
+        self.send("RC", AddLink())
+        self._consistent(1, self.view)
+
+
+def chatty() -> Host:
+    team = chain()
+    return Host(Chatty(LocalProblem(parts(team)["RB"]), PriorityOrder(team.order)))
+
+
+def test_a_message_carries_the_clock_of_when_it_was_said() -> None:
+    b = chatty()
+    said = b.handle([Envelope("RA", "RB", encode(Ok((1,))), clock=7)])
+    assert [envelope.clock for envelope in said] == [7, 8, 9]
+    assert b.clock == 10
+    assert b.said_at == [0, 1, 2]
+    # Nothing rules out B = 2, so it is checked each time; what ruled out B = 1 is known.
+    again = b.handle([Envelope("RA", "RB", encode(Ok((1,))), clock=0)])
+    assert [envelope.clock for envelope in again] == [10, 10, 11]
+
+
+def test_what_was_said_to_a_message_does_not_carry_the_clocks_of_those_that_were_read_after_it() -> None:
+    b = chatty()
+    first, second = (Envelope("RA", "RB", encode(Ok((1,))), clock) for clock in (7, 100))
+    assert [envelope.clock for envelope in b.handle([first, second])] == [7, 8, 100, 100, 101]
+    assert b.clock == 102
+
+
+def test_an_old_clock_moves_nothing_back() -> None:
+    b = host("RB")
+    b.handle([Envelope("RA", "RB", encode(Ok((1,))), clock=7)])
+    b.handle([Envelope("RA", "RB", encode(Ok((1,))), clock=0)])
+    assert b.clock == 10
+
+
+def test_messages_and_bytes_are_counted_by_type() -> None:
+    b = host("RB")
+    (said,) = b.start()
+    assert said.content == encode(Ok((1,)))
+    assert b.metrics().messages == {"Ok": 1}
+    assert b.metrics().bytes == len(said.content)
+
+
+@pytest.mark.parametrize("content", [b"", b"\x00", encode(Placed((1,))), encode(Ok((1,)))[:-1], b"\x92\xa2Ok\x91\xa1x"])
+def test_what_is_no_message_of_the_protocol_is_refused(content: bytes) -> None:
+    with pytest.raises(BadMessage, match="RA sent RB what is no message"):
+        host("RB").handle([Envelope("RA", "RB", content, 0)])
+
+
+def test_events_tell_what_happened_in_order() -> None:
+    events: list[AnyEvent] = []
+    c = host("RC")
+    c.observe(events.append, lambda: 1.5)
+    c.start()
+    c.handle([Envelope("RB", "RC", encode(Ok((1,))), 3)])
+    assert events == [
+        Decided(t=1.5, robot="RC", assignment={"C": 1}, clock=0),
+        Settled(t=1.5, robot="RC", clock=0, checks=0),
+        Received(t=1.5, sender="RB", receiver="RC", type="Ok", clock=3),
+        Decided(t=1.5, robot="RC", assignment={"C": 2}, clock=5),
+        Settled(t=1.5, robot="RC", clock=5, checks=2),
+    ]
+
+
+def test_a_verdict_is_an_event_once() -> None:
+    events: list[AnyEvent] = []
+    a = host("RA")
+    a.observe(events.append, lambda: 0.0)
+    a.start()
+    for value in (1, 2):
+        a.handle([Envelope("RB", "RA", encode(Nogood({}, (value,))), 0)])
+    a.handle([Envelope("RB", "RA", encode(Nogood({}, (1,))), 0)])
+    assert [event for event in events if isinstance(event, Concluded)] == [
+        Concluded(t=0.0, robot="RA", verdict="no-solution")
+    ]
+    assert any(isinstance(event, Sent) and event.content == {"value": (2,)} for event in events)

@@ -1,0 +1,125 @@
+"""The simulator: deterministic from its seed, exact counts, golden journals, schedules that keep FIFO."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.generators.queens3d import queens3d
+from robochoc.journal.journal import Header, Recorder, lines_of, metrics_of, read_journal
+from robochoc.model.message import Envelope
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.run.orchestrator import Options, Runtime, ScheduleName, Withdrawal, solve
+from tests.support import golden
+from tests.support.clocks import waiting
+from tests.support.problems import team_of, teams
+
+
+@pytest.mark.parametrize(
+    ("n", "model", "messages", "ncccs", "checks"),
+    [
+        (4, "planar", {"AddLink": 4, "Nogood": 80, "Ok": 565}, 75, 879),
+        (4, "full", {"AddLink": 3, "Nogood": 94, "Ok": 496}, 62, 760),
+        (7, "planar", {"AddLink": 74, "Nogood": 174, "Ok": 2364}, 262, 7656),
+    ],
+)
+def test_counts_of_queens_are_exact(n: int, model: str, messages: dict[str, int], ncccs: int, checks: int) -> None:
+    spent = solve(queens3d(n, model), Options(runtime=Runtime.SIMULATOR)).metrics
+    assert (spent.messages, spent.ncccs, spent.checks) == (messages, ncccs, checks)
+
+
+@pytest.mark.parametrize("file", golden.files())
+def test_journals_are_as_they_were(file: str) -> None:
+    assert golden.content(file) == (golden.FOLDER / file).read_bytes()
+
+
+@given(team=teams, seed=st.integers(0, 2**32), schedule=st.sampled_from(list(ScheduleName)))
+@settings(max_examples=50, deadline=None)
+def test_a_seed_is_a_run(team: Team, seed: int, schedule: ScheduleName) -> None:
+    options = Options(runtime=Runtime.SIMULATOR, seed=seed, schedule=schedule, delay=seed % 30)
+    once, again = (recorded(team, options) for _ in range(2))
+    assert once == again
+
+
+@given(team=teams, seed=st.integers(0, 2**32))
+@settings(max_examples=50, deadline=None)
+def test_metrics_from_the_journal_are_the_hosts(team: Team, seed: int) -> None:
+    recorder = Recorder(Header(team=team.name, protocol="abt", runtime="simulator", seed=seed))
+    options = Options(runtime=Runtime.SIMULATOR, seed=seed, withdraw=Withdrawal.MAXIMAL)
+    spent = solve(team, options, observer=recorder).metrics
+    read = metrics_of(read_journal(recorder.content()).events)
+    assert replace(read, wall_s=spent.wall_s) == spent
+
+
+def recorded(team: Team, options: Options) -> list[bytes]:
+    recorder = Recorder(Header(team=team.name, protocol="abt", runtime="simulator", seed=options.seed))
+    solve(team, options, observer=recorder)
+    return [*lines_of(read_journal(recorder.content()))]
+
+
+def test_other_seeds_are_other_runs() -> None:
+    counts = {
+        sum(solve(queens3d(4), Options(runtime=Runtime.SIMULATOR, seed=seed)).metrics.messages.values())
+        for seed in range(5)
+    }
+    assert len(counts) > 1
+
+
+def test_delays_go_into_the_clock() -> None:
+    quick, slow = (
+        solve(queens3d(4), Options(runtime=Runtime.SIMULATOR, delay=delay)).metrics.ncccs for delay in (0, 1000)
+    )
+    assert slow > 10 * quick
+
+
+def test_a_timeout_is_an_unknown() -> None:
+    outcome = solve(queens3d(8), Options(runtime=Runtime.SIMULATOR, timeout=0.05))
+    assert outcome.verdict is Verdict.UNKNOWN
+    assert not outcome.assignment
+    assert not outcome.verified
+
+
+def test_a_timeout_holds_where_a_packet_takes_long() -> None:
+    never = Relation("R", 2, Semantics.SUPPORTS, ((-1, -1),))
+    team = team_of({"X": range(20_000), "Y": range(20_000)}, [Constraint("C", never, ("X", "Y"), ("X", "Y"))])
+    with waiting(5):
+        outcome = solve(team, Options(runtime=Runtime.SIMULATOR, timeout=0.5))
+    assert outcome.verdict is Verdict.UNKNOWN
+
+
+@given(
+    sends=st.lists(st.tuples(st.sampled_from("ABC"), st.sampled_from("DE"), st.integers(0, 20)), max_size=60),
+    seed=st.integers(0, 1000),
+    longest=st.integers(0, 50),
+)
+def test_channels_are_fifo_and_lose_nothing(sends: list[tuple[str, str, int]], seed: int, longest: int) -> None:
+    for schedule in (RandomChannels(seed), Concurrent(seed, longest)):
+        arrived = delivered(schedule, sends)
+        for edge in {send[:2] for send in sends}:
+            sent = [number for number, send in enumerate(sends) if send[:2] == edge]
+            assert [int(e.content) for e in arrived if (e.sender, e.receiver) == edge] == sent
+
+
+def delivered(schedule: Schedule, sends: list[tuple[str, str, int]]) -> list[Envelope]:
+    """Put everything, some of it between packets; then take what arrives."""
+    arrived: list[Envelope] = []
+    for number, (sender, receiver, clock) in enumerate(sends):
+        schedule.put(Envelope(sender, receiver, str(number).encode(), clock))
+        if number % 5 == 4:
+            arrived += taken(schedule)
+    while packet := taken(schedule):
+        arrived += packet
+    return arrived
+
+
+def taken(schedule: Schedule) -> list[Envelope]:
+    packet = list(schedule.get())
+    assert len({envelope.receiver for envelope in packet}) <= 1
+    if packet:
+        schedule.done(packet[0].receiver, max(envelope.clock for envelope in packet), 0)
+    return packet

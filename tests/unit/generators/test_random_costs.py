@@ -1,0 +1,122 @@
+"""Random problems with costs: Model B's graphs, every cost as likely as any other, and graphs to be coloured."""
+
+from __future__ import annotations
+
+from collections import Counter
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+from robochoc.formats import read_team, write_team
+from robochoc.generators.coloring import coloring
+from robochoc.generators.random_csp import random_csp
+from robochoc.model.orders import neighbours
+from robochoc.model.problem import INFINITE, Kind, Semantics, Team
+from tests.support.program import robochoc
+from tests.unit.generators.test_random_csp import constraints, edges, relation
+
+
+def test_the_graph_is_model_bs() -> None:
+    for seed in range(5):
+        team = random_csp(12, 3, 0.4, 0, seed, max_cost=9)
+        assert team.kind is Kind.DISWCSP
+        assert team.name == f"random-12-3-0.4-0.0-cost9-{seed}"
+        assert len(edges(team)) == len(constraints(team)) == round(0.4 * 66)
+        assert {relation(one).semantics for one in constraints(team)} == {Semantics.SOFT}
+    linked = random_csp(12, 3, 0.2, 0, 1, connected=True, max_cost=9)
+    assert all(neighbours(linked).values())
+
+
+def test_so_many_pairs_are_forbidden_all_others_cost_something() -> None:
+    team = random_csp(9, 5, 0.5, 0.36, 3, max_cost=4)
+    for one in constraints(team):
+        prices = [relation(one).cost((a, b)) for a in range(1, 6) for b in range(1, 6)]
+        assert prices.count(INFINITE) == 9
+        assert {price for price in prices if price < INFINITE} <= {0, 1, 2, 3, 4}
+
+
+def test_every_cost_is_as_likely_as_any_other() -> None:
+    seen: Counter[float] = Counter()
+    for seed in range(20):
+        for one in constraints(random_csp(10, 5, 0.5, 0, seed, max_cost=9)):
+            seen.update(relation(one).cost((a, b)) for a in range(1, 6) for b in range(1, 6))
+    expected = sum(seen.values()) / 10
+    assert sorted(seen) == list(range(10))
+    assert sum((count - expected) ** 2 / expected for count in seen.values()) < 28  # chi-square, 9 degrees
+
+
+def test_a_seed_is_one_problem_everywhere() -> None:
+    """Fixed for good: who publishes figures names seeds."""
+    said = [
+        (one.scope, relation(one).tuples, relation(one).costs)
+        for one in constraints(random_csp(10, 5, 0.4, 0.1, 42, max_cost=100))
+    ]
+    assert sha256(repr(said).encode()).hexdigest()[:16] == "73f3803ff545085f"
+    assert sha256(repr(sorted(edges(coloring(20, 3, 4, 42)))).encode()).hexdigest()[:16] == "60db1280f43b4712"
+
+
+def test_a_graph_to_be_coloured_has_the_degree_that_was_asked_for() -> None:
+    team = coloring(15, 3, 4, 7)
+    assert team.name == "coloring-15-3-4.0-7"
+    assert len(edges(team)) == 30
+    assert {one.cost for one in constraints(team)} == {1}
+    assert all(list(one.domain) == [1, 2, 3] for one in team.variables.values())
+    assert all(neighbours(coloring(15, 3, 3, 7, connected=True)).values())
+
+
+@pytest.mark.parametrize(
+    "team", [random_csp(8, 3, 0.5, 0.2, 1, max_cost=0), random_csp(8, 3, 0.5, 0.2, 1, max_cost=50), coloring(8, 2, 3)]
+)
+def test_the_team_is_what_its_files_say(tmp_path: Path, team: Team) -> None:
+    write_team(team, tmp_path / team.name)
+    assert read_team(tmp_path / team.name) == team
+
+
+def test_impossible_problems_are_refused() -> None:
+    for cost in (-1, 1_000_001):
+        with pytest.raises(ValueError, match=f"max-cost is {cost}; it must be from 0 to 1000000"):
+            random_csp(3, 3, 0.5, 0, max_cost=cost)
+    with pytest.raises(ValueError, match=r"together have 4,950,000 pairs of values, more than 1,000,000"):
+        random_csp(100, 100, 0.1, 0, max_cost=5)
+    for wrong, said in (
+        ((0, 3, 0), "agents is 0"),
+        ((3, 0, 1), "colors is 0"),
+        ((3, 3, 2.5), "degree is 2.5; among 3"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            coloring(*wrong)
+    with pytest.raises(ValueError, match="degree is nan"):
+        coloring(3, 3, float("nan"))
+
+
+# On the command line
+
+
+def test_generate_writes_costs_where_it_says(tmp_path: Path) -> None:
+    words = ["generate", "random", "--agents", 6, "--domain", 3, "--density", 0.4, "--max-cost", 10, "--seed", 4]
+    done = robochoc(*words, folder=tmp_path)
+    folder = Path("instances") / "random-6-3-0.4-0.0-cost10-4"
+    assert done.stdout == f"{folder}: 6 robots, 6 constraints; next: robochoc solve {folder}\n"
+    assert read_team(tmp_path / folder) == random_csp(6, 3, 0.4, 0, 4, max_cost=10)
+    done = robochoc("generate", "coloring", "--agents", 6, "--degree", 3, "--connected", folder=tmp_path)
+    folder = Path("instances") / "coloring-6-3-3.0-0-connected"
+    assert done.stdout == f"{folder}: 6 robots, 9 constraints; next: robochoc solve {folder}\n"
+    assert read_team(tmp_path / folder) == coloring(6, 3, 3, connected=True)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["random", "--agents", 5, "--domain", 3, "--density", 0.4], "Missing option '--tightness'"),
+        (["random", "--agents", 5, "--domain", 3, "--density", 0.4, "--max-cost", "-1"], "--max-cost"),
+        (["random", "--agents", 5, "--domain", 3, "--density", 0.4, "--max-cost", "1000001"], "--max-cost"),
+        (["coloring", "--agents", 5, "--degree", 5], "degree is 5.0; among 5 robots it must be from 0 to 4"),
+        (["coloring", "--agents", 5], "--degree"),
+    ],
+)
+def test_what_does_not_fit_is_wrong_usage(tmp_path: Path, words: list[str], said: str) -> None:
+    done = robochoc("generate", *words, folder=tmp_path)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert not list(tmp_path.iterdir())

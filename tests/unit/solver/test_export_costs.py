@@ -1,0 +1,143 @@
+"""What `export` and `compile` make of teams with costs."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import re
+from pathlib import Path
+from random import Random
+
+import pytest
+from lxml import etree
+
+from robochoc.formats import PREDEFINED, write_team
+from robochoc.formats.xcsp3 import xcsp3
+from robochoc.generators.coloring import coloring
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.solver.encoding import Unsupported
+from tests.support.complex_problems import complex_team
+from tests.support.cost_problems import least_cost, random_complex_cost_team, random_cost_team, with_costs
+from tests.support.problems import team_of
+from tests.support.program import robochoc
+from tests.unit.solver.test_central import bundled, java, span
+
+
+def least_exported(document: bytes) -> float:
+    """The least cost of an exported instance of tables and allDifferent, by hand."""
+    root = etree.fromstring(document)
+    assert root.get("type") == "COP"
+    elements = root.findall("variables/var")
+    names = [element.get("id") or "" for element in elements]
+    paid = (root.findtext("objectives/minimize/list") or "").split()
+    assert root.find("objectives/minimize").get("type") == "sum"  # type: ignore[union-attr]
+    free = [name for name in names if name not in paid]
+    domains = {
+        name: [value for part in (element.text or "").split() for value in span(part)]
+        for name, element in zip(names, elements, strict=True)
+    }
+    hard: list[tuple[list[str], set[tuple[int, ...]], bool]] = []
+    charged: dict[str, tuple[list[str], dict[tuple[int, ...], int]]] = {}
+    for element in root.findall("constraints/extension"):
+        scope = (element.findtext("list") or "").split()
+        positive = element.find("supports") is not None
+        text = element.findtext("supports" if positive else "conflicts") or ""
+        rows = {tuple(map(int, row.split(","))) for row in re.findall(r"\(([^)]*)\)", text)}
+        rows |= {(value,) for part in text.split() if "(" not in text for value in span(part)}
+        if scope[-1] in paid:
+            charged[scope[-1]] = scope[:-1], {row[:-1]: row[-1] for row in rows}
+        else:
+            hard.append((scope, rows, positive))
+    apart = [(element.text or "").split() for element in root.findall("constraints/allDifferent")]
+    anyway = sum(domains[name][0] for name in paid if name not in charged)
+    best = INFINITE
+    for values in itertools.product(*(domains[name] for name in free)):
+        given = dict(zip(free, values, strict=True))
+
+        def of(scope: list[str], given: dict[str, int] = given) -> tuple[int, ...]:
+            return tuple(given[name] for name in scope)
+
+        if all((of(scope) in rows) is positive for scope, rows, positive in hard) and all(
+            len(set(of(scope))) == len(scope) for scope in apart
+        ):
+            best = min(best, anyway + sum(rows.get(of(scope), INFINITE) for scope, rows in charged.values()))
+    return best
+
+
+def test_what_is_exported_costs_the_same() -> None:
+    chance = Random("exported costs")
+    for _ in range(12):
+        team = random_cost_team(chance) if chance.random() < 0.6 else random_complex_cost_team(chance)
+        assert least_exported(xcsp3(team)) == least_cost(team), team
+
+
+@pytest.mark.slow
+def test_ace_and_choco_find_the_least_cost_of_what_is_exported(tmp_path: Path) -> None:
+    for team, least in ((coloring(4, 3, 3), 1), (charged_in_any_case(), 9), (spared(), 0)):
+        path = tmp_path / "team.xml"
+        path.write_bytes(xcsp3(team))
+        ace = java(bundled("ace"), "main.Head", str(path), "-npc")
+        choco = java(bundled("choco"), "org.chocosolver.parser.xcsp.ChocoXCSP", str(path), "-limit=[50s]")
+        assert least_cost(team) == least
+        assert re.search(rf"d BOUND\s+{least}\b", ace), ace
+        assert re.findall(r"^o (\d+)", choco, re.MULTILINE)[-1] == str(least), choco
+        assert "s OPTIMUM FOUND" in choco, choco
+
+
+def charged_in_any_case() -> Team:
+    """One constraint that charges the same whatever happens, and one that differs."""
+    always = Relation("always", 2, Semantics.SOFT, (), (), 7)
+    alone = Relation("alone", 1, Semantics.SOFT, ((1,), (2,)), (2, 5), 3)
+    return with_costs(
+        team_of(
+            {"A": (1, 2), "B": (1, 2)},
+            [Constraint("C", always, ("A", "B"), ("A", "B")), Constraint("D", alone, ("B",), ("B",))],
+        )
+    )
+
+
+def spared() -> Team:
+    """A DisWCSP without any cost."""
+    return with_costs(team_of({"A": (1, 2), "B": (1, 2)}, [Constraint("C", PREDEFINED["ne"], ("A", "B"), ("A", "B"))]))
+
+
+def test_costs_that_no_solver_could_add_are_not_exported() -> None:
+    table = Relation("R", 2, Semantics.SOFT, ((1, 1),), (10**12,), 0)
+    team = with_costs(team_of({"A": (1, 2), "B": (1, 2)}, [Constraint("C", table, ("A", "B"), ("A", "B"))]))
+    with pytest.raises(Unsupported, match="costs that add up to more than"):
+        xcsp3(team)
+
+
+def test_export_says_so(tmp_path: Path) -> None:
+    write_team(coloring(4, 3, 3), tmp_path / "four")
+    done = robochoc("export", tmp_path / "four")
+    assert done.returncode == 0, done.stderr
+    assert '<minimize type="sum">' in done.stdout
+    assert done.stdout.count("note=") == 4
+
+
+# Compiled
+
+
+@pytest.fixture
+def pair(tmp_path: Path) -> Path:
+    """A robot of two variables, of which its neighbour sees the first; and a robot of one, without costs."""
+    table = Relation("R", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1)), (5, 3, INFINITE), 8)
+    constraints = [
+        Constraint("P", table, ("A1", "A2"), ("A1", "A2")),
+        Constraint("S", PREDEFINED["ne"], ("A1", "B1"), ("A1", "B1"), cost=1),
+    ]
+    domains = dict.fromkeys(("A1", "A2", "B1"), (1, 2))
+    write_team(with_costs(complex_team({"RA": ["A1", "A2"], "RB": ["B1"]}, domains, constraints)), tmp_path / "pair")
+    return tmp_path / "pair"
+
+
+def test_compile_shows_what_groups_cost(pair: Path) -> None:
+    done = robochoc("compile", pair)
+    assert done.returncode == 0, done.stderr
+    head, *rows = (re.split(r" {2,}", line.strip()) for line in done.stdout.splitlines()[1:4])
+    assert [row[head.index("cost")] for row in rows] == ["3..8", "0..0"]
+    report = json.loads(robochoc("compile", "--json", pair).stdout)
+    first, second = report["robots"]
+    assert [first[name] for name in ("local_solutions", "groups", "cheapest", "dearest")] == [3, 2, 3, 8]
+    assert (second["cheapest"], second["dearest"]) == (0, 0)

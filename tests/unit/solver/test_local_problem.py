@@ -1,0 +1,219 @@
+"""What a robot's local problem says of broken constraints, one way held against another."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from random import Random
+
+import pytest
+
+from robochoc.model.message import Value
+from robochoc.model.problem import INFINITE, Constraint, Relation, Robot, Semantics, Team
+from robochoc.solver import compiled
+from robochoc.solver.agent_problem import Brief, Part, parts
+from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.domain import CompiledDomain
+from tests.support.complex_problems import random_complex_team
+from tests.support.cost_problems import random_complex_cost_team, random_cost_team
+from tests.support.problems import random_team, team_of
+
+EQUAL = Relation("R", 2, Semantics.SUPPORTS, ((1, 1), (2, 2)))
+ONE = Relation("R", 2, Semantics.SUPPORTS, ((1, 1),))
+
+
+def test_all_broken_constraints_are_told_not_only_the_first() -> None:
+    constraints = [Constraint("C", EQUAL, pair, pair) for pair in (("A", "D"), ("B", "D"), ("C", "D"))]
+    problem = LocalProblem(parts(team_of(dict.fromkeys("ABCD", (1, 2)), constraints))["RD"])
+    view: dict[str, Value] = {"RA": (2,), "RB": (1,), "RC": (2,)}
+    assert problem.conflicts(0, view) == [({"RA": (2,)}, "RD<RA:C"), ({"RC": (2,)}, "RD<RC:C")]
+    assert problem.conflicts(1, view) == [({"RB": (1,)}, "RD<RB:C")]
+
+
+def test_two_constraints_with_one_robot_are_both_told() -> None:
+    names = ("A", "B")
+    constraints = [Constraint("C1", EQUAL, names, names), Constraint("C2", ONE, names, names)]
+    problem = LocalProblem(parts(team_of(dict.fromkeys("AB", (1, 2)), constraints))["RB"])
+    assert [key for _, key in problem.conflicts(1, {"RA": (1,)})] == ["RB<RA:C1", "RB<RA:C2"]
+    assert [key for _, key in problem.conflicts(1, {"RA": (2,)})] == ["RB<RA:C2"]
+
+
+def test_each_known_constraint_is_a_check_and_unknown_ones_are_passed_over() -> None:
+    constraints = [Constraint("C", EQUAL, pair, pair) for pair in (("A", "C"), ("B", "C"))]
+    problem = LocalProblem(parts(team_of(dict.fromkeys("ABC", (1, 2)), constraints))["RC"])
+    assert problem.conflicts(0, {}) == []
+    assert problem.checks == 0
+    problem.conflicts(0, {"RA": (1,)})
+    assert problem.checks == 1
+    problem.conflicts(0, {"RA": (1,), "RB": (2,)})
+    assert problem.checks == 3
+
+
+@pytest.mark.parametrize("batch", range(2))
+def test_conflicts_are_those_of_the_files(batch: int) -> None:
+    """Every robot of a scope tells just the constraints that its value and the others' break together."""
+    chance = Random(f"conflicts {batch}")
+    seen = Counter[int]()
+    for _ in range(50):
+        team = random_team(chance)
+        given = {name: chance.choice(sorted(v.domain)) for name, v in team.variables.items()}
+        shared = [c for r in team.robots for parent in r.parents for c in parent.constraints]
+        for name, part in parts(team, everywhere=True).items():
+            problem = LocalProblem(part)
+            if not team[name].interface:
+                continue
+            (own,) = team[name].interface
+            for index, (value,) in enumerate(problem.values):
+                assert value is not None
+                broken = sum(own in c.variables and not c.allows({**given, own: value}) for c in shared)
+                told = problem.conflicts(index, _view(team, given))
+                assert len(told) == broken == problem.violated(index, _view(team, given))
+                seen[min(broken, 2)] += 1
+    assert min(seen[0], seen[1], seen[2]) > 50
+
+
+def test_burdens_are_broken_constraints_and_what_the_others_charge() -> None:
+    soft = Relation("S", 2, Semantics.SOFT, ((1, 1), (2, 1)), (3, 5), 0)
+    prices = Relation("P", 1, Semantics.SOFT, ((1,), (2,)), (7, 0))
+    constraints = [
+        Constraint("C", EQUAL, ("A", "C"), ("A", "C")),
+        Constraint("C", soft, ("B", "C"), ("B", "C")),
+        Constraint("P", prices, ("C",), ("C",)),
+    ]
+    problem = LocalProblem(parts(team_of(dict.fromkeys("ABC", (1, 2)), constraints))["RC"])
+    assert problem.burdens({}) == [(0, 7), (0, 0)]
+    assert problem.checks == 0
+    assert problem.burdens({"RA": (1,), "RB": (1,)}) == [(0, 10), (1, 0)]
+    assert problem.checks == 4
+    assert problem.burdens({"RA": (2,), "RB": (2,)}) == [(1, 12), (0, 0)]
+
+
+@pytest.mark.parametrize("batch", range(2))
+def test_burdens_are_costs_where_nothing_is_broken(batch: int) -> None:
+    """They take as many checks; of what is broken `violated` says as much."""
+    chance = Random(f"burdens {batch}")
+    seen = Counter[bool]()
+    for _ in range(40):
+        team = random_cost_team(chance)
+        given = {name: chance.choice(sorted(v.domain)) for name, v in team.variables.items()}
+        for part in parts(team, everywhere=True).values():
+            problem = LocalProblem(part)
+            view = {name: value for name, value in _view(team, given).items() if chance.random() < 0.8}
+            costs = problem.costs(view)
+            checks = problem.checks
+            burdens = problem.burdens(view)
+            assert problem.checks == 2 * checks
+            for index, (broken, cost) in enumerate(burdens):
+                assert broken == problem.violated(index, view)
+                assert (costs[index] == cost) if broken == 0 else (costs[index] == INFINITE > cost)
+                seen[broken > 0] += 1
+    assert min(seen[True], seen[False]) > 50
+
+
+@pytest.mark.parametrize("batch", range(2))
+def test_the_first_conflict_is_the_one_that_is_explained(batch: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whether conflicts are looked up one by one or for all values at once."""
+    chance = Random(f"explained {batch}")
+    for _ in range(30):
+        team = random_complex_team(chance)
+        for part in parts(_any_domains(team, chance), everywhere=True).values():
+            monkeypatch.setattr(compiled, "LARGE", chance.choice((1, 1000)))
+            _compare(part, chance)
+
+
+@pytest.mark.parametrize("batch", range(2))
+def test_what_a_robot_adds_is_the_difference_that_it_makes(batch: int) -> None:
+    """Robots become known from the highest one on; constraints that wait for none are in the costs from the start."""
+    chance = Random(f"added {batch}")
+    seen = Counter[str]()
+    for _ in range(40):
+        team = random_complex_cost_team(chance)
+        for part in parts(_any_domains(team, chance), everywhere=True).values():
+            problem, again = LocalProblem(part), LocalProblem(part)
+            view: dict[str, Value] = {}
+            costs = problem.costs(view)
+            for name in part.order:
+                if name == problem.agent:
+                    continue
+                aside = chance.random() < 0.1
+                names = part.interfaces[name]
+                view[name] = tuple([None if aside else chance.choice(list(part.domains[one])) for one in names])
+                added = problem.added(name, view)
+                if added is not None:
+                    costs = [cost + more for cost, more in zip(costs, added, strict=True)]
+                assert costs == again.costs(view)
+                seen["nothing" if added is None else "aside" if aside else "something"] += 1
+            assert problem.checks <= again.checks
+    assert min(seen.values()) > 10, seen
+
+
+@pytest.mark.parametrize("batch", range(2))
+def test_the_least_is_what_the_cheapest_values_of_the_others_cost(batch: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Constraint by constraint, whatever the others' values in other constraints."""
+    chance = Random(f"least {batch}")
+    seen = Counter[bool]()
+    for _ in range(40):
+        team = random_cost_team(chance)
+        shared = [c for robot in team.robots for parent in robot.parents for c in parent.constraints]
+        robots = {name for name in team.order if chance.random() < 0.6}
+        for name, part in parts(team, everywhere=True).items():
+            problem = LocalProblem(part)
+            (own,) = (variable.name for variable in team[name].variables)
+            least = problem.least(robots - {name})
+            for index, shown in enumerate(problem.values):
+                if not shown:
+                    continue
+                (value,) = shown
+                assert value is not None
+                expected = 0.0
+                for constraint in shared:
+                    others = [one for one in constraint.variables if one != own]
+                    if own in constraint.variables and {team.owner[one] for one in others} <= robots - {name}:
+                        columns = [team.variables[one].domain for one in others]
+                        expected += min(
+                            constraint.price({own: value, **dict(zip(others, row, strict=True))})
+                            for row in itertools.product(*columns)
+                        )
+                assert least[index] == expected
+                seen[expected > 0] += 1
+            monkeypatch.setattr(compiled, "WIDE", 0)
+            assert problem.least(robots) == [0] * len(problem.values)
+            monkeypatch.undo()
+    assert min(seen.values()) > 50, seen
+
+
+def test_nothing_is_sure_to_be_charged_where_robots_may_step_aside() -> None:
+    team = team_of(dict.fromkeys("AB", (1, 2)), [Constraint("C", ONE, ("A", "B"), ("A", "B"))])
+    assert LocalProblem(parts(team, everywhere=True)["RA"]).least({"RB"}) == [0, INFINITE]
+    assert LocalProblem(parts(team, brief=Brief(aside=1), everywhere=True)["RA"]).least({"RB"}) == [0, 0, 0]
+
+
+def _compare(part: Part, chance: Random) -> None:
+    problem = LocalProblem(part)
+    for index in range(len(problem.values)):
+        view = {
+            name: tuple([chance.choice(list(part.domains[variable])) for variable in variables])
+            for name, variables in part.interfaces.items()
+            if chance.random() < 0.8
+        }
+        told = problem.conflicts(index, view)
+        assert problem.explained(index, view) == next(iter(told), None)
+        assert problem.violated(index, view) == len(told)
+
+
+def _view(team: Team, given: dict[str, int]) -> dict[str, Value]:
+    return {robot.name: tuple([given[name] for name in robot.interface]) for robot in team.robots}
+
+
+def _any_domains(team: Team, chance: Random) -> CompiledTeam:
+    """Some values for each robot, whatever its private constraints say."""
+
+    def compile_robot(robot: Robot) -> CompiledDomain:
+        names = tuple(variable.name for variable in robot.variables)
+        rows = sorted({tuple([chance.choice(list(variable.domain)) for variable in robot.variables]) for _ in range(6)})
+        by_value = {tuple([row[names.index(name)] for name in robot.interface]): row for row in rows}
+        ones, noughts = (1,) * len(by_value), (0,) * len(by_value)
+        return CompiledDomain(names, tuple(by_value), tuple(by_value.values()), ones, noughts)
+
+    return CompiledTeam(team, compile_robot)

@@ -1,0 +1,235 @@
+"""What is known of a search that minimises: the objective, the best that robots tell of, bounds, and trees."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from random import Random
+from typing import Any
+
+import pytest
+
+from robochoc.cli.reports.outcome import report
+from robochoc.cli.reports.pseudo_tree import explained
+from robochoc.communication.run_result import RunResult
+from robochoc.journal.events import AnyEvent, Decided, Heard, Improved
+from robochoc.journal.journal import improvements
+from robochoc.model.expression import Type, parse
+from robochoc.model.outcome import Metrics, Outcome, Place, Verdict
+from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
+from robochoc.protocols.findings import Best, Findings, Trail
+from robochoc.run.incumbent import best_of, bound_of, course, tree_of
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.verification.objective import Objective, aside_cost
+from tests.support.cost_problems import cost_of, random_complex_cost_team, random_cost_team, with_costs
+from tests.support.problems import team_of
+
+PRICES = Relation("price", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1)), (4, 3, INFINITE), 7)
+PAIR = with_costs(team_of({"A": (1, 2), "B": (1, 2)}, [Constraint("C", PRICES, ("A", "B"), ("A", "B"))]))
+"""(1, 1) costs 4, (1, 2) costs 3, (2, 1) is forbidden, (2, 2) costs 7."""
+
+
+def own(team: Team, assignment: Mapping[str, int]) -> dict[str, dict[str, int]]:
+    """`assignment`, by robot."""
+    return {robot.name: {v.name: assignment[v.name] for v in robot.variables} for robot in team.robots}
+
+
+def result(assignments: Mapping[str, dict[str, int]], findings: Mapping[str, Findings] | None = None) -> RunResult:
+    return RunResult(Verdict.UNKNOWN, None, dict(assignments), Metrics(), findings=dict(findings or {}))
+
+
+# The objective
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_objective_follows_changes_and_equals_the_sum_of_all_prices(seed: int) -> None:
+    chance = Random(seed)
+    team = random_complex_cost_team(chance) if seed % 3 == 0 else random_cost_team(chance)
+    objective = Objective(team)
+    assignment = {name: chance.choice(list(variable.domain)) for name, variable in team.variables.items()}
+    objective.change(own(team, assignment))
+    for _ in range(20):
+        robot = chance.choice(team.robots)
+        values = {variable.name: chance.choice(list(variable.domain)) for variable in robot.variables}
+        assignment.update(values)
+        objective.change({robot.name: values})
+        assert objective.cost == cost_of(assignment, list(team.constraints()))
+
+
+def test_without_leave_to_step_aside_a_robot_without_values_has_no_cost() -> None:
+    objective = Objective(PAIR)
+    objective.change({"RA": {"A": 1}})
+    assert objective.cost == INFINITE
+    objective.change({"RB": {"B": 2}})
+    assert objective.cost == 3
+    objective.change({"RB": {}})
+    assert objective.cost == INFINITE
+
+
+def test_who_steps_aside_costs_its_weight_and_frees_its_constraints() -> None:
+    team = replace(PAIR, robots=(PAIR.robots[0], replace(PAIR.robots[1], weight=3)))
+    objective = Objective(team, 10)
+    assert objective.cost == 40
+    objective.change({"RA": {"A": 2}, "RB": {"B": 1}})
+    assert objective.cost == INFINITE
+    objective.change({"RB": {}})
+    assert objective.cost == 30
+    objective.change({"RA": {}, "RB": {"B": 2}})
+    assert objective.cost == 10
+
+
+def test_stepping_aside_costs_more_than_all_that_can_be_paid_without() -> None:
+    predicate = Predicate("p", ("X",), parse("eq(X, 2)", ("X",), Type.BOOLEAN))
+    soft = Constraint("S", predicate, ("A",), ("A",), cost=5)
+    hard = Constraint("H", predicate, ("B",), ("B",))
+    team = with_costs(team_of({"A": (1,), "B": (1,)}, [soft, hard, *PAIR.constraints()]))
+    assert aside_cost(team) == 1 + 5 + 7
+    assert aside_cost(team_of({"B": (1,)}, [hard])) == 1
+
+
+# The best that robots tell of
+
+
+def test_the_values_at_the_end_are_an_answer() -> None:
+    found = best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2})))
+    assert found == ({"A": 2, "B": 2}, 7)
+
+
+def test_what_breaks_something_hard_is_none() -> None:
+    assert best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 1}))) is None
+    assert best_of(CompiledTeam(PAIR), result({"RA": {"A": 1}, "RB": {}})) is None
+
+
+def test_the_cheapest_that_a_robot_has_heard_of_is_better_than_the_values_at_the_end() -> None:
+    findings = {
+        "RA": Findings(best=Best(4, {"RA": (1,), "RB": (1,)})),
+        "RB": Findings(best=Best(3, {"RA": (1,), "RB": (2,)})),
+    }
+    found = best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2}), findings))
+    assert found == ({"A": 1, "B": 2}, 3)
+
+
+def test_who_steps_aside_in_the_best_has_no_values_in_it() -> None:
+    findings = {"RA": Findings(best=Best(11, {"RA": (2,), "RB": (None,)}))}
+    found = best_of(CompiledTeam(PAIR), result({"RA": {}, "RB": {}}, findings), 11)
+    assert found == ({"A": 2}, 11)
+
+
+def test_who_has_nothing_to_show_and_no_value_steps_aside_in_the_best() -> None:
+    """Its value is (), as that of one without neighbours that stays is."""
+    forbids = Relation("R", 1, Semantics.CONFLICTS, ((1,),))
+    team = team_of({"A": (1,), "B": (1,)}, [Constraint("C", forbids, ("A",), ("A",))])
+    findings = {"RB": Findings(best=Best(1, {"RA": (), "RB": ()}))}
+    assert best_of(CompiledTeam(team), result({"RA": {}, "RB": {}}, findings), 1) == ({"B": 1}, 1)
+
+
+def test_the_best_cycle_is_found_and_unfinished_cycles_do_not_count() -> None:
+    findings = {
+        "RA": Findings(trail=Trail([(0, 1), (1, 0), (3, 1)], 4)),  # 2, then 1 in cycles 1 and 2, then 2
+        "RB": Findings(trail=Trail([(0, 1), (1, 0), (2, 1)], 2)),  # 2, 1, 2
+    }
+    trails = {name: found.trail for name, found in findings.items() if found.trail}
+    assert list(course(CompiledTeam(PAIR), trails)) == [7, 4, 3]
+    found = best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2}), findings))
+    assert found == ({"A": 1, "B": 2}, 3)
+
+
+def test_a_robot_without_a_trail_leaves_the_cycles_out() -> None:
+    findings = {"RA": Findings(trail=Trail([(0, 0)], 1)), "RB": Findings()}
+    assert best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2}), findings)) == ({"A": 2, "B": 2}, 7)
+
+
+def test_bounds_of_several_roots_are_summed_and_an_infinite_one_is_none() -> None:
+    assert bound_of({"A": Findings(bound=3), "B": Findings(), "C": Findings(bound=4.0)}) == 7
+    assert bound_of({"A": Findings()}) is None
+    assert bound_of({"A": Findings(bound=INFINITE)}) is None
+
+
+# Improvements in journals
+
+
+def test_improvements_stand_right_behind_the_decision_that_made_them() -> None:
+    decisions = [("RA", {"A": 2}), ("RB", {"B": 2}), ("RA", {"A": 1}), ("RB", {"B": 1}), ("RB", {"B": 2})]
+    events: list[AnyEvent] = [
+        Decided(t=number, robot=name, assignment=values, clock=0) for number, (name, values) in enumerate(decisions)
+    ]
+    told = [event for event in improvements(events, Objective(PAIR)) if isinstance(event, Improved)]
+    assert [(event.t, event.cost, event.assignment) for event in told] == [
+        (1, 7, {"A": 2, "B": 2}),
+        (2, 3, {"A": 1, "B": 2}),
+    ]
+
+
+def test_what_a_robot_has_heard_of_is_an_improvement_too() -> None:
+    events: list[AnyEvent] = [
+        Heard(t=1, robot="RB", cost=4, values={"RA": (1,), "RB": (1,)}),
+        Heard(t=2, robot="RA", cost=4, values={"RA": (1,), "RB": (1,)}),
+        Heard(t=3, robot="RB", cost=3, values={"RA": (1,), "RB": (2,)}),
+        Heard(t=4, robot="RB", cost=2, values={"RA": (1,), "RB": (None,)}),
+    ]
+    told = [event for event in improvements(events, Objective(PAIR, 2)) if isinstance(event, Improved)]
+    assert [(event.t, event.cost) for event in told] == [(1, 4), (3, 3), (4, 2)]
+    assert [event.assignment for event in told] == [{"A": 1, "B": 1}, {"A": 1, "B": 2}, {"A": 1}]
+
+
+# In words
+
+
+def aside(verdict: Verdict, *weights: int, **known: Any) -> str:  # noqa: ANN401 - fields of an outcome
+    """What is told when RB of a hard team has stepped aside."""
+    hard = team_of({"A": (1,), "B": (1,)}, [])
+    robots = tuple(replace(robot, weight=weight) for robot, weight in zip(hard.robots, weights, strict=True))
+    outcome = Outcome("t", "sfb", "simulator", 0, verdict, {"A": 1}, 0, ("RB",), verified=True, **known)
+    return report(replace(hard, robots=robots), outcome)
+
+
+def test_weights_are_told_where_they_are_not_all_one() -> None:
+    assert "as few as possible (proven) step aside" in aside(Verdict.OPTIMAL, 1, 1)
+    assert "weight" not in aside(Verdict.OPTIMAL, 1, 1)
+    told = aside(Verdict.OPTIMAL, 5, 2)
+    assert "as few as possible, by weight (proven) step aside" in told
+    assert "1 flies, 1 steps aside (weight 2)" in told
+
+
+def test_a_limit_is_told_with_the_best_so_far_and_the_bound() -> None:
+    told = aside(Verdict.UNKNOWN, 1, 3, reason="the time was over", bound=2)
+    assert "unknown: the time was over; in the best answer so far 1 steps aside (weight 3); at least 2 have to" in told
+    outcome = Outcome("t", "afb", "simulator", 0, Verdict.UNKNOWN, {"A": 1, "B": 2}, 2**60 + 1, reason="so", bound=3)
+    assert f"so; the best so far costs {2**60 + 1:,}, and nothing costs less than 3" in report(PAIR, outcome)
+
+
+def test_who_placed_the_robots_is_told_where_that_was_not_asked_for() -> None:
+    assert "\n  sfb, simulator, seed 0: " in aside(Verdict.OPTIMAL, 1, 1)
+    assert "\n  sfb, then first-fit, simulator, seed 0: " in aside(Verdict.SOLUTION, 1, 1, placed_by="first-fit")
+
+
+def test_what_is_not_proven_says_so() -> None:
+    outcome = Outcome("t", "dsa", "simulator", 0, Verdict.SOLUTION, {"A": 1, "B": 2}, 3, verified=True)
+    assert "solution, cost 3, which may not be the least, checked" in report(PAIR, outcome)
+
+
+# Trees, explained
+
+
+def test_a_tree_is_drawn_with_its_depth_and_width() -> None:
+    places = {
+        "R1": Place(None),
+        "R2": Place("R1"),
+        "R3": Place("R2", ("R1",)),
+        "R10": Place("R2"),
+        "S": Place(None),
+    }
+    assert tree_of({name: Findings(place=place) for name, place in places.items()} | {"T": Findings()}) == places
+    outcome = Outcome("team", "dpop", "simulator", 0, Verdict.OPTIMAL, tree=places)
+    assert explained(outcome).splitlines() == [
+        "  pseudo-tree, built by the robots: depth 2, induced width 2, 2 roots ([neighbours further up])",
+        "    R1",
+        "    └── R2",
+        "        ├── R3 [R1]",
+        "        └── R10",
+        "    S",
+    ]
+
+
+def test_who_builds_no_tree_says_so() -> None:
+    assert explained(Outcome("team", "abt", "simulator", 0, Verdict.SOLUTION)) == "  abt builds no pseudo-tree"

@@ -1,0 +1,382 @@
+"""What was flown, as a picture: key frames, epochs, what happened, and flights that there are none of."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import umsgpack
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robochoc.flight.flight import fly
+from robochoc.flight.mission import mission_of
+from robochoc.flight.quadrotor.conditions import Conditions, Failure
+from robochoc.flight.quadrotor.flown import Happening
+from robochoc.formats import write_team
+from robochoc.formats.result import result_json
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.view import scene as scenes
+from robochoc.view.film import Look
+from robochoc.view.keyframes import angle, attitude_keys, position_keys, slerp
+from robochoc.view.page import page
+from robochoc.view.palette import GREY, RED, web
+from robochoc.view.scene import Scene, scene_of
+from tests.support.clocks import working
+from tests.support.flights import FPS, LEG_S, TILT, epochs_of_three, five, straight
+from tests.support.program import robochoc
+
+HOSTILE = "</script><img src=x onerror=alert(1)>"
+Array = npt.NDArray[np.float64]
+
+
+def commands_of(html: bytes) -> list[dict[str, Any]]:
+    block = re.search(rb'<script id="commands"[^>]*>([^<]*)</script>', html)
+    assert block
+    return [umsgpack.unpackb(base64.b64decode(line)) for line in block[1].split()]
+
+
+def film_in(html: bytes) -> dict[str, Any]:
+    block = re.search(rb'<script id="film"[^>]*>([^<]*)</script>', html)
+    assert block
+    film: dict[str, Any] = json.loads(block[1])
+    return film
+
+
+def tracks_of(html: bytes) -> dict[str, list[tuple[float, list[float]]]]:
+    """Key frames, by path and property."""
+    (animation,) = (command for command in commands_of(html) if command["type"] == "set_animation")
+    return {
+        clip["path"].removeprefix("/meshcat/drones/") + track["name"]: [
+            (key["time"], key["value"]) for key in track["keys"]
+        ]
+        for clip in animation["animations"]
+        for track in clip["clip"]["tracks"]
+    }
+
+
+def shown(outcome: Outcome | None = None, **how: Any) -> Scene:  # noqa: ANN401 - `straight`'s
+    mission = mission_of(outcome) if outcome else mission_of(epochs_of_three(), five())
+    outcome = outcome or epochs_of_three()
+    return scene_of(outcome, mission=mission, flown=straight(mission, **how))
+
+
+# Key frames
+
+
+def walks(width: int) -> st.SearchStrategy[Array]:
+    steps = st.lists(st.tuples(*[st.floats(-1, 1)] * width), min_size=1, max_size=60)
+    return steps.map(lambda taken: np.cumsum(np.array(taken), axis=0))
+
+
+@settings(max_examples=50)
+@given(walks(3), st.floats(0.001, 1))
+def test_positions_between_keys_are_nearly_those_that_were_flown(walk: Array, tolerance: float) -> None:
+    times = np.arange(len(walk)) / FPS
+    keys = position_keys(times, walk, tolerance)
+    between = np.stack([np.interp(times, times[keys], walk[keys, axis]) for axis in range(3)], axis=1)
+    assert np.linalg.norm(between - walk, axis=1).max() <= tolerance + 1e-9
+    assert (keys[0], keys[-1]) == (0, len(walk) - 1)
+
+
+@settings(max_examples=50)
+@given(walks(4), st.floats(0.001, 1))
+def test_attitudes_between_keys_are_nearly_those_that_were_flown(walk: Array, tolerance: float) -> None:
+    turned = walk + np.array([0, 0, 0, 0.1])
+    turned = turned[np.linalg.norm(turned, axis=1) > 0.01]
+    turned = np.array([[0, 0, 0, 1], *turned / np.linalg.norm(turned, axis=1, keepdims=True)])
+    times = np.arange(len(turned)) / FPS
+    keys = attitude_keys(times, turned, tolerance)
+    for first, last in pairwise(keys):
+        between = (times[first : last + 1] - times[first]) / (times[last] - times[first])
+        played = slerp(turned[first], turned[last], between)
+        assert angle(played, turned[first : last + 1]).max() <= tolerance + 1e-6
+
+
+def test_what_goes_straight_needs_two_keys() -> None:
+    times = np.arange(100) / FPS
+    assert [*position_keys(times, np.outer(times, [1, 2, 3]), 0.002)] == [0, 99]
+    lean = times[:, None] / 4
+    turn = np.hstack([np.sin(lean), 0 * lean, 0 * lean, np.cos(lean)])
+    assert [*attitude_keys(times, turn, 0.001)] == [0, 99]
+    assert [*position_keys(times[:1], np.zeros((1, 3)), 0.1)] == [0]
+
+
+def test_the_angle_between_attitudes() -> None:
+    turn = np.array([[np.sin(0.05), 0, 0, np.cos(0.05)]])
+    assert angle(turn, np.array([0, 0, 0, 1.0])) == pytest.approx(0.1)
+    assert angle(-turn, turn) == pytest.approx(0)
+
+
+def test_the_page_plays_what_was_flown() -> None:
+    scene = shown()
+    film = scene.film
+    assert film
+    tracks = tracks_of(page(scene))
+    frames = FPS * film.times
+    for number, drone in enumerate(scene.drones):
+        path = f"{number + 1} {drone.name}"
+        keys, values = zip(*tracks[f"{path}.position"], strict=True)
+        played = np.stack([np.interp(frames, keys, part) for part in np.array(values).T], axis=1)
+        assert np.abs(played - film.positions[:, number]).max() < 0.0021
+        leans = 2 * np.arcsin([value[0] for _, value in tracks[f"{path}/body.quaternion"]])
+        assert max(leans) == pytest.approx(TILT, abs=0.001)
+
+
+def test_metres_are_shown_in_cells() -> None:
+    outcome = Outcome("vast", "abt", "simulator", 0, Verdict.SOLUTION, {"V1.1": 1, "V1.2": 10**9, "V2.1": 5 * 10**8})
+    mission = mission_of(outcome)
+    scene = scene_of(outcome, mission=mission, flown=straight(mission))
+    assert scene.film
+    assert mission.scale < 1e-6
+    for drone, begin, end in zip(scene.drones, scene.film.positions[0], scene.film.positions[-1], strict=True):
+        assert begin == pytest.approx(drone.home)
+        assert end == pytest.approx(drone.end)
+    assert [drone.place and drone.place[2] for drone in scene.drones] == pytest.approx([1, 4, 2.5], abs=0.1)
+
+
+def test_vast_numbers_are_flown_as_they_are_drawn() -> None:
+    outcome = Outcome("vast", "abt", "simulator", 0, Verdict.SOLUTION, {"V1.1": -1000, "V1.2": 10**12})
+    with working(5):
+        scene = scene_of(outcome)
+    assert scene.film
+    for drone, end in zip(scene.drones, scene.film.positions[-1], strict=True):
+        assert end == pytest.approx(drone.end, abs=0.1)
+    assert (scene.axes[2].first, scene.axes[2].last) == (-1000, 10**12)
+
+
+# Epochs
+
+
+def test_each_epoch_says_what_opened_it_and_what_came_of_it() -> None:
+    film = film_in(page(shown()))
+    assert film["chapters"] == [
+        {"at": 0, "opened": "the start", "says": "solution, 4 fly"},
+        {"at": LEG_S, "opened": "-R5.1", "says": "no solution, 3 hover on"},
+        {"at": 2 * LEG_S, "opened": "V2.1 without <2>", "says": "solution, 4 fly"},
+    ]
+    assert film["duration"] == 3 * LEG_S
+
+
+def test_nobody_flies_where_there_never_was_a_solution() -> None:
+    outcome = Outcome("t", "abt", "simulator", 0, Verdict.NO_SOLUTION, {})
+    assert film_in(page(shown(outcome)))["chapters"] == [
+        {"at": 0, "opened": "the start", "says": "no solution, nobody flies"}
+    ]
+    alone = scene_of(outcome, five())
+    assert alone.film is None
+    assert not {"flown", "flight"} & dict(alone.facts).keys()
+
+
+def test_who_leaves_turns_grey_when_it_leaves() -> None:
+    scene = shown()
+    assert scene.film
+    assert [len(looks) for looks in scene.film.looks] == [0, 0, 0, 0, 1]
+    assert [*scene.film.looks[4]] == [(LEG_S, Look.ASIDE)]
+    gone = scene.drones[4]
+    assert gone.aside
+    assert gone.place is None
+    html = page(scene)
+    colours = tracks_of(html)["5 R5.1/body/<object>.material.color"]
+    assert [frame for frame, _ in colours] == [0, FPS * LEG_S, FPS * LEG_S + 25]
+    assert colours[-1][1] == pytest.approx(GREY)
+    assert film_in(html)["drones"][4]["looks"] == [[LEG_S, "aside", web(GREY)]]
+
+
+def test_who_comes_back_has_its_colour_again() -> None:
+    outcome = epochs_of_three()
+    first, second, third = outcome.epochs
+    third = replace(third, robots=first.robots, assignment={**third.assignment, "V5.1": 2})
+    outcome = replace(outcome, epochs=(first, second, third), assignment=third.assignment)
+    mission = mission_of(outcome, five())
+    scene = scene_of(outcome, mission=mission, flown=straight(mission))
+    assert scene.film
+    assert [*scene.film.looks[4]] == [(LEG_S, Look.ASIDE), (2 * LEG_S, Look.FLIES)]
+    colours = tracks_of(page(scene))["5 R5.1/body/<object>.material.color"]
+    assert colours[-1][1] == pytest.approx(colours[0][1])
+
+
+def test_the_flight_of_a_scenario_is_flown_here_if_need_be() -> None:
+    scene = scene_of(epochs_of_three(), five())
+    assert scene.film
+    assert len(scene.film.chapters) == 3
+    assert scene.film.duration_s > 3
+    assert "flown" in dict(scene.facts)
+
+
+# What happened
+
+
+def test_who_falls_turns_red_and_stays_where_it_lies() -> None:
+    scene = shown(falls={1: 3.0})
+    assert scene.film
+    assert scene.film.looks[1] == ((3.0, Look.FALLEN),)
+    html = page(scene)
+    assert film_in(html)["marks"] == [{"at": 3.0, "drone": 1, "says": "motor 2 stopped"}]
+    tracks = tracks_of(html)
+    assert tracks["2 R2.1/body/<object>.material.color"][-1][1] == pytest.approx(RED, abs=1e-6)
+    assert tracks["2 R2.1.position"][-1][1][2] == pytest.approx(scene.ground)
+    assert ("fallen", "R2.1 (motor 2 stopped)") in scene.facts
+
+
+def test_what_the_flight_tells_of_one_that_falls_is_understood() -> None:
+    outcome = epochs_of_three()
+    mission = mission_of(outcome, five())
+    failure = Failure(mission.drones[1].name, 3.0, 1)
+    scene = scene_of(outcome, mission=mission, flown=fly(mission, Conditions(failures=(failure,))))
+    assert scene.film
+    ((at_s, look),) = scene.film.looks[1]
+    assert at_s == pytest.approx(3.0, abs=0.05)
+    assert look is Look.FALLEN
+    assert "motor" in dict(scene.facts)["fallen"]
+
+
+def test_who_has_fallen_does_not_turn_grey_later() -> None:
+    scene = shown(falls={4: 1.0})
+    assert scene.film
+    assert scene.film.looks[4] == ((1.0, Look.FALLEN),)
+
+
+def test_obstacles_are_boxes_in_their_cells() -> None:
+    scene = shown(obstacles=((2.0, 3.0, 4.0), (1.0, 1.0, 1.0)))
+    drawn = {command["path"]: command for command in commands_of(page(scene)) if command["type"] == "set_object"}
+    (body,) = (drawn[path] for path in drawn if path.endswith("obstacles/1/body"))
+    corners = np.frombuffer(body["object"]["geometries"][0]["data"]["attributes"]["position"]["array"].data, "<f4")
+    assert corners.reshape(-1, 3).mean(axis=0) == pytest.approx([2, 3, 4])
+    assert body["object"]["materials"][0]["opacity"] < 0.5
+    assert any(path.endswith("obstacles/2/edges") for path in drawn)
+
+
+def test_obstacles_appear_when_they_are_seen() -> None:
+    mission = mission_of(epochs_of_three(), five())
+    flight = straight(mission, obstacles=((2.0, 3.0, 4.0), (1.0, 1.0, 1.0)))
+    html = page(scene_of(epochs_of_three(), mission=mission, flown=replace(flight, seen_s=(0.0, 1.5))))
+    (animation,) = (command for command in commands_of(html) if command["type"] == "set_animation")
+    appearing = {
+        clip["path"]: track["keys"]
+        for clip in animation["animations"]
+        for track in clip["clip"]["tracks"]
+        if track["name"] == ".material.opacity"
+    }
+    assert [path.rpartition("obstacles/")[2] for path in appearing] == ["2/body/<object>", "2/edges/<object>"]
+    for keys in appearing.values():
+        assert [(key["time"], key["value"]) for key in keys[:2]] == [(0, [0]), (1.5 * FPS, [0])]
+        assert keys[2]["value"][0] > 0.3
+
+
+def test_what_happened_is_told_in_its_order() -> None:
+    outcome = epochs_of_three()
+    mission = mission_of(outcome)
+    seen = (Happening(4.0, 0, "second"), Happening(1.0, 2, "first"))
+    scene = scene_of(outcome, mission=mission, flown=replace(straight(mission), happenings=seen))
+    assert [mark["says"] for mark in film_in(page(scene))["marks"]] == ["first", "second"]
+
+
+def test_the_caption_tells_of_the_flight() -> None:
+    facts = dict(shown().facts)
+    assert facts["flown"] == "6.0 s"
+    assert facts["nearest"] == "0.98 m (set: 0.5 m)"
+    assert "fallen" not in facts
+
+
+# No flight
+
+
+@pytest.mark.parametrize("error", [MemoryError("no room"), FloatingPointError(), ValueError("nonsense")])
+def test_drones_that_cannot_fly_are_where_they_would_be(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr(scenes, "fly", fails)
+    scene = scene_of(epochs_of_three(), five())
+    assert scene.film is None
+    assert ("flight", f"none: {str(error) or 'FloatingPointError'}") in scene.facts
+    commands = commands_of(page(scene))
+    assert not any(command["type"] == "set_animation" for command in commands)
+    placed = {
+        command["path"]: np.frombuffer(command["matrix"].data, "<f4").reshape(4, 4)[3, :3]
+        if hasattr(command["matrix"], "data")
+        else np.array(command["matrix"]).reshape(4, 4)[3, :3]
+        for command in commands
+        if command["type"] == "set_transform"
+    }
+    for number, drone in enumerate(scene.drones, 1):
+        assert placed[f"/meshcat/drones/{number} {drone.name}"] == pytest.approx(drone.end)
+
+
+def test_too_many_are_not_flown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scenes, "_MOST_FLIGHTS", 14)
+    scene = scene_of(epochs_of_three(), five())
+    assert scene.film is None
+    assert dict(scene.facts)["flight"].startswith("none: 5 drones in 3 epochs are more than")
+
+
+def test_a_flight_whose_legs_are_others_still_plays() -> None:
+    outcome = epochs_of_three()
+    mission = mission_of(outcome)
+    flown = straight(mission)
+    html = page(scene_of(outcome, mission=mission, flown=replace(flown, stages=flown.stages[:1])))
+    assert len(film_in(html)["chapters"]) == 1
+
+
+# The page
+
+
+def test_hostile_names_and_words_stay_text() -> None:
+    outcome = Outcome(HOSTILE, HOSTILE, "processes", 0, Verdict.SOLUTION, {HOSTILE: 1, "__proto__": 2, "\ud800": 3})
+    mission = mission_of(outcome)
+    seen = (Happening(1.0, 0, HOSTILE),)
+    html = page(scene_of(outcome, mission=mission, flown=replace(straight(mission), happenings=seen)))
+    assert b"<img" not in html
+    assert html.count(b"</script>") == 4
+    film = film_in(html)
+    assert film["marks"][0]["says"] == HOSTILE
+    assert {"__proto__", HOSTILE} < {drone["name"] for drone in film["drones"]}
+
+
+def test_equal_flights_make_equal_pages() -> None:
+    assert page(shown(falls={1: 3.0})) == page(shown(falls={1: 3.0}))
+
+
+@pytest.mark.parametrize(("n", "most"), [(4, 1_200_000), (11, 2_500_000)])
+def test_pages_of_large_teams_are_small_and_soon_made(n: int, most: int) -> None:
+    places = {f"V{i}.{j}": (3 * i + 5 * j) % n + 1 for i in range(1, n + 1) for j in range(1, n + 1)}
+    scene = scene_of(Outcome("t", "abt", "simulator", 0, Verdict.SOLUTION, places))
+    with working(3):
+        html = page(scene)
+    assert len(html) < most
+    assert len(tracks_of(html)) >= n * n
+
+
+# Saved runs
+
+
+def test_animate_shows_all_epochs_whoever_opened_them(tmp_path: Path) -> None:
+    outcome = epochs_of_three()
+    first, second, third = outcome.epochs
+    outcome = replace(outcome, epochs=(first, second, replace(third, opened_by="obstacle at (2, 1, 5)")))
+    write_team(five(), tmp_path / "watch")
+    (tmp_path / "result.json").write_bytes(result_json(outcome))
+    told = robochoc("animate", "result.json", "--team", "watch", "-o", "page.html", folder=tmp_path)
+    assert (told.returncode, told.stderr.count("\n")) == (0, 1)
+    chapters = film_in((tmp_path / "page.html").read_bytes())["chapters"]
+    assert [chapter["opened"] for chapter in chapters] == ["the start", "-R5.1", "obstacle at (2, 1, 5)"]
+
+
+def test_animate_refuses_a_team_whose_robots_are_others(tmp_path: Path) -> None:
+    outcome = epochs_of_three()
+    strangers = replace(outcome.epochs[0], robots=("Nobody",), assignment={})
+    write_team(five(), tmp_path / "watch")
+    (tmp_path / "result.json").write_bytes(result_json(replace(outcome, epochs=(strangers, *outcome.epochs[1:]))))
+    told = robochoc("animate", "result.json", "--team", "watch", "-o", "page.html", folder=tmp_path)
+    assert told.returncode == 1
+    assert "not the team" in told.stderr
+    assert not (tmp_path / "page.html").exists()
