@@ -14,7 +14,7 @@ from tests.support.program import ROOT
 HEAVY = {
     "numpy", "rich", "meshcat", "tornado", "zenoh", "cryptography", "pycsp3", "jpype", "importlib.metadata", "tomllib",
     "robochoc.solver.ace", "robochoc.solver.central", "robochoc.run.second_opinion",
-    "robochoc.communication.simulator",
+    "robochoc.communication.simulator.channel", "robochoc.sniffer", "robochoc.flight",
     "robochoc.communication.network", "robochoc.view", "robochoc.ros", "robochoc.replay",
 }  # fmt: skip
 """What a run of ABT in a pipe has no use for."""

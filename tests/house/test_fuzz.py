@@ -66,7 +66,7 @@ def test_an_input_that_takes_more_than_its_time_is_a_finding(monkeypatch: pytest
         while True:
             pass
 
-    monkeypatch.setattr("fuzz.harness.CPU_S", 0.05)
+    monkeypatch.setattr("tests.fuzz.harness.CPU_S", 0.05)
     assert isinstance(tried(Target("slow", lambda: [b""], spoilt_bytes, slowly), b"")[1], TooDearError)
 
 
