@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from measure import Failed, say
+from measure import FailedError, say
 from report import Row, Section
 from rows import written_rows
 
@@ -101,7 +101,7 @@ def _agree(series: Series, runs: Sequence[Run]) -> None:
     ended = [run for run in runs if run.verdict != Verdict.UNKNOWN]
     sure = [run for run in ended if run.protocol in series.proven]
     if len({run.cost for run in sure}) > 1 or (not series.proven and len({run.verdict for run in ended}) > 1):
-        raise Failed(f"problem {runs[0].problem} of {series.name}: answers differ: {ended}")
+        raise FailedError(f"problem {runs[0].problem} of {series.name}: answers differ: {ended}")
 
 
 def _table(series: Series, runs: Sequence[Run]) -> list[Row]:

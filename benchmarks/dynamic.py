@@ -15,7 +15,7 @@ from pathlib import Path
 from random import Random
 from typing import NamedTuple
 
-from measure import ROOT, Failed, say
+from measure import ROOT, FailedError, say
 from report import Row, Section, draw
 from rows import append_row, read_rows, written_rows
 
@@ -212,7 +212,7 @@ def _sequence(series: Series, rate: int, sequence: int, done: dict[tuple[object,
         verdicts[protocol] = [epoch.verdict for epoch in epochs]
         runs += epochs
     if len(set(map(tuple, verdicts.values()))) > 1 or Verdict.UNKNOWN in verdicts[PROTOCOLS[0]]:
-        raise Failed(f"no agreement on {series}, rate {rate}, sequence {sequence}: {verdicts}")
+        raise FailedError(f"no agreement on {series}, rate {rate}, sequence {sequence}: {verdicts}")
     return runs
 
 

@@ -37,7 +37,7 @@ class Sample(NamedTuple):
         return None if self.output is None else json.loads(self.output)
 
 
-class Failed(Exception):  # noqa: N818 - named for what happened
+class FailedError(Exception):
     """What was to be measured did not do its work."""
 
 
@@ -58,7 +58,7 @@ def spread(values: Iterable[float], digits: int = 2) -> str:
 def timed_command(command: Sequence[str], *, expected: Sequence[int] = (0,), limit_s: float | None = None) -> Sample:
     """Run `command` in the checkout's root, and kill it with all that it started once `limit_s` is over.
 
-    Raises `Failed` when it ends with a status that is not `expected`.
+    Raises `FailedError` when it ends with a status that is not `expected`.
     """
     before, began = _children_cpu_s(), time.perf_counter()
     with subprocess.Popen(
@@ -75,19 +75,19 @@ def timed_command(command: Sequence[str], *, expected: Sequence[int] = (0,), lim
             raise
     wall_s = time.perf_counter() - began
     if process.returncode not in expected:
-        raise Failed(f"{' '.join(command)} ended with status {process.returncode}: {errors.strip()[-500:]}")
+        raise FailedError(f"{' '.join(command)} ended with status {process.returncode}: {errors.strip()[-500:]}")
     return Sample(wall_s, _children_cpu_s() - before, output)
 
 
 def timed_call(act: Callable[[], None]) -> Sample:
-    """Run `act` in a forked process. Raises `Failed` when it does not end well."""
+    """Run `act` in a forked process. Raises `FailedError` when it does not end well."""
     before, began = _children_cpu_s(), time.perf_counter()
     process = multiprocessing.get_context("fork").Process(target=act)
     process.start()
     process.join()
     wall_s = time.perf_counter() - began
     if process.exitcode:
-        raise Failed(f"a measured process ended with status {process.exitcode}")
+        raise FailedError(f"a measured process ended with status {process.exitcode}")
     return Sample(wall_s, _children_cpu_s() - before)
 
 

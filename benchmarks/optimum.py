@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from measure import Failed, say
+from measure import FailedError, say
 from report import Row, Section, draw
 from rows import written_rows
 
@@ -67,7 +67,7 @@ def measured() -> Section:
     for density, problem in {(run.density, run.problem) for run in runs}:
         costs = {run.cost for run in runs if run[:2] == (density, problem) and run.verdict != Verdict.UNKNOWN}
         if len(costs) > 1:
-            raise Failed(f"problem {problem} of density {density} has costs {costs}")
+            raise FailedError(f"problem {problem} of density {density} has costs {costs}")
     DATA.parent.mkdir(exist_ok=True)
     written_rows(DATA, Run, runs)
     draw("optimum")
@@ -94,7 +94,7 @@ def _run(density: float, problem: int, name: str) -> Run:
             again = session.search(LONGEST_S)
         processes_s = again.metrics.wall_s
         if again.verdict is Verdict.SOLUTION and _cost(team, again) != _cost(team, result):
-            raise Failed(f"{name} on problem {problem} of density {density}: another cost in processes")
+            raise FailedError(f"{name} on problem {problem} of density {density}: another cost in processes")
     metrics = result.metrics
     figures = sum(metrics.messages.values()), metrics.bytes, metrics.ncccs, round(cpu_s, 4), round(processes_s, 4)
     return Run(density, problem, name, str(result.verdict), _cost(team, result), *figures)

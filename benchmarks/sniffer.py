@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from measure import ROBOCHOC, ROOT, Failed, say, spread
+from measure import ROBOCHOC, ROOT, FailedError, say, spread
 from report import Row, Section
 from sniffer_page import STOPPED
 
@@ -78,7 +78,7 @@ def _run_s(options: tuple[str, ...], scratch: str, *, stopped: bool) -> tuple[fl
         start_new_session=True,
     ) as process:
         if process.stdout is None:
-            raise Failed("there is no output")
+            raise FailedError("there is no output")
         result = process.stdout.readline()
         took = time.perf_counter() - began
         process.send_signal(signal.SIGINT)
@@ -87,7 +87,7 @@ def _run_s(options: tuple[str, ...], scratch: str, *, stopped: bool) -> tuple[fl
     found = re.search(rb'"wall_s": ?([0-9.]+)', result)
     messages = sum(map(int, re.findall(rb'"(?:Ok|Nogood|AddLink)": ?([0-9]+)', result)))
     if not (found and messages):
-        raise Failed(f"no result: {result[:200]!r}")
+        raise FailedError(f"no result: {result[:200]!r}")
     return took, float(found[1]) / messages
 
 
@@ -114,7 +114,7 @@ def _sniffing(journal: Path) -> Iterator[str]:
     with subprocess.Popen([ROBOCHOC, "sniff", str(journal)], stderr=subprocess.PIPE, text=True) as process:
         try:
             if process.stderr is None:
-                raise Failed("there is no URL")
+                raise FailedError("there is no URL")
             yield process.stderr.readline().split()[0]
         finally:
             process.send_signal(signal.SIGINT)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import rows
-from measure import ROOT, Failed, say
+from measure import ROOT, FailedError, say
 from report import Row, Section, draw
 from rows import written_rows
 
@@ -148,7 +148,7 @@ def _runs() -> list[Run]:
                 rows.append_row(RAW, run)
             runs.append(run)
             if run.verdict != Verdict.UNKNOWN and truth.setdefault(run[:3], run.verdict) != run.verdict:
-                raise Failed(f"{run.label} says {run.verdict} on {run[:3]}, others say {truth[run[:3]]}")
+                raise FailedError(f"{run.label} says {run.verdict} on {run[:3]}, others say {truth[run[:3]]}")
     return runs
 
 
@@ -169,12 +169,12 @@ def _run(series: Series, tightness: float, problem: int, variant: Variant) -> Ru
 
 
 def solved(team: Team, protocol: type[Protocol], schedule: Concurrent, limit: int) -> tuple[str, int, int, int, int]:
-    """Verdict, messages, bytes, NCCCs and checks of one run. Raises `Failed` where a solution is none."""
+    """Verdict, messages, bytes, NCCCs and checks of one run. Raises `FailedError` where a solution is none."""
     result = Simulation(team, protocol, schedule).search(LONGEST_S, limit)
     if result.verdict is Verdict.SOLUTION:
         assignment = {name: value for own in result.assignments.values() for name, value in own.items()}
         if faults := list(objections(team, assignment, ())):
-            raise Failed(f"{protocol.__name__} on {team.name}: {faults[0]}")
+            raise FailedError(f"{protocol.__name__} on {team.name}: {faults[0]}")
     metrics = result.metrics
     return str(result.verdict), sum(metrics.messages.values()), metrics.bytes, metrics.ncccs, metrics.checks
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from bare_pipes import run_bare
-from measure import RUNS, Failed, Sample, say, spread, timed_call
+from measure import RUNS, FailedError, Sample, say, spread, timed_call
 from report import Row, Section
 from ring import OFFSETS, messages, ring_protocol, ring_team
 
@@ -60,7 +60,7 @@ def run_ours(agents: int, hops: int) -> None:
     result = ProcessesRun(ring_team(agents), ring_protocol(agents, hops)).run()
     sent = sum(result.metrics.messages.values())
     if sent != messages(agents, hops):
-        raise Failed(f"{sent} messages instead of {messages(agents, hops)}")
+        raise FailedError(f"{sent} messages instead of {messages(agents, hops)}")
 
 
 def _compared(agents: int) -> list[Row]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from colouring import colouring
-from measure import Failed, say
+from measure import FailedError, say
 from report import Row, Section
 from rows import append_row, read_rows
 from sweep import LIMIT, LIMIT_SLOW, solved
@@ -245,7 +245,7 @@ def _studied(study: Study, variant: Variant, truth: dict[int, str]) -> Figure:
     verdicts = [run[0] for run in runs]
     for seed, verdict in enumerate(verdicts):
         if verdict != Verdict.UNKNOWN and truth.setdefault(seed, verdict) != verdict:
-            raise Failed(f"{variant.label} says {verdict} on {study.name}, problem {seed}")
+            raise FailedError(f"{variant.label} says {verdict} on {study.name}, problem {seed}")
     _, messages, content, ncccs, checks = zip(*runs, strict=True)
     return Figure(
         study.name,

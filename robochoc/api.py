@@ -23,19 +23,19 @@ from robochoc.model.problem import Team
 from robochoc.run.defaults import suits
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.orchestrator import solve
-from robochoc.run.registry import UnknownProtocol, offers
+from robochoc.run.registry import UnknownProtocolError, offers
 from robochoc.run.scenario import Field
 
 if TYPE_CHECKING:
     from robochoc.communication.network.robot import Ending
-    from robochoc.run.networked.address import Place
+    from robochoc.run.networked.address import Address
 
 _MASTER, _AGENT = "Master", "Agent"
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A valid team: `team` is its data. Raises `InvalidInput` for one that was built in Python and is not."""
+    """A valid team: `team` is its data. Raises `InvalidInputError` for one that was built in Python and is not."""
 
     team: Team
 
@@ -73,7 +73,7 @@ class Problem:
 
 
 def load(path: Path | str) -> Problem:
-    """The team in the folder `path`. Raises `InvalidInput` with every mistake's file and line."""
+    """The team in the folder `path`. Raises `InvalidInputError` with every mistake's file and line."""
     return Problem(read_team(Path(path)))
 
 
@@ -103,13 +103,13 @@ class AgentsContainer:
 
     _type: str = ""
     _agents: dict[str, tuple[Path | None, bool]] = field(default_factory=dict)
-    _main: Place | None = None
-    _listen: Place | None = None
+    _main: Address | None = None
+    _listen: Address | None = None
     _authority: Path | None = None
     _identities: dict[str, tuple[Path | None, str | None]] = field(default_factory=dict)
 
     def set_agent_type(self, kind: str) -> None:
-        """`MasterABT`, `AgentABT`: which end this is, and the protocol. Raises `ValueError`, `UnknownProtocol`."""
+        """`MasterABT`, `AgentABT`: which end this is, and the protocol. Raises `ValueError`, `UnknownProtocolError`."""
         if not kind.startswith((_MASTER, _AGENT)):
             raise ValueError(f"{kind!r} is no type of agent: MasterABT or AgentABT, or with another protocol's name")
         protocol_called(kind.removeprefix(_MASTER).removeprefix(_AGENT))
@@ -123,16 +123,16 @@ class AgentsContainer:
         self._agents[name] = (None if file is None else Path(file), sniff)
 
     def set_main_container(self, place: str) -> None:
-        """Where the master listens: `HOST` or `HOST:PORT`. Raises `BadPlace`."""
-        from robochoc.run.networked.address import Place  # noqa: PLC0415 - an extra
+        """Where the master listens: `HOST` or `HOST:PORT`. Raises `AddressError`."""
+        from robochoc.run.networked.address import Address  # noqa: PLC0415 - an extra
 
-        self._main = Place.parse(place)
+        self._main = Address.parse(place)
 
     def set_listen(self, place: str) -> None:
-        """The master: listen here, instead of on loopback. Raises `BadPlace`."""
-        from robochoc.run.networked.address import Place  # noqa: PLC0415 - an extra
+        """The master: listen here, instead of on loopback. Raises `AddressError`."""
+        from robochoc.run.networked.address import Address  # noqa: PLC0415 - an extra
 
-        self._listen = Place.parse(place)
+        self._listen = Address.parse(place)
 
     def set_authority(self, folder: Path | str) -> None:
         """The master: the Authority's folder, instead of the user's own."""
@@ -172,7 +172,7 @@ class AgentsContainer:
             running = {name: pool.submit(self._robot, name, self._main) for name in self._agents}
             return {name: robot.result() for name, robot in running.items()}
 
-    def _robot(self, name: str, main: Place) -> Ending:
+    def _robot(self, name: str, main: Address) -> Ending:
         from robochoc.communication.network.manner import Manner  # noqa: PLC0415 - an extra
         from robochoc.run.networked.join import PATIENCE_S, identity_of, join  # noqa: PLC0415 - the same
         from robochoc.solver.compile import Compiler  # noqa: PLC0415 - the same
@@ -187,8 +187,8 @@ class AgentsContainer:
 
 
 def protocol_called(word: str) -> str:
-    """The installed name of the protocol that the paper's type names: `ABT` is `abt`. Raises `UnknownProtocol`."""
+    """The installed name of the protocol that the paper's type names: `ABT` is `abt`. Raises `UnknownProtocolError`."""
     for offer in offers():
         if offer.protocol and word.casefold() in {offer.name.casefold(), offer.protocol.__name__.casefold()}:
             return offer.name
-    raise UnknownProtocol(f"no protocol {word!r} is installed; robochoc protocols lists them")
+    raise UnknownProtocolError(f"no protocol {word!r} is installed; robochoc protocols lists them")

@@ -20,7 +20,7 @@ from cryptography.x509 import Certificate
 from robochoc.authority.certificates import (
     LONGEST_NAME,
     MASTER,
-    BadCertificate,
+    CertificateError,
     ca_certificate,
     check_issued,
     fingerprint,
@@ -37,7 +37,7 @@ from robochoc.authority.events import AuthorityEvent, AuthorityObserver, Granted
 from robochoc.authority.identity import Identity, private_folder, save
 from robochoc.authority.registry import (
     PRIVATE,
-    BadAuthority,
+    AuthorityError,
     Invitation,
     Issued,
     Member,
@@ -59,15 +59,15 @@ _KEY, _CERTIFICATE, _MASTER = "ca.key", "ca.pem", "master"
 _OTHERS = 0o077
 
 
-class BadName(ValueError):  # noqa: N818 - named for what was found
+class InvalidNameError(ValueError):
     """A name that no robot can have, or that is reserved."""
 
 
-class UnknownName(LookupError):  # noqa: N818 - named for what was asked for
+class UnknownNameError(LookupError):
     """Nobody of that name is enrolled."""
 
 
-class NotGranted(Exception):  # noqa: N818 - named for the answer
+class NotGrantedError(Exception):
     """The Authority refuses; the message says why, and may be told to whoever asked."""
 
 
@@ -105,12 +105,14 @@ class Authority:
         clock: Callable[[], float] = time.time,
         lifetime: timedelta = CERTIFICATE_LIFETIME,
     ) -> Authority:
-        """A new Authority in `folder`, which is closed to other users. Raises `BadAuthority` where one is already."""
+        """A new Authority in `folder`, which is closed to other users. Raises `AuthorityError` where one is already."""
         folder = Path(folder)
         private_folder(folder)
         with locked(folder):
             if (folder / _KEY).exists() or (folder / _CERTIFICATE).exists():
-                raise BadAuthority(f"there is an Authority in {folder} already; it has to stay, or all must enrol anew")
+                raise AuthorityError(
+                    f"there is an Authority in {folder} already; it has to stay, or all must enrol anew"
+                )
             key = new_key()
             certificate = ca_certificate(key, moment(clock()))
             write_atomically(folder / _KEY, key_pem(key), PRIVATE)
@@ -126,25 +128,25 @@ class Authority:
         clock: Callable[[], float] = time.time,
         lifetime: timedelta = CERTIFICATE_LIFETIME,
     ) -> Authority:
-        """The Authority in `folder`. Raises `BadAuthority` where there is none that can be used."""
+        """The Authority in `folder`. Raises `AuthorityError` where there is none that can be used."""
         folder = Path(folder)
         try:
             content, mode = (folder / _KEY).read_bytes(), (folder / _KEY).stat().st_mode
             key, certificate = read_key(content), read_certificate((folder / _CERTIFICATE).read_bytes())
         except FileNotFoundError:
-            raise BadAuthority(f"there is no Authority in {folder}; say: robochoc authority init") from None
+            raise AuthorityError(f"there is no Authority in {folder}; say: robochoc authority init") from None
         except OSError as error:
-            raise BadAuthority(f"the Authority in {folder} cannot be read: {error.strerror}") from error
-        except BadCertificate as error:
-            raise BadAuthority(f"the Authority in {folder} is damaged: {error}") from error
+            raise AuthorityError(f"the Authority in {folder} cannot be read: {error.strerror}") from error
+        except CertificateError as error:
+            raise AuthorityError(f"the Authority in {folder} is damaged: {error}") from error
         if mode & _OTHERS:
-            raise BadAuthority(
+            raise AuthorityError(
                 f"others can read the key of the Authority (mode {mode & 0o777:o}); say: chmod 600 {folder / _KEY}"
             )
         if certificate.public_key() != key.public_key():
-            raise BadAuthority(f"the Authority in {folder} is damaged: {_KEY} is not the key of {_CERTIFICATE}")
+            raise AuthorityError(f"the Authority in {folder} is damaged: {_KEY} is not the key of {_CERTIFICATE}")
         if not certificate.not_valid_before_utc <= moment(clock()) < certificate.not_valid_after_utc:
-            raise BadAuthority(f"the Authority in {folder} has expired, or the clock is wrong")
+            raise AuthorityError(f"the Authority in {folder} has expired, or the clock is wrong")
         return cls(folder, key, certificate, observer=observer, clock=clock, lifetime=lifetime)
 
     def enrol(
@@ -160,7 +162,7 @@ class Authority:
         ttl: timedelta = TOKEN_LIFETIME,
         may: Iterable[Right] = (),
     ) -> dict[str, Token]:
-        """A token for each of `names`, or for none of them. Raises `BadName`.
+        """A token for each of `names`, or for none of them. Raises `InvalidNameError`.
 
         A name that is enrolled gets a new token as well; when that is redeemed, its certificates so far are revoked:
         a name has one key. One that was revoked is readmitted then. The role, and the rights that it has from now on
@@ -181,21 +183,21 @@ class Authority:
     def redeem(self, secret: bytes, request: bytes, origin: str = "") -> bytes:
         """The certificate (PEM) that `request` (PKCS 10, PEM) asks for, against the secret of a token.
 
-        `origin` says where the request came from, for the observer. Raises `NotGranted` when the secret is unknown,
-        used or expired, or the request is not in the token's name.
+        `origin` says where the request came from, for the observer. Raises `NotGrantedError` when the secret is
+        unknown, used or expired, or the request is not in the token's name.
         """
         what = "redeem a token"
         with self._answering(what, request, origin) as (name, holder), self._registry.change() as members:
             now, known = self.clock(), digest(secret)
             member = next((m for m in members.values() if m.invitation and m.invitation.digest == known), None)
             if member is None or member.invitation is None:
-                raise NotGranted("the token is unknown here, or a newer one has replaced it")
+                raise NotGrantedError("the token is unknown here, or a newer one has replaced it")
             if member.invitation.used:
-                raise NotGranted("the token has been used already")
+                raise NotGrantedError("the token has been used already")
             if now >= member.invitation.expires:
-                raise NotGranted("the token has expired")
+                raise NotGrantedError("the token has expired")
             if member.name != name:
-                raise NotGranted("the token is not for this name")
+                raise NotGrantedError("the token is not for this name")
             certificate, issued = self._issue(holder, name)
             members[name] = Member(
                 name,
@@ -212,24 +214,24 @@ class Authority:
         """A new certificate (PEM) for the holder of `current`, for the key in `request` (PKCS 10, PEM).
 
         The caller has made sure that whoever asks holds the key of `current` (TLS does). That one stays in force
-        until it expires. Raises `NotGranted` when it is not in force, or the request is in another name.
+        until it expires. Raises `NotGrantedError` when it is not in force, or the request is in another name.
         """
         what = "renew a certificate"
         with self._answering(what, request, origin) as (name, holder), self._registry.change() as members:
             now = self.clock()
             try:
                 proven = check_issued(current, self.certificate, moment(now))
-            except BadCertificate as error:
-                raise NotGranted(str(error)) from error
+            except CertificateError as error:
+                raise NotGrantedError(str(error)) from error
             if proven != name:
-                raise NotGranted("the request is in another name than the certificate")
+                raise NotGrantedError("the request is in another name than the certificate")
             if name == MASTER:
-                raise NotGranted(f"{MASTER} is certified where the Authority is, not from afar")
+                raise NotGrantedError(f"{MASTER} is certified where the Authority is, not from afar")
             if self.is_revoked(current.serial_number):
-                raise NotGranted("the certificate has been revoked")
+                raise NotGrantedError("the certificate has been revoked")
             member = members[name].since(now)
             if len(member.certificates) >= IN_FORCE_AT_MOST:
-                raise NotGranted(f"{IN_FORCE_AT_MOST} certificates of this name are in force, and no more may be")
+                raise NotGrantedError(f"{IN_FORCE_AT_MOST} certificates of this name are in force, and no more may be")
             certificate, issued = self._issue(holder, name)
             members[name] = msgspec.structs.replace(member, certificates=(*member.certificates, issued))
         self.report(Granted(t=now, who=name, what=what, origin=origin))
@@ -239,7 +241,7 @@ class Authority:
         """A new identity of the master, for servers that are reached at `hosts` (names or addresses).
 
         It is written to `folder` (the Authority's own `master` if None) and needs no token: only who has the
-        Authority's key can make one. Raises `BadHost`.
+        Authority's key can make one. Raises `HostNameError`.
         """
         key = new_key()
         with self._registry.change() as members:
@@ -254,15 +256,15 @@ class Authority:
     def revoke(self, name: str) -> None:
         """From now on nothing that `name` was given is good: neither certificates nor an unused token, nor a right.
 
-        Raises `UnknownName`, or `BadName` for the master: robots could not hear of it.
+        Raises `UnknownNameError`, or `InvalidNameError` for the master: robots could not hear of it.
         """
         if name == MASTER:
-            raise BadName(f"{MASTER} cannot be revoked, for robots would not hear of it: make a new Authority")
+            raise InvalidNameError(f"{MASTER} cannot be revoked, for robots would not hear of it: make a new Authority")
         with self._registry.change() as members:
             member = members.get(name)
             if member is None:
                 what = f"no '{on_one_line(shortened(name))}' is enrolled"
-                raise UnknownName(f"{what} ({suggestion(name, members, 'names')})")
+                raise UnknownNameError(f"{what} ({suggestion(name, members, 'names')})")
             withdrawn = (*member.withdrawn, *member.certificates)
             members[name] = Member(name, member.role, None, (), withdrawn, revoked=True).since(self.clock())
 
@@ -316,11 +318,11 @@ class Authority:
         try:
             try:
                 name, holder = read_request(request)
-            except BadCertificate as error:
-                raise NotGranted(str(error)) from error
+            except CertificateError as error:
+                raise NotGrantedError(str(error)) from error
             who = on_one_line(shortened(name))
             yield name, holder
-        except NotGranted as refusal:
+        except NotGrantedError as refusal:
             self.report(Refused(t=self.clock(), who=who, what=what, why=str(refusal), origin=origin))
             raise
 
@@ -333,11 +335,13 @@ def default_folder() -> Path:
 
 
 def check_name(name: str, role: Role = Role.ROBOT) -> None:
-    """Raises `BadName` if `name` cannot take part as `role`."""
+    """Raises `InvalidNameError` if `name` cannot take part as `role`."""
     shown = on_one_line(shortened(name))
     if not is_name(name):
-        raise BadName(f"'{shown}' is no robot's name: a letter, then letters, digits, '_' and '.'")
+        raise InvalidNameError(f"'{shown}' is no robot's name: a letter, then letters, digits, '_' and '.'")
     if len(name) > LONGEST_NAME:
-        raise BadName(f"'{shown}' is too long: a certificate names at most {LONGEST_NAME} characters")
+        raise InvalidNameError(f"'{shown}' is too long: a certificate names at most {LONGEST_NAME} characters")
     if name.upper() == MASTER or role is Role.MASTER:
-        raise BadName(f"the name {MASTER} is the master's own, which needs no token; choose another name, or role")
+        raise InvalidNameError(
+            f"the name {MASTER} is the master's own, which needs no token; choose another name, or role"
+        )

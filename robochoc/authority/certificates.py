@@ -52,11 +52,11 @@ _SIGNING_CERTIFICATES = x509.KeyUsage(
 )
 
 
-class BadCertificate(ValueError):  # noqa: N818 - named for what was found
+class CertificateError(ValueError):
     """A certificate, a request for one, or a key that is malformed, or not what it would have to be."""
 
 
-class BadHost(ValueError):  # noqa: N818 - named for what was found
+class HostNameError(ValueError):
     """No certificate can name this host."""
 
 
@@ -107,7 +107,7 @@ def leaf_certificate(
     hosts: Sequence[str] | None,
     times: tuple[datetime, datetime],
 ) -> x509.Certificate:
-    """A certificate that says that `holder` is the key of `name`, within `times`. Raises `BadHost`.
+    """A certificate that says that `holder` is the key of `name`, within `times`. Raises `HostNameError`.
 
     `hosts`: the names and addresses at which a server is to be believed; None: it is for a client only.
     """
@@ -137,59 +137,59 @@ def signing_request(key: ec.EllipticCurvePrivateKey, name: str) -> bytes:
 
 
 def read_request(content: bytes) -> tuple[str, ec.EllipticCurvePublicKey]:
-    """Name and key of a request, whose maker has shown to hold the key. Raises `BadCertificate`."""
+    """Name and key of a request, whose maker has shown to hold the key. Raises `CertificateError`."""
     try:
         request = x509.load_pem_x509_csr(content)
         holder, genuine = request.public_key(), request.is_signature_valid
         name = common_name(request.subject)
     except (ValueError, TypeError, UnsupportedAlgorithm, x509.InvalidVersion) as error:
-        raise BadCertificate("the request for a certificate is malformed") from error
+        raise CertificateError("the request for a certificate is malformed") from error
     if not genuine:
-        raise BadCertificate("the request for a certificate is not signed by the key that it names")
+        raise CertificateError("the request for a certificate is not signed by the key that it names")
     return name, _on_p256(holder)
 
 
 def read_certificate(content: bytes) -> x509.Certificate:
-    """The one certificate in `content`. Raises `BadCertificate`."""
+    """The one certificate in `content`. Raises `CertificateError`."""
     try:
         found = x509.load_pem_x509_certificates(content)
     except (ValueError, TypeError, x509.InvalidVersion) as error:
-        raise BadCertificate("that is no certificate") from error
+        raise CertificateError("that is no certificate") from error
     if len(found) != 1:
-        raise BadCertificate(f"expected one certificate, found {len(found)}")
+        raise CertificateError(f"expected one certificate, found {len(found)}")
     return found[0]
 
 
 def read_key(content: bytes) -> ec.EllipticCurvePrivateKey:
-    """The private key in `content`. Raises `BadCertificate`."""
+    """The private key in `content`. Raises `CertificateError`."""
     try:
         key = serialization.load_pem_private_key(content, None)
     except (ValueError, TypeError, UnsupportedAlgorithm) as error:
-        raise BadCertificate("that is no private key") from error
+        raise CertificateError("that is no private key") from error
     if not isinstance(key, ec.EllipticCurvePrivateKey):
-        raise BadCertificate("the private key is not on P-256")
+        raise CertificateError("the private key is not on P-256")
     _on_p256(key.public_key())
     return key
 
 
 def holder_of(certificate: x509.Certificate) -> ec.EllipticCurvePublicKey:
-    """The public key in `certificate`. Raises `BadCertificate`."""
+    """The public key in `certificate`. Raises `CertificateError`."""
     try:
         return _on_p256(certificate.public_key())
     except (ValueError, UnsupportedAlgorithm) as error:
-        raise BadCertificate("the certificate's key is of a kind that robochoc does not use") from error
+        raise CertificateError("the certificate's key is of a kind that robochoc does not use") from error
 
 
 def common_name(subject: x509.Name) -> str:
-    """The name in a subject that is nothing but a name. Raises `BadCertificate`."""
+    """The name in a subject that is nothing but a name. Raises `CertificateError`."""
     attributes = list(subject)
     if len(attributes) != 1 or attributes[0].oid != NameOID.COMMON_NAME or not isinstance(attributes[0].value, str):
-        raise BadCertificate("its subject is not one common name")
+        raise CertificateError("its subject is not one common name")
     return attributes[0].value
 
 
 def check_issued(certificate: x509.Certificate, ca: x509.Certificate, now: datetime) -> str:
-    """The name that `certificate` proves: `ca` has issued it, and it is valid `now`. Raises `BadCertificate`.
+    """The name that `certificate` proves: `ca` has issued it, and it is valid `now`. Raises `CertificateError`.
 
     X.509 path validation as `cryptography` does it, for a client's certificate (the master's is one too).
     """
@@ -197,15 +197,15 @@ def check_issued(certificate: x509.Certificate, ca: x509.Certificate, now: datet
         name = common_name(certificate.subject)
         certificate.verify_directly_issued_by(ca)
     except (ValueError, TypeError, InvalidSignature, UnsupportedAlgorithm) as error:
-        raise BadCertificate("this Authority has not issued the certificate") from error
+        raise CertificateError("this Authority has not issued the certificate") from error
     if not certificate.not_valid_before_utc <= now <= certificate.not_valid_after_utc:
         times = f"{certificate.not_valid_before_utc:%Y-%m-%d %H:%M} to {certificate.not_valid_after_utc:%Y-%m-%d %H:%M}"
         who = on_one_line(shortened(name))
-        raise BadCertificate(f"the certificate of {who} is valid from {times} (UTC), not now; is the clock right?")
+        raise CertificateError(f"the certificate of {who} is valid from {times} (UTC), not now; is the clock right?")
     try:
         PolicyBuilder().store(Store([ca])).time(now).build_client_verifier().verify(certificate, [])
     except VerificationError as error:
-        raise BadCertificate("this Authority would not have issued such a certificate") from error
+        raise CertificateError("this Authority would not have issued such a certificate") from error
     return name
 
 
@@ -231,16 +231,16 @@ def _host(host: str) -> x509.DNSName | x509.IPAddress:
         except ValueError:
             name = ""
         if not name:
-            raise BadHost(f"{on_one_line(shortened(host))!r} is no host name, and no address") from None
+            raise HostNameError(f"{on_one_line(shortened(host))!r} is no host name, and no address") from None
         return x509.DNSName(name)
     if address.is_unspecified:
-        raise BadHost(f"{host} means all addresses: name the host or the addresses that robots connect to")
+        raise HostNameError(f"{host} means all addresses: name the host or the addresses that robots connect to")
     return x509.IPAddress(address)
 
 
 def _on_p256(key: object) -> ec.EllipticCurvePublicKey:
     if not isinstance(key, ec.EllipticCurvePublicKey) or not isinstance(key.curve, ec.SECP256R1):
-        raise BadCertificate("the key is not on P-256")
+        raise CertificateError("the key is not on P-256")
     return key
 
 

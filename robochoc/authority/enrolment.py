@@ -18,7 +18,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 
 from robochoc.authority.certificates import (
     MASTER,
-    BadCertificate,
+    CertificateError,
     check_issued,
     fingerprint,
     holder_of,
@@ -30,10 +30,10 @@ from robochoc.authority.certificates import (
 )
 from robochoc.authority.frames import (
     Answer,
-    BadFrame,
     Certified,
     Denied,
     Exchange,
+    FrameError,
     Introduce,
     Introduction,
     Question,
@@ -49,15 +49,15 @@ PATIENCE_S = 30.0
 """So long may a question take, with the time that the service lets it wait."""
 
 
-class EnrolmentFailed(Exception):  # noqa: N818 - named for what happened
+class EnrolmentError(Exception):
     """There is no certificate; the message says why, and what to do."""
 
 
-class NobodyThere(EnrolmentFailed):
+class NobodyThereError(EnrolmentError):
     """Nobody listens at that address (yet). Nothing was sent, so the same token can be tried again."""
 
 
-class NotTrusted(EnrolmentFailed):
+class NotTrustedError(EnrolmentError):
     """Whoever answers is not who the token, or the identity, is from. Nothing secret was sent."""
 
 
@@ -66,8 +66,8 @@ def enrol(
 ) -> Identity:
     """Make a key in `folder`, and have the Authority at `host` and `port` certify that it is the key of `name`.
 
-    An identity in `folder` is replaced when the Authority has said yes. Raises `BadToken`, `NotTrusted`,
-    `NobodyThere`, `EnrolmentFailed` (refused), `OSError` (the folder).
+    An identity in `folder` is replaced when the Authority has said yes. Raises `TokenError`, `NotTrustedError`,
+    `NobodyThereError`, `EnrolmentError` (refused), `OSError` (the folder).
     """
     token = token if isinstance(token, Token) else Token.parse(token)
     folder = Path(folder)
@@ -84,8 +84,8 @@ def enrol(
 def renew(identity: Identity, host: str, port: int, patience_s: float = PATIENCE_S) -> Identity:
     """The same identity with a new certificate, which is in its folder as well.
 
-    The key stays: so one file is replaced, and no crash can part a key from its certificate. Raises `NotTrusted`,
-    `EnrolmentFailed`.
+    The key stays: so one file is replaced, and no crash can part a key from its certificate. Raises `NotTrustedError`,
+    `EnrolmentError`.
     """
     context = _believing(identity.ca)
     context.load_cert_chain(identity.certificate_file, identity.key_file)
@@ -104,10 +104,10 @@ def _introduced(place: tuple[str, int], token: Token, patience_s: float) -> x509
     answer = _ask(place, Introduce(), context, patience_s)
     try:
         ca = read_certificate(answer.ca) if isinstance(answer, Introduction) else None
-    except BadCertificate:
+    except CertificateError:
         ca = None
     if ca is None or not hmac.compare_digest(fingerprint(ca), token.fingerprint):
-        raise NotTrusted(
+        raise NotTrustedError(
             f"who answers at {_shown(place)} is not the Authority that the token is from: it is the address of "
             "another one, or somebody is in between; the token was not shown"
         )
@@ -128,7 +128,7 @@ def _ask(place: tuple[str, int], question: Question, context: ssl.SSLContext, pa
     try:
         raw = socket.create_connection(place, patience_s)
     except OSError as error:
-        raise NobodyThere(_unanswered(place, error)) from error
+        raise NobodyThereError(_unanswered(place, error)) from error
     try:
         with raw:
             Exchange(raw, patience_s).wait()
@@ -138,17 +138,17 @@ def _ask(place: tuple[str, int], question: Question, context: ssl.SSLContext, pa
                 exchange.send(question)
                 return exchange.answer()
     except ssl.SSLCertVerificationError as error:
-        raise NotTrusted(
+        raise NotTrustedError(
             f"who answers at {_shown(place)} is not the master of this Authority ({error.verify_message}); "
             "check the address, and the clocks of both machines"
         ) from error
     except ssl.SSLError as error:
-        raise EnrolmentFailed(
+        raise EnrolmentError(
             f"the Authority at {_shown(place)} has ended the connection ({error.reason or error}); "
             "is the certificate that was shown still good?"
         ) from error
-    except (OSError, BadFrame) as error:
-        raise EnrolmentFailed(_unanswered(place, error)) from error
+    except (OSError, FrameError) as error:
+        raise EnrolmentError(_unanswered(place, error)) from error
 
 
 def _unanswered(place: tuple[str, int], error: Exception) -> str:
@@ -160,18 +160,18 @@ def _certified(answer: Answer, ca: x509.Certificate, key: ec.EllipticCurvePrivat
     """The certificate in `answer`, if `ca` says there that `key` is the key of `name`."""
     match answer:
         case Denied():
-            raise EnrolmentFailed(f"the Authority refuses: {on_one_line(answer.why)}")
+            raise EnrolmentError(f"the Authority refuses: {on_one_line(answer.why)}")
         case Certified():
             try:
                 certificate = read_certificate(answer.certificate)
                 proven = check_issued(certificate, ca, moment(time.time()))
-            except BadCertificate as error:
-                raise EnrolmentFailed(f"the Authority has given a certificate that is not good: {error}") from error
+            except CertificateError as error:
+                raise EnrolmentError(f"the Authority has given a certificate that is not good: {error}") from error
             if proven == name and holder_of(certificate) == key.public_key():
                 return certificate
-            raise EnrolmentFailed("the Authority has given the certificate of another name or key")
+            raise EnrolmentError("the Authority has given the certificate of another name or key")
         case _:
-            raise EnrolmentFailed("the Authority has answered another question")
+            raise EnrolmentError("the Authority has answered another question")
 
 
 def _shown(place: tuple[str, int]) -> str:

@@ -18,15 +18,15 @@ from typing import Self, assert_never
 
 from cryptography import x509
 
-from robochoc.authority.authority import Authority, NotGranted
+from robochoc.authority.authority import Authority, NotGrantedError
 from robochoc.authority.certificates import pem
 from robochoc.authority.events import Refused
 from robochoc.authority.frames import (
     Answer,
-    BadFrame,
     Certified,
     Denied,
     Exchange,
+    FrameError,
     Introduce,
     Introduction,
     Question,
@@ -34,7 +34,7 @@ from robochoc.authority.frames import (
     Renew,
 )
 from robochoc.authority.identity import Identity
-from robochoc.authority.registry import BadAuthority
+from robochoc.authority.registry import AuthorityError
 
 CONNECTIONS = 32
 """So many are served at once; others wait to be accepted."""
@@ -123,7 +123,7 @@ class EnrolmentServer:
             except BaseException:
                 raw.close()
                 raise
-        except (OSError, BadAuthority) as error:
+        except (OSError, AuthorityError) as error:
             self._free.release()
             self._refuse("", f"the connection could not be accepted: {error}")
             return
@@ -160,12 +160,12 @@ class EnrolmentServer:
     def _answered(self, exchange: Exchange, connection: ssl.SSLSocket, origin: str) -> Answer:
         try:
             return self._answer(exchange.question(), connection.getpeercert(binary_form=True), origin)
-        except NotGranted as refusal:  # which the Authority has reported
+        except NotGrantedError as refusal:  # which the Authority has reported
             return Denied(str(refusal))
-        except BadFrame as error:
+        except FrameError as error:
             self._refuse(origin, str(error))
             return Denied(str(error))
-        except BadAuthority as error:
+        except AuthorityError as error:
             self._refuse(origin, str(error))
             return Denied("the Authority cannot answer at the moment; ask whoever runs it")
 
@@ -178,7 +178,7 @@ class EnrolmentServer:
                 return Certified(self._authority.redeem(question.secret, question.request, origin))
             case Renew():
                 if shown is None:
-                    raise BadFrame("a certificate is renewed over a connection that shows it")
+                    raise FrameError("a certificate is renewed over a connection that shows it")
                 current = x509.load_der_x509_certificate(shown)
                 return Certified(self._authority.renew(question.request, current, origin))
             case _:

@@ -16,7 +16,7 @@ LARGEST_BYTES = 16384
 _LENGTH_BYTES = 4
 
 
-class BadFrame(ValueError):  # noqa: N818 - named for what was found
+class FrameError(ValueError):
     """What came is no question, or no answer, of these."""
 
 
@@ -66,20 +66,20 @@ _answers = msgspec.msgpack.Decoder(Answer)
 
 
 def decode_question(content: bytes) -> Question:
-    """The question in `content`. Raises `BadFrame`."""
+    """The question in `content`. Raises `FrameError`."""
     try:
         question: Question = _questions.decode(content)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-        raise BadFrame(f"that is no question: {error}") from error
+        raise FrameError(f"that is no question: {error}") from error
     return question
 
 
 def decode_answer(content: bytes) -> Answer:
-    """The answer in `content`. Raises `BadFrame`."""
+    """The answer in `content`. Raises `FrameError`."""
     try:
         answer: Answer = _answers.decode(content)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-        raise BadFrame(f"that is no answer: {error}") from error
+        raise FrameError(f"that is no answer: {error}") from error
     return answer
 
 
@@ -104,17 +104,17 @@ class Exchange:
         self._connection.sendall(len(content).to_bytes(_LENGTH_BYTES, "big") + content)
 
     def question(self) -> Question:
-        """The next frame, a question. Raises `OSError`, `BadFrame`."""
+        """The next frame, a question. Raises `OSError`, `FrameError`."""
         return decode_question(self._receive())
 
     def answer(self) -> Answer:
-        """The next frame, an answer. Raises `OSError`, `BadFrame`."""
+        """The next frame, an answer. Raises `OSError`, `FrameError`."""
         return decode_answer(self._receive())
 
     def _receive(self) -> bytes:
         length = int.from_bytes(self._exactly(_LENGTH_BYTES), "big")
         if length > LARGEST_BYTES:
-            raise BadFrame(f"{length} bytes were announced, and {LARGEST_BYTES} are allowed")
+            raise FrameError(f"{length} bytes were announced, and {LARGEST_BYTES} are allowed")
         return self._exactly(length)
 
     def _exactly(self, size: int) -> bytes:
@@ -123,6 +123,6 @@ class Exchange:
             self.wait()
             part = self._connection.recv(size - len(content))
             if not part:
-                raise BadFrame("the other side has hung up in the middle")
+                raise FrameError("the other side has hung up in the middle")
             content += part
         return bytes(content)

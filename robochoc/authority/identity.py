@@ -16,7 +16,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509 import Certificate
 
 from robochoc.authority.certificates import (
-    BadCertificate,
+    CertificateError,
     check_issued,
     common_name,
     holder_of,
@@ -35,7 +35,7 @@ _OTHERS = 0o077
 _LARGEST_BYTES = 65536
 
 
-class BadIdentity(Exception):  # noqa: N818 - named for what was found
+class IdentityError(Exception):
     """A folder that holds no identity, or one that cannot be used; the message says what to do."""
 
 
@@ -61,7 +61,7 @@ class Identity:
     def load(cls, folder: Path | str, now: float | None = None) -> Identity:
         """The identity in `folder`. `now`: Unix time, if not the clock's.
 
-        Raises `BadIdentity` when something is missing or malformed, others may read the key, the key is not the
+        Raises `IdentityError` when something is missing or malformed, others may read the key, the key is not the
         certificate's, or the certificate is not the Authority's or not valid now.
         """
         folder = Path(folder)
@@ -70,9 +70,9 @@ class Identity:
             certificate, ca = read_certificate(_read(folder / CERTIFICATE)), read_certificate(_read(folder / CA))
             name = check_issued(certificate, ca, moment(time.time() if now is None else now))
             if holder_of(certificate) != key.public_key():
-                raise BadIdentity(f"{folder}: {KEY} is not the key of {CERTIFICATE}; enrol anew, with a new token")
-        except BadCertificate as error:
-            raise BadIdentity(f"{folder}: {error}; enrol anew, with a new token") from error
+                raise IdentityError(f"{folder}: {KEY} is not the key of {CERTIFICATE}; enrol anew, with a new token")
+        except CertificateError as error:
+            raise IdentityError(f"{folder}: {error}; enrol anew, with a new token") from error
         return cls(folder, name, key, certificate, ca)
 
     @classmethod
@@ -155,7 +155,7 @@ def _secret(path: Path) -> bytes:
     content = _read(path)
     mode = path.stat().st_mode
     if mode & _OTHERS:
-        raise BadIdentity(f"{path} can be read by others (mode {mode & 0o777:o}); say: chmod 600 {path}")
+        raise IdentityError(f"{path} can be read by others (mode {mode & 0o777:o}); say: chmod 600 {path}")
     return content
 
 
@@ -164,9 +164,9 @@ def _read(path: Path) -> bytes:
         with path.open("rb") as file:
             content = file.read(_LARGEST_BYTES + 1)
     except FileNotFoundError:
-        raise BadIdentity(f"{path} is missing: there is no identity here yet, enrol with a token") from None
+        raise IdentityError(f"{path} is missing: there is no identity here yet, enrol with a token") from None
     except OSError as error:
-        raise BadIdentity(f"{path} cannot be read: {error.strerror}") from error
+        raise IdentityError(f"{path} cannot be read: {error.strerror}") from error
     if len(content) > _LARGEST_BYTES:
-        raise BadIdentity(f"{path} is no identity's file: it has more than {_LARGEST_BYTES} bytes")
+        raise IdentityError(f"{path} is no identity's file: it has more than {_LARGEST_BYTES} bytes")
     return content

@@ -20,7 +20,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey,
 from cryptography.hazmat.primitives.asymmetric.x25519 import X25519PrivateKey, X25519PublicKey
 from cryptography.hazmat.primitives.kdf.hkdf import HKDF
 
-from robochoc.authority.certificates import BadCertificate, check_issued, holder_of, moment, pem, read_certificate
+from robochoc.authority.certificates import CertificateError, check_issued, holder_of, moment, pem, read_certificate
 from robochoc.authority.identity import Identity
 from robochoc.formats.diagnostics import on_one_line, shortened
 
@@ -29,11 +29,11 @@ _LARGEST_CARD_BYTES = 8192
 _SECRET_BYTES = 32
 
 
-class BadCard(ValueError):  # noqa: N818 - named for what was found
+class KeyCardError(ValueError):
     """A key card that does not prove what it says."""
 
 
-class UnknownPeer(LookupError):  # noqa: N818 - named for what was asked for
+class UnknownPeerError(LookupError):
     """No card of this robot was admitted."""
 
 
@@ -56,13 +56,13 @@ class KeyCard(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @classmethod
     def decode(cls, content: bytes) -> Self:
-        """The card in `content`, not checked yet: `KeyRing.admit` does that. Raises `BadCard`."""
+        """The card in `content`, not checked yet: `KeyRing.admit` does that. Raises `KeyCardError`."""
         if len(content) > _LARGEST_CARD_BYTES:
-            raise BadCard(f"a key card has at most {_LARGEST_CARD_BYTES} bytes, this one {len(content)}")
+            raise KeyCardError(f"a key card has at most {_LARGEST_CARD_BYTES} bytes, this one {len(content)}")
         try:
             return msgspec.msgpack.decode(content, type=cls)
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-            raise BadCard(f"that is no key card: {error}") from error
+            raise KeyCardError(f"that is no key card: {error}") from error
 
     def signed_part(self) -> bytes:
         """What the signature is over."""
@@ -93,7 +93,7 @@ class KeyRing:
     def admit(self, card: KeyCard, now: float) -> None:
         """Believe `card` from now on (Unix time `now`), instead of an older one of that robot.
 
-        Raises `BadCard`: when the Authority has not issued its certificate, or that is not valid now or names
+        Raises `KeyCardError`: when the Authority has not issued its certificate, or that is not valid now or names
         somebody else, the signature is wrong, or the card is from another run.
         """
         who = on_one_line(shortened(card.name))
@@ -101,20 +101,20 @@ class KeyRing:
             certificate = read_certificate(card.certificate)
             proven = check_issued(certificate, self._ca, moment(now))
             holder_of(certificate).verify(card.signature, card.signed_part(), ec.ECDSA(hashes.SHA256()))
-        except BadCertificate as error:
-            raise BadCard(f"the key card of {who}: {error}") from error
+        except CertificateError as error:
+            raise KeyCardError(f"the key card of {who}: {error}") from error
         except (InvalidSignature, UnicodeEncodeError) as error:
-            raise BadCard(f"the key card of {who} is not signed with the key of its certificate") from error
+            raise KeyCardError(f"the key card of {who} is not signed with the key of its certificate") from error
         if proven != card.name:
-            raise BadCard(f"the key card of {who} comes with the certificate of {on_one_line(shortened(proven))}")
+            raise KeyCardError(f"the key card of {who} comes with the certificate of {on_one_line(shortened(proven))}")
         if card.run != self.run:
-            raise BadCard(f"the key card of {who} is from another run")
+            raise KeyCardError(f"the key card of {who} is from another run")
         if {len(card.signing), len(card.sealing)} != {_PUBLIC_BYTES}:
-            raise BadCard(f"the keys on the card of {who} do not have {_PUBLIC_BYTES} bytes")
+            raise KeyCardError(f"the keys on the card of {who} do not have {_PUBLIC_BYTES} bytes")
         try:
             self._sealing.exchange(X25519PublicKey.from_public_bytes(card.sealing))
         except ValueError as error:  # a point of small order: whatever is agreed on, everybody knows it
-            raise BadCard(f"the sealing key on the card of {who} is no key") from error
+            raise KeyCardError(f"the sealing key on the card of {who} is no key") from error
         self._peers[card.name] = card
 
     def dismiss(self, name: str) -> None:
@@ -122,18 +122,18 @@ class KeyRing:
         self._peers.pop(name, None)
 
     def card_of(self, name: str) -> KeyCard:
-        """The card of `name`. Raises `UnknownPeer`."""
+        """The card of `name`. Raises `UnknownPeerError`."""
         try:
             return self._peers[name]
         except KeyError:
-            raise UnknownPeer(f"no key card of {on_one_line(shortened(name))} was admitted") from None
+            raise UnknownPeerError(f"no key card of {on_one_line(shortened(name))} was admitted") from None
 
     def sign(self, content: bytes) -> bytes:
         """An Ed25519 signature, 64 bytes."""
         return self._signing.sign(content)
 
     def is_signed(self, name: str, signature: bytes, content: bytes) -> bool:
-        """Whether `name` has signed `content`. Raises `UnknownPeer`."""
+        """Whether `name` has signed `content`. Raises `UnknownPeerError`."""
         card = self.card_of(name)
         try:
             Ed25519PublicKey.from_public_bytes(card.signing).verify(signature, content)
@@ -145,7 +145,7 @@ class KeyRing:
         """32 bytes that only `sender` and `receiver` can know, one of which is this robot; the same for both.
 
         X25519, then HKDF with SHA-256 (RFC 5869) over all that the two have agreed on: run, names, public keys and
-        `purpose`. The way back has another secret. Raises `UnknownPeer`.
+        `purpose`. The way back has another secret. Raises `UnknownPeerError`.
         """
         peer = self.card_of(receiver if sender == self.name else sender)
         cards = (self.card, peer) if sender == self.name else (peer, self.card)

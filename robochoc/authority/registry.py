@@ -23,7 +23,7 @@ PRIVATE = 0o600
 _FILE, _LOCK = "registry.json", "lock"
 
 
-class BadAuthority(Exception):  # noqa: N818 - named for what was found
+class AuthorityError(Exception):
     """The Authority's folder is not there, or what is in it cannot be used."""
 
 
@@ -120,7 +120,7 @@ class Registry:
         self._known: tuple[tuple[int, ...], dict[str, Member]] = ((), {})
 
     def members(self) -> Mapping[str, Member]:
-        """All names, as they stand now. Raises `BadAuthority`."""
+        """All names, as they stand now. Raises `AuthorityError`."""
         path = self._folder / _FILE
         try:
             status = path.stat()
@@ -133,9 +133,9 @@ class Registry:
         except FileNotFoundError:
             return {}
         except OSError as error:
-            raise BadAuthority(f"{path} cannot be read: {error.strerror}") from error
+            raise AuthorityError(f"{path} cannot be read: {error.strerror}") from error
         except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-            raise BadAuthority(f"{path} is no registry of this version: {error}") from error
+            raise AuthorityError(f"{path} is no registry of this version: {error}") from error
         return known[1]
 
     @contextmanager

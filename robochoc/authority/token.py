@@ -17,7 +17,7 @@ SECRET_BYTES = 20
 FINGERPRINT_BYTES = 32
 
 
-class BadToken(ValueError):  # noqa: N818 - named for what was found
+class TokenError(ValueError):
     """The text is no token, or not a whole one."""
 
 
@@ -35,14 +35,16 @@ class Token:
 
     @classmethod
     def parse(cls, text: str) -> Token:
-        """The token that `text` stands for; blanks around it and capitals do no harm. Raises `BadToken`."""
+        """The token that `text` stands for; blanks around it and capitals do no harm. Raises `TokenError`."""
         secret, dot, fingerprint = text.strip().partition(".")
         try:
             token = cls(_decoded(secret), _decoded(fingerprint))
         except (ValueError, binascii.Error):
             token = cls(b"", b"")
         if not dot or (len(token.secret), len(token.fingerprint)) != (SECRET_BYTES, FINGERPRINT_BYTES):
-            raise BadToken("that is no token, or only a part of one: copy all that 'robochoc authority enrol' printed")
+            raise TokenError(
+                "that is no token, or only a part of one: copy all that 'robochoc authority enrol' printed"
+            )
         return token
 
     def __str__(self) -> str:

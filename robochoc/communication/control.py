@@ -75,7 +75,7 @@ class Report(OfEpoch, frozen=True):
 class Failed(_Control, frozen=True):
     """I cannot go on; `unsupported`: because of my problem, not because something broke.
 
-    `elsewhere`: another protocol may be able to (`TooMuch`).
+    `elsewhere`: another protocol may be able to (`TooLargeError`).
     """
 
     why: str

@@ -20,11 +20,11 @@ from robochoc.system.installed import all_in, loaded, missing, named
 GROUP = "robochoc.filters"
 
 
-class NotGenuine(Exception):  # noqa: N818 - named for what was found
+class NotGenuineError(Exception):
     """What has come is not what `sender` has sealed for this robot, in this context; nothing of it may be used."""
 
 
-class UnknownFilter(LookupError):  # noqa: N818 - named for what was asked for
+class UnknownFilterError(LookupError):
     """No installed package offers a filter of that name, or what it offers cannot be used."""
 
 
@@ -40,11 +40,11 @@ class ChannelFilter(ABC):
 
     @abstractmethod
     def seal(self, receiver: str, content: bytes, context: bytes) -> bytes:
-        """What is sent instead of `content`. Each call may give something else. Raises `UnknownPeer`."""
+        """What is sent instead of `content`. Each call may give something else. Raises `UnknownPeerError`."""
 
     @abstractmethod
     def open(self, sender: str, content: bytes, context: bytes) -> bytes:
-        """What `sender` has sealed; `content` may be anything. Raises `NotGenuine`."""
+        """What `sender` has sealed; `content` may be anything. Raises `NotGenuineError`."""
 
 
 class FilterStack(ChannelFilter):
@@ -61,15 +61,18 @@ class FilterStack(ChannelFilter):
         return content
 
     def open(self, sender: str, content: bytes, context: bytes) -> bytes:
-        """What the first filter has sealed. A filter that fails in whatever way has not opened it: `NotGenuine`."""
+        """What the first filter has sealed.
+
+        A filter that fails in whatever way has not opened it: `NotGenuineError`.
+        """
         for each in reversed(self._filters):
             try:
                 content = each.open(sender, content, context)
-            except NotGenuine:
+            except NotGenuineError:
                 raise
             except Exception as error:
                 told = on_one_line(f"{type(each).__name__} failed: {type(error).__name__}: {error}")
-                raise NotGenuine(told) from error
+                raise NotGenuineError(told) from error
         return content
 
 
@@ -91,13 +94,13 @@ def filter_offers() -> tuple[FilterOffer, ...]:
 
 
 def filter_named(name: str) -> type[ChannelFilter]:
-    """The filter called `name`. Raises `UnknownFilter`, which names those there are."""
+    """The filter called `name`. Raises `UnknownFilterError`, which names those there are."""
     found = named(GROUP, name)
     if not found:
-        raise UnknownFilter(missing(GROUP, "filter", name))
+        raise UnknownFilterError(missing(GROUP, "filter", name))
     offer = _offer(found[0], found)
     if offer.filter is None:
-        raise UnknownFilter(f"{offer.place}, installed as filter {name!r}, {offer.broken}")
+        raise UnknownFilterError(f"{offer.place}, installed as filter {name!r}, {offer.broken}")
     return offer.filter
 
 

@@ -24,25 +24,25 @@ from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Void
 
 
-class BadSettings(ValueError):  # noqa: N818 - named for what was given
+class SettingsError(ValueError):
     """What was set is nothing that the protocol knows, or will not do; says which and why."""
 
 
 def settings_of(protocol: type[Protocol], given: Mapping[str, str]) -> Settings:
-    """The settings of `protocol`: its defaults, and what was `given` instead. Raises `BadSettings`."""
+    """The settings of `protocol`: its defaults, and what was `given` instead. Raises `SettingsError`."""
     known = type(protocol.settings)
     names = [field.name for field in msgspec.structs.fields(known)]
     for name in given:
         if name not in names:
             there = f"it has {', '.join(names)}" if names else "it has no settings"
-            raise BadSettings(f"{name!r} is no setting of this protocol: {there}")
+            raise SettingsError(f"{name!r} is no setting of this protocol: {there}")
     try:
         return msgspec.convert(dict(given), known, strict=False)
     except msgspec.ValidationError as error:
-        raise BadSettings(str(error)) from None
+        raise SettingsError(str(error)) from None
 
 
-class BadMessage(Exception):  # noqa: N818 - named for what arrived
+class BadMessageError(Exception):
     """The bytes of an envelope are no message of the protocol."""
 
 
@@ -51,7 +51,7 @@ class Host:
 
     @classmethod
     def of(cls, protocol: type[Protocol], part: Part) -> Self:
-        """A host for the robot whose part of the problem is `part`. Raises `Unsupported` (see `LocalProblem`)."""
+        """A host for the robot whose part of the problem is `part`. Raises `UnsupportedError` (see `LocalProblem`)."""
         return cls(protocol(LocalProblem(part), PriorityOrder(part.order, part.links)), part.brief)
 
     def __init__(self, protocol: Protocol, brief: Brief = NO_BRIEF) -> None:
@@ -102,7 +102,7 @@ class Host:
     def change(self, part: Part, void: Void) -> None:
         """A new epoch: the problem has changed to `part`, and counting begins again.
 
-        A protocol that can goes on with what it knows; any other is begun anew. Raises `Unsupported`.
+        A protocol that can goes on with what it knows; any other is begun anew. Raises `UnsupportedError`.
         """
         problem, order = LocalProblem(part), PriorityOrder(part.order, part.links)
         if isinstance(self.protocol, DynamicProtocol):
@@ -120,21 +120,21 @@ class Host:
     def handle(self, packet: Sequence[Envelope]) -> list[Envelope]:
         """Take in all waiting messages, let the protocol settle, and return what it says.
 
-        Raises `BadMessage` when an envelope's content is no message of the protocol.
+        Raises `BadMessageError` when an envelope's content is no message of the protocol.
         """
         for envelope in packet:
             self.take_in(envelope)
         return self.settle()
 
     def take_in(self, envelope: Envelope) -> None:
-        """Take in one message of a packet, of which more may follow. Raises `BadMessage`.
+        """Take in one message of a packet, of which more may follow. Raises `BadMessageError`.
 
         What the robot says at once does not carry the clocks of those that follow.
         """
         try:
             message: Message = self._decoder.decode(envelope.content)
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-            raise BadMessage(f"{envelope.sender} sent {self.name} what is no message: {error}") from error
+            raise BadMessageError(f"{envelope.sender} sent {self.name} what is no message: {error}") from error
         self.clock = max(self.clock, envelope.clock)
         self.protocol.receive(envelope.sender, message)
         self._tick()

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 
 _STOPPING = {signal.SIGINT, signal.SIGTERM}
 
@@ -23,7 +23,7 @@ def allow_descriptors(needed: int) -> None:
 
 
 def require_descriptors(free: int) -> None:
-    """Raise `Unsupported` unless `free` more files can be opened; the soft limit is raised as far as it goes.
+    """Raise `UnsupportedError` unless `free` more files can be opened; the soft limit is raised as far as it goes.
 
     zenoh does not come back from a lack of them: it aborts the process.
     """
@@ -34,7 +34,7 @@ def require_descriptors(free: int) -> None:
     allow_descriptors(in_use + free)
     limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     if limit not in {resource.RLIM_INFINITY, -1} and limit - in_use < free:
-        raise Unsupported(
+        raise UnsupportedError(
             f"too few files may be open: {limit}, with {in_use} in use and {free} more needed; say: ulimit -n 1024"
         )
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from cryptography.exceptions import InvalidTag
 from cryptography.hazmat.primitives.ciphers.aead import ChaCha20Poly1305
 
-from robochoc.authority.keyring import KeyCard, KeyRing, UnknownPeer
-from robochoc.communication.filters import ChannelFilter, NotGenuine
+from robochoc.authority.keyring import KeyCard, KeyRing, UnknownPeerError
+from robochoc.communication.filters import ChannelFilter, NotGenuineError
 
 _PURPOSE = b"robochoc sealed 1"
 _NUMBER_BYTES = 8
@@ -33,16 +33,18 @@ class Sealed(ChannelFilter):
         return number + cipher.encrypt(_PADDING + number, content, context)
 
     def open(self, sender: str, content: bytes, context: bytes) -> bytes:
-        """The content, if `sender` has sealed it for this robot and `context`. Raises `NotGenuine`."""
+        """The content, if `sender` has sealed it for this robot and `context`. Raises `NotGenuineError`."""
         number, encrypted = content[:_NUMBER_BYTES], content[_NUMBER_BYTES:]
         if len(number) < _NUMBER_BYTES:
-            raise NotGenuine("it is too short")
+            raise NotGenuineError("it is too short")
         try:
             return self._cipher(sender, self.ring.name).decrypt(_PADDING + number, encrypted, context)
-        except UnknownPeer as error:
-            raise NotGenuine(str(error)) from error
+        except UnknownPeerError as error:
+            raise NotGenuineError(str(error)) from error
         except InvalidTag as error:
-            raise NotGenuine("it was changed, or not sealed by this sender for this receiver and context") from error
+            raise NotGenuineError(
+                "it was changed, or not sealed by this sender for this receiver and context"
+            ) from error
 
     def _cipher(self, sender: str, receiver: str) -> ChaCha20Poly1305:
         """The cipher of this direction; made anew when the peer has a new card."""

@@ -65,7 +65,7 @@ class Session(ABC):
         """Search until there is a verdict, for at most `timeout` seconds or (about) so many `messages`.
 
         When a limit comes first the verdict is `unknown`. The metrics are those of this search. Robots begin only
-        when all are there, as the paper's master orders the start. Raises `RobotsLost` where robots can be lost.
+        when all are there, as the paper's master orders the start. Raises `RobotsLostError` where robots can be lost.
         """
 
     @abstractmethod

@@ -5,8 +5,8 @@ Ed25519 (RFC 8032) over sender, receiver, context and content. 64 bytes more a m
 
 from __future__ import annotations
 
-from robochoc.authority.keyring import UnknownPeer, bound
-from robochoc.communication.filters import ChannelFilter, NotGenuine
+from robochoc.authority.keyring import UnknownPeerError, bound
+from robochoc.communication.filters import ChannelFilter, NotGenuineError
 
 _PURPOSE = b"robochoc signed 1"
 _SIGNATURE_BYTES = 64
@@ -21,15 +21,15 @@ class Signed(ChannelFilter):
         return signature + content
 
     def open(self, sender: str, content: bytes, context: bytes) -> bytes:
-        """The content, if `sender` has signed it for this robot and `context`. Raises `NotGenuine`."""
+        """The content, if `sender` has signed it for this robot and `context`. Raises `NotGenuineError`."""
         signature, plain = content[:_SIGNATURE_BYTES], content[_SIGNATURE_BYTES:]
         part = _signed_part(sender, self.ring.name, plain, context)
         try:
             genuine = self.ring.is_signed(sender, signature, part)
-        except UnknownPeer as error:
-            raise NotGenuine(str(error)) from error
+        except UnknownPeerError as error:
+            raise NotGenuineError(str(error)) from error
         if not genuine:
-            raise NotGenuine("the signature is wrong")
+            raise NotGenuineError("the signature is wrong")
         return plain
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from itertools import product, zip_longest
 from math import prod
 
-from robochoc.model.expression import Expression, Undefined, evaluate, names
+from robochoc.model.expression import Expression, UndefinedValueError, evaluate, names
 from robochoc.model.problem import Assignment, Robot, Topic
 
 Cell = tuple[int, int]
@@ -110,7 +110,7 @@ def _value(expression: Expression | None, values: Assignment) -> int | None:
         return None
     try:
         return _bounded(evaluate(expression, values))
-    except (Undefined, KeyError):
+    except (UndefinedValueError, KeyError):
         return None
 
 

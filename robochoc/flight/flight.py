@@ -34,7 +34,7 @@ from robochoc.flight.quadrotor.spots import gaps, nearest_two
 from robochoc.flight.quadrotor.targets import Hazards, Targets, check_apart, waits
 from robochoc.flight.reports import Blocked, OutOfOrder, Report
 from robochoc.flight.routes.motion import Limits
-from robochoc.flight.routes.timetable import NoWay, TooClose, plan
+from robochoc.flight.routes.timetable import NoRouteError, TooCloseError, plan
 
 __all__ = ["Conditions", "Failure", "Flight", "Flown", "Happening", "Nearest", "Stage", "fly"]
 
@@ -213,18 +213,18 @@ class Flight:
                 limits=LIMITS,
                 ground=self._ground,
             )
-        except (TooClose, NoWay) as refused:
+        except (TooCloseError, NoRouteError) as refused:
             raise ValueError(self._told(refused, who)) from refused
         check_length(len(self.names), simulation.now_s + way.duration_s)
         course = Course(way, who, simulation.reference)
         unknown = {int(number): self._obstacles[number] for number in np.flatnonzero(~known)}
         return course, threats(course, unknown, keep)
 
-    def _told(self, refused: TooClose | NoWay, who: npt.NDArray[np.intp]) -> str:
+    def _told(self, refused: TooCloseError | NoRouteError, who: npt.NDArray[np.intp]) -> str:
         """The same with the names of those that it is about: the plan knows only their places in `who`."""
-        numbers = refused.drones if isinstance(refused, NoWay) else (refused.first, refused.second)
+        numbers = refused.drones if isinstance(refused, NoRouteError) else (refused.first, refused.second)
         named = [self.names[who[number]] if number < len(who) else "something that is in the way" for number in numbers]
-        if isinstance(refused, NoWay):
+        if isinstance(refused, NoRouteError):
             return f"there is no way for {', '.join(named)}: what is in the way encloses where they start or end"
         ends = "start" if refused.where == "start" else "are to end"
         return f"{' and '.join(named)} {ends} only {refused.distance_m:.3g} m from each other"

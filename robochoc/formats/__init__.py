@@ -1,7 +1,7 @@
 """Robots and teams as XML files: reading them with every mistake told, and writing them (FORMAT.md, Figure 2)."""
 
 from robochoc.formats.definitions import PREDEFINED
-from robochoc.formats.diagnostics import Diagnostic, InvalidInput, encodable, on_one_line
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable, on_one_line
 from robochoc.formats.folder import write_team
 from robochoc.formats.robot import read_robot, robot_in
 from robochoc.formats.team import find_teams, read_team, robot_names
@@ -12,7 +12,7 @@ from robochoc.system.files import write_atomically
 __all__ = [
     "PREDEFINED",
     "Diagnostic",
-    "InvalidInput",
+    "InvalidInputError",
     "check_event",
     "check_robot",
     "check_team",

@@ -13,7 +13,7 @@ from itertools import product
 
 from robochoc.formats.diagnostics import Diagnostic, shortened
 from robochoc.formats.members import Members
-from robochoc.model.expression import Apply, Constant, Expression, Name, Undefined, compiled
+from robochoc.model.expression import Apply, Constant, Expression, Name, UndefinedValueError, compiled
 from robochoc.model.problem import INFINITE, Constraint, Domain, Model, Relation, Robot
 
 MAX_COMPARED = 1_000_000
@@ -124,7 +124,7 @@ def _price(constraint: Constraint, variables: tuple[str, ...]) -> Callable[[tupl
     def price(values: tuple[int, ...]) -> float:
         try:
             return 0 if holds(values) else constraint.cost
-        except Undefined:
+        except UndefinedValueError:
             return constraint.cost
 
     return price

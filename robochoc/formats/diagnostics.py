@@ -29,7 +29,7 @@ class Diagnostic:
         return on_one_line(f"{place}: {self.message} ({self.hint})")
 
 
-class InvalidInput(Exception):  # noqa: N818 - the error is the input's
+class InvalidInputError(Exception):
     """An input that cannot be used. `diagnostics` holds every mistake found, ordered by file and line."""
 
     def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
@@ -55,10 +55,10 @@ class Report:
         self._found: list[Diagnostic] = []
 
     def add(self, line: int, message: str, hint: str) -> None:
-        """Note a mistake. Raises `InvalidInput` when there are so many that reading on is of no use."""
+        """Note a mistake. Raises `InvalidInputError` when there are so many that reading on is of no use."""
         if len(self._found) == MAX_PER_FILE:
             self._found.append(Diagnostic(self.file, line, "and more mistakes from here on", "mend those above first"))
-            raise InvalidInput(self._found)
+            raise InvalidInputError(self._found)
         self._found.append(Diagnostic(self.file, line, message, hint))
 
     @contextmanager
@@ -70,9 +70,9 @@ class Report:
             self.add(mistake.line or line, mistake.message, mistake.hint)
 
     def finish(self) -> None:
-        """Raise `InvalidInput` when anything was found."""
+        """Raise `InvalidInputError` when anything was found."""
         if self._found:
-            raise InvalidInput(self._found)
+            raise InvalidInputError(self._found)
 
 
 def suggestion(word: str, known: Collection[str], what: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from robochoc.formats.diagnostics import Diagnostic, InvalidInput
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError
 from robochoc.formats.robot import robot_in
 from robochoc.formats.validation import check_writable
 from robochoc.formats.writer import robot_xml
@@ -18,7 +18,7 @@ _SURELY_READ = 1024 * 1024
 def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
     """Write one XML file per robot into `folder`, which comes into being complete, or not at all.
 
-    Raises `InvalidInput` when the team is not valid, or says what robots' files cannot; when something is there
+    Raises `InvalidInputError` when the team is not valid, or says what robots' files cannot; when something is there
     already, unless `replace` is set and it is a team's folder (one that holds nothing but XML files). Raises `OSError`
     when the folder cannot be written.
     """
@@ -48,7 +48,7 @@ def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
 
 
 def _file(robot: Robot) -> bytes:
-    """The robot's file. Raises `InvalidInput` when no reader would take it: it may be too large."""
+    """The robot's file. Raises `InvalidInputError` when no reader would take it: it may be too large."""
     content = robot_xml(robot)
     if len(content) > _SURELY_READ:
         robot_in(content, robot.name)
@@ -68,5 +68,5 @@ def _may_replace(folder: Path, *, replace: bool) -> None:
         )
 
 
-def _refusal(folder: Path, message: str, hint: str) -> InvalidInput:
-    return InvalidInput([Diagnostic(str(folder), 0, message, hint)])
+def _refusal(folder: Path, message: str, hint: str) -> InvalidInputError:
+    return InvalidInputError([Diagnostic(str(folder), 0, message, hint)])

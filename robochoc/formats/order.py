@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from robochoc.formats.diagnostics import Diagnostic, InvalidInput, Report, shortened, suggestion
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, Report, shortened, suggestion
 from robochoc.model.problem import Team
 
 MAX_BYTES = 1024 * 1024
@@ -12,7 +12,7 @@ _MISSING_SHOWN = 10
 
 
 def read_order(path: Path, team: Team) -> tuple[str, ...]:
-    """The order in the file `path`, of all robots of `team`. Raises `InvalidInput` with every mistake."""
+    """The order in the file `path`, of all robots of `team`. Raises `InvalidInputError` with every mistake."""
     report = Report(str(path))
     lines = _text(path).splitlines()
     known = frozenset(team.order)
@@ -53,5 +53,5 @@ def _text(path: Path) -> str:
         raise _invalid(path, "is not UTF-8", "an order is a text file with a robot's name a line") from None
 
 
-def _invalid(path: Path, message: str, hint: str) -> InvalidInput:
-    return InvalidInput([Diagnostic(str(path), 0, message, hint)])
+def _invalid(path: Path, message: str, hint: str) -> InvalidInputError:
+    return InvalidInputError([Diagnostic(str(path), 0, message, hint)])

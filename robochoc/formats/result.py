@@ -8,7 +8,7 @@ from msgspec import UNSET, UnsetType
 from robochoc.model.outcome import Epoch, Metrics, Outcome, Place, Thoroughness, Verdict
 
 
-class BadResult(ValueError):  # noqa: N818 - named for what was found
+class ResultError(ValueError):
     """The text is no JSON result."""
 
 
@@ -151,15 +151,15 @@ def _epoch_of(form: _EpochForm) -> Epoch:
 
 
 def read_result(content: bytes) -> Outcome:
-    """The outcome that a JSON result tells of. Raises `BadResult`, saying what is wrong."""
+    """The outcome that a JSON result tells of. Raises `ResultError`, saying what is wrong."""
     try:
         form = msgspec.json.decode(content, type=_Form)
     except UnicodeDecodeError as error:
-        raise BadResult("it is not UTF-8") from error
+        raise ResultError("it is not UTF-8") from error
     except RecursionError as error:
-        raise BadResult("it is nested too deep") from error
+        raise ResultError("it is nested too deep") from error
     except msgspec.MsgspecError as error:
-        raise BadResult(str(error)) from error
+        raise ResultError(str(error)) from error
     spent = form.metrics
     messages = spent.messages_by_type or {"messages": spent.messages}
     counts = spent.bytes, spent.ncccs, spent.checks, spent.wall_s, spent.compile_s, spent.memory, spent.simulated_s

@@ -11,7 +11,7 @@ from lxml import etree
 
 from robochoc.formats.constraints import Context, read_private, read_shared
 from robochoc.formats.definitions import check_semantics, refuse_predefined
-from robochoc.formats.diagnostics import Diagnostic, InvalidInput, MistakeError, Report, shortened, suggestion
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, Report, shortened, suggestion
 from robochoc.formats.extension import check_count, read_domain, read_relation
 from robochoc.formats.intension import read_predicate, read_topic
 from robochoc.formats.members import Member
@@ -46,13 +46,13 @@ class RobotFile(Member):
 def read_robot(path: Path | str) -> Robot:
     """The robot in the XML file `path`, named after the file's stem.
 
-    Its neighbours are not looked at: `read_team` does that. Raises `InvalidInput` with all mistakes of the file.
+    Its neighbours are not looked at: `read_team` does that. Raises `InvalidInputError` with all mistakes of the file.
     """
     return read_robot_file(Path(path)).robot
 
 
 def read_robot_file(path: Path) -> RobotFile:
-    """The robot in the XML file `path`, with what the team has to check. Raises `InvalidInput`."""
+    """The robot in the XML file `path`, with what the team has to check. Raises `InvalidInputError`."""
     _check_name(path.stem, path)
     return _Reader(path, read_xml(path, "instance")).whole()
 
@@ -60,7 +60,7 @@ def read_robot_file(path: Path) -> RobotFile:
 def robot_in(content: bytes, name: str) -> Robot:
     """The robot called `name`, whose XML file has this `content`. Nobody need have written such a file.
 
-    The same limits hold as for a file. Raises `InvalidInput`, which tells of the file `NAME.xml`.
+    The same limits hold as for a file. Raises `InvalidInputError`, which tells of the file `NAME.xml`.
     """
     path = Path(f"{name}.xml")
     _check_name(name, path)
@@ -68,11 +68,11 @@ def robot_in(content: bytes, name: str) -> Robot:
 
 
 def _check_name(name: str, path: Path) -> None:
-    """Raise `InvalidInput` unless `name`, which the file at `path` gives its robot, can be one."""
+    """Raise `InvalidInputError` unless `name`, which the file at `path` gives its robot, can be one."""
     try:
         check_robot_name(name, "rename the file")
     except MistakeError as mistake:
-        raise InvalidInput([Diagnostic(str(path), 0, mistake.message, mistake.hint)]) from None
+        raise InvalidInputError([Diagnostic(str(path), 0, mistake.message, mistake.hint)]) from None
 
 
 class _Reader:

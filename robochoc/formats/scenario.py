@@ -10,11 +10,11 @@ from pathlib import Path
 from lxml import etree
 
 from robochoc.formats.constraints import Context, read_shared
-from robochoc.formats.diagnostics import Diagnostic, InvalidInput, MistakeError, Report, shortened
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, Report, shortened
 from robochoc.formats.robot import RobotFile, read_robot_file
 from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
 from robochoc.formats.xml import attribute, line, read_xml
-from robochoc.model.change import BadChange, changed
+from robochoc.model.change import ChangeError, changed
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
@@ -42,7 +42,7 @@ def read_scenario(folder: Path, team: Team | None, files: Mapping[str, RobotFile
     """The events of the scenario in `folder`, each of which the team as it stands then can take.
 
     `team` is None when the robots' `files` have mistakes: then only the scenario's own mistakes are looked for. Files
-    of added robots lie in the folder or below. Raises `InvalidInput`.
+    of added robots lie in the folder or below. Raises `InvalidInputError`.
     """
     return _Reader(folder, team, files).events()
 
@@ -69,14 +69,14 @@ class _Reader:
         """Robots, variables and constraints that could not be added."""
 
     def events(self) -> tuple[Event, ...]:
-        """All events. Raises `InvalidInput`."""
+        """All events. Raises `InvalidInputError`."""
         try:
             events = tuple([self._event(one) for one in read_xml(self._path, "scenario").iterchildren("event")])
             self._report.finish()
-        except InvalidInput as invalid:
+        except InvalidInputError as invalid:
             self._elsewhere += invalid.diagnostics
         if self._elsewhere:
-            raise InvalidInput(dict.fromkeys(self._elsewhere))
+            raise InvalidInputError(dict.fromkeys(self._elsewhere))
         return events
 
     def _event(self, element: etree._Element) -> Event:
@@ -124,7 +124,7 @@ class _Reader:
             file = read_robot_file(self._folder / name)
             if not there_already:
                 _refuse_parts(file.robot)
-        except InvalidInput as invalid:
+        except InvalidInputError as invalid:
             self._elsewhere += invalid.diagnostics
             self._unread = True
             if not there_already:
@@ -155,7 +155,7 @@ class _Reader:
         while self._team is not None:
             try:
                 self._team = changed(self._team, [change])
-            except BadChange as bad:
+            except ChangeError as bad:
                 if isinstance(change, AddAgent) and bad.line:
                     self._blame(change.robot, bad, place)
                     change = AddAgent(_without_line(change.robot, bad.line))
@@ -165,13 +165,13 @@ class _Reader:
                     raise MistakeError(bad.message, bad.hint) from None
             return
 
-    def _blame(self, robot: Robot, bad: BadChange, place: int) -> None:
+    def _blame(self, robot: Robot, bad: ChangeError, place: int) -> None:
         """Tell a mistake of an added robot's file; the robot joins without what is wrong with it."""
         if not self._excused(bad):
             message = f"{bad.message}, when {SCENARIO}:{place} adds this robot"
             self._elsewhere.append(Diagnostic(robot.file, bad.line, message, bad.hint))
 
-    def _excused(self, bad: BadChange) -> bool:
+    def _excused(self, bad: ChangeError) -> bool:
         """Whether `bad` may only follow from a mistake that was told already."""
         return bool(bad.missing) and (self._unread or bad.missing in self._missed)
 
@@ -190,7 +190,7 @@ def _change(element: etree._Element) -> Change:
 
 
 def _refuse_parts(robot: Robot) -> None:
-    """Raise `InvalidInput` where an added robot brings its part of partially known constraints."""
+    """Raise `InvalidInputError` where an added robot brings its part of partially known constraints."""
     report = Report(robot.file)
     for constraint in robot.shared:
         with report.at(constraint.line):

@@ -80,7 +80,7 @@ def schema_for(root: str) -> etree.XMLSchema:
 
 
 def check_schema(tree: etree._Element, file: str, schema: etree.XMLSchema) -> None:
-    """Raise `InvalidInput` unless `tree`, read from `file`, is valid."""
+    """Raise `InvalidInputError` unless `tree`, read from `file`, is valid."""
     if schema.validate(tree):
         return
     import difflib  # noqa: PLC0415 - start-up: only mistakes need it

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from robochoc.formats.diagnostics import Diagnostic, InvalidInput, encodable
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
 from robochoc.formats.members import Members
 from robochoc.formats.robot import RobotFile, read_robot_file
 from robochoc.formats.scenario import SCENARIO, has_scenario, read_scenario
@@ -22,7 +22,7 @@ def find_teams(path: Path | str) -> list[Path]:
     """The folders of teams at `path` or below, in natural order.
 
     A folder with XML files in it is a team, and nothing is looked for below it; other folders are searched, hidden
-    ones and symbolic links left out. Raises `InvalidInput` when there is no team, or a folder cannot be read.
+    ones and symbolic links left out. Raises `InvalidInputError` when there is no team, or a folder cannot be read.
     """
     teams = list(_teams(Path(path)))
     if not teams:
@@ -33,7 +33,7 @@ def find_teams(path: Path | str) -> list[Path]:
 def read_team(folder: Path | str) -> Team:
     """The team whose robots are the XML files in `folder`, in priority order.
 
-    Raises `InvalidInput` with the mistakes of all its files, and of all pairs of files (FORMAT.md, "The team").
+    Raises `InvalidInputError` with the mistakes of all its files, and of all pairs of files (FORMAT.md, "The team").
     """
     folder = Path(folder)
     paths = [folder / name for name in _xml_files(_listing(folder)) if name != SCENARIO]
@@ -44,7 +44,7 @@ def read_team(folder: Path | str) -> Team:
     for path in paths:
         try:
             files[path.stem] = read_robot_file(path)
-        except InvalidInput as invalid:
+        except InvalidInputError as invalid:
             found.extend(invalid.diagnostics)
     members = Members(files, frozenset(path.stem for path in paths) - files.keys())
     found.extend(between(members))
@@ -53,10 +53,10 @@ def read_team(folder: Path | str) -> Team:
         try:
             scenario = read_scenario(folder, team, files)
             team = team and replace(team, scenario=scenario)
-        except InvalidInput as invalid:
+        except InvalidInputError as invalid:
             found.extend(invalid.diagnostics)
     if team is None or found:
-        raise InvalidInput(found)
+        raise InvalidInputError(found)
     note_valid(team)
     return team
 
@@ -65,7 +65,7 @@ def robot_names(folder: Path | str) -> tuple[str, ...]:
     """The names of the robots whose files are in `folder`, in natural order, from the files' names alone.
 
     No file is opened: whoever only has to know who takes part need not see what each robot has to solve. Raises
-    `InvalidInput` when the folder cannot be read, or has no robot.
+    `InvalidInputError` when the folder cannot be read, or has no robot.
     """
     names = tuple(Path(name).stem for name in _xml_files(_listing(Path(folder))) if name != SCENARIO)
     if not names:
@@ -108,7 +108,7 @@ def _xml_files(entries: Iterable[os.DirEntry[str]]) -> Iterator[str]:
 
 
 def _listing(folder: Path) -> list[os.DirEntry[str]]:
-    """What is in `folder`, in natural order. Raises `InvalidInput`."""
+    """What is in `folder`, in natural order. Raises `InvalidInputError`."""
     try:
         with os.scandir(folder) as entries:
             return sorted(entries, key=lambda entry: natural(entry.name))
@@ -122,5 +122,5 @@ def _listing(folder: Path) -> list[os.DirEntry[str]]:
         raise _invalid(folder, f"cannot be read: {reason}", "check the path and its permissions") from None
 
 
-def _invalid(path: Path | str, message: str, hint: str) -> InvalidInput:
-    return InvalidInput([Diagnostic(str(path), 0, message, hint)])
+def _invalid(path: Path | str, message: str, hint: str) -> InvalidInputError:
+    return InvalidInputError([Diagnostic(str(path), 0, message, hint)])

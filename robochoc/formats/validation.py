@@ -14,7 +14,7 @@ from itertools import islice
 from typing import TypeVar
 
 from robochoc.formats.copies import differing_copies
-from robochoc.formats.diagnostics import Diagnostic, InvalidInput, MistakeError, shortened
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, shortened
 from robochoc.formats.members import Member, Members
 from robochoc.formats.names import check_integer
 from robochoc.formats.neighbours import (
@@ -30,7 +30,7 @@ from robochoc.formats.places import ObjectPlaces, Place
 from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
 from robochoc.formats.scopes import misplaced, misplaced_parts, untold
 from robochoc.formats.shapes import AS_BUILT, ShapeError, check_shape
-from robochoc.model.change import BadChange, changed
+from robochoc.model.change import ChangeError, changed
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, Event, RemoveValue, Robot, Team
 
@@ -45,7 +45,7 @@ _valid: dict[int, weakref.ref[Team]] = {}
 
 
 def check_team(team: Team) -> None:
-    """Raise `InvalidInput` with every mistake of `team`, unless it is valid (FORMAT.md).
+    """Raise `InvalidInputError` with every mistake of `team`, unless it is valid (FORMAT.md).
 
     The messages are those for files; where a file's have its name and a line, these have the robot, and what of it is
     wrong. A team that was found valid before is not looked at again.
@@ -54,12 +54,12 @@ def check_team(team: Team) -> None:
         return
     found = _of_the_whole(team) or _mistakes(team) or list(_of_the_scenario(team))
     if found:
-        raise InvalidInput(dict.fromkeys(found))
+        raise InvalidInputError(dict.fromkeys(found))
     note_valid(team)
 
 
 def check_writable(team: Team) -> None:
-    """Raise `InvalidInput` unless `team` is valid, and robots' files can say all of it.
+    """Raise `InvalidInputError` unless `team` is valid, and robots' files can say all of it.
 
     They have no order but the links', no scenario, and do not say what changes have left of a variable's neighbours.
     """
@@ -78,21 +78,21 @@ def check_writable(team: Team) -> None:
         place = Place(f"team {shortened(team.name)}")
         found.append(place.mistake("its scenario is no robot's", "write it as scenario.xml, and the team without it"))
     if found:
-        raise InvalidInput(dict.fromkeys(found))
+        raise InvalidInputError(dict.fromkeys(found))
     by_links = priority_order({robot.name: [parent.name for parent in robot.parents] for robot in team.robots})
     if by_links != team.order:
         check_team(replace(team, robots=tuple(team[name] for name in by_links)))
 
 
 def check_robot(robot: Robot) -> None:
-    """Raise `InvalidInput` with every mistake that `robot` has by itself; its neighbours are not there to be asked."""
+    """Raise `InvalidInputError` with every mistake of `robot` that can be found without its neighbours."""
     found = Objects().mistakes(robot)
     if found:
-        raise InvalidInput(dict.fromkeys(found))
+        raise InvalidInputError(dict.fromkeys(found))
 
 
 def check_event(team: Team, event: Event) -> None:
-    """Raise `InvalidInput` when `event`, which happens to `team`, brings what no team could have.
+    """Raise `InvalidInputError` when `event`, which happens to `team`, brings what no team could have.
 
     What this team cannot take is no mistake here: it may have lost the robots that somebody has counted on.
     """
@@ -101,7 +101,7 @@ def check_event(team: Team, event: Event) -> None:
         mistake for change in event.changes for mistake in _of_the_change(_robots(team, event), change, place)
     ]
     if found:
-        raise InvalidInput(dict.fromkeys(found))
+        raise InvalidInputError(dict.fromkeys(found))
 
 
 def held_to_rules(field: Callable[[Team, _Ended, float | None], Event | None]) -> Callable[..., Event | None]:
@@ -211,7 +211,7 @@ def _of_the_scenario(team: Team) -> Iterator[Diagnostic]:
             if not mistakes:
                 try:
                     now = changed(now, [change])
-                except BadChange as bad:
+                except ChangeError as bad:
                     found.append(place.mistake(bad.message, bad.hint))
         if not found and not now.robots:
             found.append(place.mistake(*NOBODY_LEFT))

@@ -16,7 +16,8 @@ def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
 
     Variables get names that XCSP3 allows; the attribute `note` says whose variable each is. With costs it is a COP:
     what soft constraints charge are variables too, and their sum is to be minimised. Whoever exports many teams may
-    lend a `solver`. Raises `Unsupported`, and `SolverLost` when pycsp3, which writes it in a process of its own, fails.
+    lend a `solver`. Raises `UnsupportedError`, and `SolverLostError` when pycsp3, which writes it in a process of its
+    own, fails.
     """
     network, costs = merged(team)
     names = list(team.variables)

@@ -14,7 +14,7 @@ from typing import cast
 
 from lxml import etree
 
-from robochoc.formats.diagnostics import MAX_PER_FILE, Diagnostic, InvalidInput
+from robochoc.formats.diagnostics import MAX_PER_FILE, Diagnostic, InvalidInputError
 from robochoc.formats.schema import check_schema, entries, schema_for
 
 MAX_BYTES = 16 * 1024 * 1024
@@ -45,7 +45,7 @@ _HINTS = {
 def read_xml(path: Path, root: str) -> etree._Element:
     """The root element of the XML file `path`, which must be a `root` and valid by its schema.
 
-    Raises `InvalidInput` with every mistake that the failing layer shows.
+    Raises `InvalidInputError` with every mistake that the failing layer shows.
     """
     try:
         content = _bytes(path)
@@ -117,7 +117,7 @@ def _with_few_mistakes(tree: etree._Element, content: bytes, schema: etree.XMLSc
 
 
 def _check_text(content: bytes, path: Path) -> None:
-    """Raise `InvalidInput` unless `content` is UTF-8, not empty, and within the limit."""
+    """Raise `InvalidInputError` unless `content` is UTF-8, not empty, and within the limit."""
     if len(content) > MAX_BYTES:
         raise _invalid(path, 0, f"is larger than {MAX_BYTES // 2**20} MiB", "a robot's file is a few kB; split it")
     if not content.strip():
@@ -139,7 +139,7 @@ def _bytes(path: Path) -> bytes:
         return file.read(MAX_BYTES + 1)
 
 
-def _malformed(path: Path, error: etree.XMLSyntaxError, parser: etree.XMLParser) -> InvalidInput:
+def _malformed(path: Path, error: etree.XMLSyntaxError, parser: etree.XMLParser) -> InvalidInputError:
     """Only the first of the parser's messages (the error's own log has older ones too): others follow from it."""
     for first in entries(parser.error_log):
         what = re.split(r", (?:use|try) XML_PARSE_HUGE", first.message.strip())[0]
@@ -149,5 +149,5 @@ def _malformed(path: Path, error: etree.XMLSyntaxError, parser: etree.XMLParser)
     return _invalid(path, 0, f"is not well-formed XML: {error}", "mend the XML")
 
 
-def _invalid(path: Path, number: int, message: str, hint: str) -> InvalidInput:
-    return InvalidInput([Diagnostic(str(path), number, message, hint)])
+def _invalid(path: Path, number: int, message: str, hint: str) -> InvalidInputError:
+    return InvalidInputError([Diagnostic(str(path), number, message, hint)])

@@ -9,7 +9,7 @@ import struct
 import zlib
 from hashlib import blake2b
 
-from robochoc.journal.entries import BadJournal
+from robochoc.journal.entries import JournalError
 
 MAGIC = b"\x89RJL\r\n\x1a\n"
 """The first bytes of a journal; transfers that take it for text destroy them, as PNG's (RFC 2083)."""
@@ -28,11 +28,11 @@ _LARGEST_PACKED = LARGEST_BLOCK + LARGEST_BLOCK // 1000 + 64
 PREAMBLE = _PREAMBLE.pack(MAGIC, FORMAT, 0)
 
 
-class Damaged(Exception):  # noqa: N818 - named for what was found
+class JournalDamagedError(Exception):
     """From here on nothing can be read; says where, and why."""
 
 
-class Truncated(Damaged):
+class JournalTruncatedError(JournalDamagedError):
     """Only the end is missing: all that is there is as it was written."""
 
 
@@ -81,7 +81,8 @@ class Unframer:
     def next(self) -> bytes | None:
         """What the next block holds; None: it is not whole yet.
 
-        Raises `BadJournal` where it is no journal of this version, `Damaged` where a block is not as it was written.
+        Raises `JournalError` where it is no journal of this version, `JournalDamagedError` where a block is not as it
+        was written.
         """
         if not self._before and not self._begin():
             return None
@@ -90,13 +91,13 @@ class Unframer:
             return None
         length, size, digest = _FRAME.unpack_from(buffer)
         if size > LARGEST_BLOCK or length > _LARGEST_PACKED:
-            raise Damaged(f"{self.place}: a block claims to have {max(size, length):,} bytes")
+            raise JournalDamagedError(f"{self.place}: a block claims to have {max(size, length):,} bytes")
         end = _FRAME.size + length
         if len(buffer) < end:
             return None
         packed = bytes(memoryview(buffer)[_FRAME.size : end])
         if _digest(self._before, packed, size) != digest:
-            raise Damaged(f"{self.place}: the checksum of a block is wrong")
+            raise JournalDamagedError(f"{self.place}: the checksum of a block is wrong")
         content = self._unpacked(packed, size)
         del buffer[:end]
         self._before = digest
@@ -107,13 +108,13 @@ class Unframer:
         """Whether the preamble is there."""
         if len(self._buffer) < _PREAMBLE.size:
             if not MAGIC.startswith(self._buffer[: len(MAGIC)]):
-                raise BadJournal("it is no journal")
+                raise JournalError("it is no journal")
             return False
         magic, version, _ = _PREAMBLE.unpack_from(self._buffer)
         if magic != MAGIC:
-            raise BadJournal("it is no journal")
+            raise JournalError("it is no journal")
         if version != FORMAT:
-            raise BadJournal(f"it is a journal of format {version}, and this robochoc reads format {FORMAT}")
+            raise JournalError(f"it is a journal of format {version}, and this robochoc reads format {FORMAT}")
         self._before = blake2b(self._buffer[: _PREAMBLE.size], digest_size=_DIGEST).digest()
         self._place = _PREAMBLE.size
         del self._buffer[: _PREAMBLE.size]
@@ -124,7 +125,7 @@ class Unframer:
         try:
             content = unpacker.decompress(packed, size + 1)
         except zlib.error as error:
-            raise Damaged(f"{self.place}: a block cannot be unpacked: {error}") from error
+            raise JournalDamagedError(f"{self.place}: a block cannot be unpacked: {error}") from error
         if len(content) != size or not unpacker.eof or unpacker.unused_data:
-            raise Damaged(f"{self.place}: a block has another length than it claims")
+            raise JournalDamagedError(f"{self.place}: a block has another length than it claims")
         return content

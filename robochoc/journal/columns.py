@@ -29,7 +29,7 @@ _LARGEST = 2**63
 _Index = Annotated[int, Meta(ge=0)]
 
 
-class BadBlock(ValueError):  # noqa: N818 - named for what was found
+class BlockError(ValueError):
     """What a block holds is no entries."""
 
 
@@ -189,13 +189,13 @@ _decode = msgspec.msgpack.Decoder(_Block).decode
 
 
 def entries_of(content: bytes) -> list[Line]:
-    """The entries of a block that holds `content`. Raises `BadBlock` where that is anything but what is written."""
+    """The entries of a block that holds `content`. Raises `BlockError` where that is anything but what is written."""
     try:
         block = _decode(content)
         _json(block.values)  # msgpack can hold what no message can: keys that are no text, extensions
         return list(_Entries(block))
     except (msgspec.MsgspecError, TypeError, ValueError, OverflowError, RecursionError, LookupError) as error:
-        raise BadBlock(str(error)) from error
+        raise BlockError(str(error)) from error
 
 
 class _Entries:

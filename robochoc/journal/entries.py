@@ -15,7 +15,7 @@ READ = (STAMPED_LATE, VERSION)
 """Versions that are read."""
 
 
-class BadJournal(ValueError):  # noqa: N818 - named for what was found
+class JournalError(ValueError):
     """The file is no journal, or one of another version, or nothing of it can be read."""
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import msgspec
 
-from robochoc.formats import InvalidInput, robot_in, robot_xml
+from robochoc.formats import InvalidInputError, robot_in, robot_xml
 from robochoc.formats.names import is_name
 from robochoc.journal.events import Given
 from robochoc.model.problem import INFINITE, Constraint, Domain, Relation, Robot, Team, Variable
@@ -25,7 +25,7 @@ _STAND_IN = (range(1),)
 """What is written for an empty domain, as a file has none."""
 
 
-class BadGiven(ValueError):  # noqa: N818 - named for what was found
+class GivenProblemError(ValueError):
     """What robots are said to have been given is no team."""
 
 
@@ -87,17 +87,17 @@ class TeamReader:
         self._robots: dict[str, Robot] = {}
 
     def team(self, given: Given) -> Team:
-        """The team, in its order. Raises `BadGiven`."""
+        """The team, in its order. Raises `GivenProblemError`."""
         if given.why:
-            raise BadGiven(f"what the robots were given could not be written: {given.why}")
+            raise GivenProblemError(f"what the robots were given could not be written: {given.why}")
         for name, content in given.robots.items():
             try:
                 self._robots[name] = robot_in(content.encode(), name)
-            except (InvalidInput, UnicodeEncodeError) as invalid:
-                raise BadGiven(f"what {name} was given cannot be read: {invalid}") from invalid
+            except (InvalidInputError, UnicodeEncodeError) as invalid:
+                raise GivenProblemError(f"what {name} was given cannot be read: {invalid}") from invalid
         missing = [name for name in given.order if name not in self._robots]
         if missing:
-            raise BadGiven(f"nothing says what {missing[0]} was given")
+            raise GivenProblemError(f"nothing says what {missing[0]} was given")
         empty = set(given.empty)
         robots = tuple(_as_given(self._robots[name], given.shown.get(name, ()), empty) for name in given.order)
         team = Team(self._name, robots)
@@ -166,14 +166,14 @@ def _check_costs(constraint: Constraint) -> None:
 
 
 def _check(team: Team) -> None:
-    """Raise `BadGiven` where files that are right by themselves do not go together: nothing else looks at it again."""
+    """Raise `GivenProblemError` where files that are right by themselves do not go together."""
     if len(team.order) != len(set(team.order)):
-        raise BadGiven("a robot stands twice in the order")
+        raise GivenProblemError("a robot stands twice in the order")
     if len(team.owner) != sum(len(robot.variables) for robot in team.robots):
-        raise BadGiven("a variable belongs to two robots")
+        raise GivenProblemError("a variable belongs to two robots")
     for robot in team.robots:
         names = [*(one.name for one in robot.parents), *(one.name for one in robot.children)]
         names += [name for constraint in _constraints(robot) for name in constraint.variables]
         strangers = [name for name in names if name not in team and name not in team.owner]
         if strangers:
-            raise BadGiven(f"{robot.name} was given something on {strangers[0]}, which is not in the team")
+            raise GivenProblemError(f"{robot.name} was given something on {strangers[0]}, which is not in the team")

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
-from robochoc.journal.entries import VERSION, BadJournal, Ended, Header, Line
+from robochoc.journal.entries import VERSION, Ended, Header, JournalError, Line
 from robochoc.journal.events import AnyEvent, Began, Sent, Settled
 from robochoc.journal.reader import Follower, Journal, in_order, is_journal, lines_of, read_journal
 from robochoc.journal.recorder import JournalFile, Recorder, Sink, improvements
@@ -18,11 +18,11 @@ from robochoc.model.outcome import Metrics
 
 __all__ = [
     "VERSION",
-    "BadJournal",
     "Ended",
     "Follower",
     "Header",
     "Journal",
+    "JournalError",
     "JournalFile",
     "Line",
     "Recorder",

@@ -15,9 +15,9 @@ from typing import BinaryIO, Protocol, cast
 
 import msgspec
 
-from robochoc.journal.blocks import MAGIC, Damaged, Truncated, Unframer
-from robochoc.journal.columns import BadBlock, entries_of
-from robochoc.journal.entries import READ, BadJournal, Ended, Header, Line
+from robochoc.journal.blocks import MAGIC, JournalDamagedError, JournalTruncatedError, Unframer
+from robochoc.journal.columns import BlockError, entries_of
+from robochoc.journal.entries import READ, Ended, Header, JournalError, Line
 from robochoc.journal.events import AnyEvent, Began
 from robochoc.model.outcome import Outcome
 
@@ -54,7 +54,7 @@ def read_journal(content: bytes) -> Journal:
 
     Within a run, from one `Began` to the next, events are put in the order of their times; those of equal times stay
     in the order in which they came, which is each robot's own (`Improved` were written last, and so come after all of
-    their time). Raises `BadJournal` where not even the header can be read.
+    their time). Raises `JournalError` where not even the header can be read.
     """
     with _without_cycles():
         follower = Follower(io.BytesIO(content))
@@ -71,7 +71,7 @@ def read_journal(content: bytes) -> Journal:
             lines += rest
         first, last = lines[0], lines[-1]
         if not isinstance(first, Header):  # the follower has seen to it
-            raise BadJournal("it has no header")
+            raise JournalError("it has no header")
         outcome = last.outcome if isinstance(last, Ended) else None
         events = cast("list[AnyEvent]", lines[1:-1] if outcome else lines[1:])  # so has it here
         return Journal(first, tuple(in_order(events)), outcome, damage, truncated)
@@ -118,7 +118,7 @@ class Follower:
     def read(self, most: int | None = None) -> list[Line]:
         """The entries that have become whole since the last call, in the file's order; the first is the `Header`.
 
-        Stops after the block with which there are more than `most`. Raises `BadJournal` when it turns out that the
+        Stops after the block with which there are more than `most`. Raises `JournalError` when it turns out that the
         file is no journal.
         """
         lines: list[Line] = []
@@ -130,17 +130,17 @@ class Follower:
         return lines
 
     def finish(self) -> tuple[list[Line], str | None]:
-        """No more will be written: what is left, and the damage, if any. Raises `BadJournal`."""
+        """No more will be written: what is left, and the damage, if any. Raises `JournalError`."""
         if self._form is None:
-            raise BadJournal("it is empty")
+            raise JournalError("it is empty")
         lines: list[Line] = []
         if self.damage is None:
             try:
                 lines += self._fitting(self._form.rest())
-            except Damaged as damaged:
+            except JournalDamagedError as damaged:
                 self._break_off(damaged)
         if not self._began:
-            raise BadJournal("it ends before its header")
+            raise JournalError("it ends before its header")
         return lines, self.damage
 
     @property
@@ -154,7 +154,7 @@ class Follower:
             try:
                 if self._form and (lines := self._form.next()) is not None:
                     return self._fitting(lines)
-            except Damaged as damaged:
+            except JournalDamagedError as damaged:
                 self._break_off(damaged)
                 return None
             piece = self._source()
@@ -164,31 +164,34 @@ class Follower:
                 self._form = _Blocks() if piece[:1] == MAGIC[:1] else _Text()
             self._form.feed(piece)
 
-    def _break_off(self, damaged: Damaged) -> None:
+    def _break_off(self, damaged: JournalDamagedError) -> None:
         if not self._began:
-            raise BadJournal(str(damaged)) from damaged
+            raise JournalError(str(damaged)) from damaged
         self.damage = f"{self._place}: more follows the end" if self._over else str(damaged)
-        self.truncated = isinstance(damaged, Truncated) and not self._over
+        self.truncated = isinstance(damaged, JournalTruncatedError) and not self._over
 
     @property
     def _place(self) -> str:
         return self._form.place if self._form else ""
 
     def _fitting(self, lines: Sequence[Line]) -> Sequence[Line]:
-        """`lines`, if they may follow those before: a header, events, an end. Raises `BadJournal`, `Damaged`."""
+        """`lines`, if they may follow those before: a header, events, an end.
+
+        Raises `JournalError`, `JournalDamagedError`.
+        """
         if self._began and not self._over and {*map(type, lines)}.isdisjoint((Header, Ended)):
             return lines  # nearly always, and there may be millions
         began, over = self._began, self._over
         for line in lines:
             if over:
-                raise Damaged(f"{self._place}: more follows the end")
+                raise JournalDamagedError(f"{self._place}: more follows the end")
             if isinstance(line, Header) == began:
                 if began:
-                    raise Damaged(f"{self._place}: a second header")
-                raise BadJournal(f"{self._place}: expected the header of a journal")
+                    raise JournalDamagedError(f"{self._place}: a second header")
+                raise JournalError(f"{self._place}: expected the header of a journal")
             if isinstance(line, Header) and line.version not in READ:
                 known = " and ".join(map(str, READ))
-                raise BadJournal(f"its entries are of version {line.version}, and this robochoc reads {known}")
+                raise JournalError(f"its entries are of version {line.version}, and this robochoc reads {known}")
             began, over = True, isinstance(line, Ended)
         self._began, self._over = began, over
         return lines
@@ -219,10 +222,10 @@ class _Form(Protocol):
         """Here are the next bytes."""
 
     def next(self) -> Sequence[Line] | None:
-        """The next entries; None: they are not whole yet. Raises `BadJournal`, `Damaged`."""
+        """The next entries; None: they are not whole yet. Raises `JournalError`, `JournalDamagedError`."""
 
     def rest(self) -> Sequence[Line]:
-        """The entries that are whole if nothing follows. Raises `BadJournal`, `Damaged`."""
+        """The entries that are whole if nothing follows. Raises `JournalError`, `JournalDamagedError`."""
 
     @property
     def place(self) -> str:
@@ -244,12 +247,12 @@ class _Blocks:
             return None
         try:
             return entries_of(content)
-        except BadBlock as bad:
-            raise Damaged(f"{self.place}: a block holds no entries: {bad}") from bad
+        except BlockError as bad:
+            raise JournalDamagedError(f"{self.place}: a block holds no entries: {bad}") from bad
 
     def rest(self) -> Sequence[Line]:
         if self._unframer.rest:
-            raise Truncated(self._unframer.rest)
+            raise JournalTruncatedError(self._unframer.rest)
         return ()
 
 
@@ -273,7 +276,7 @@ class _Text:
         if end < 0:
             self._searched = len(self._buffer)
             if self._searched > LONGEST_LINE:
-                raise Damaged(f"line {self._lines + 1}: it is longer than {LONGEST_LINE:,} bytes")
+                raise JournalDamagedError(f"line {self._lines + 1}: it is longer than {LONGEST_LINE:,} bytes")
             return None
         line = self._buffer[:end]
         del self._buffer[: end + 1]
@@ -283,19 +286,19 @@ class _Text:
     def rest(self) -> Sequence[Line]:
         try:
             return self._decoded(self._buffer) if self._buffer else ()
-        except Damaged as cut:
-            raise Truncated(str(cut)) from cut
+        except JournalDamagedError as cut:
+            raise JournalTruncatedError(str(cut)) from cut
 
     def _decoded(self, line: bytearray) -> Sequence[Line]:
         self._lines += 1
         try:
             entry = self._decode(line)
         except UnicodeDecodeError as error:
-            raise Damaged(f"{self.place}: it is not UTF-8") from error
+            raise JournalDamagedError(f"{self.place}: it is not UTF-8") from error
         except (msgspec.MsgspecError, RecursionError) as error:
-            raise Damaged(f"{self.place}: {error}") from error
+            raise JournalDamagedError(f"{self.place}: {error}") from error
         if not isfinite(entry.t):
-            raise Damaged(f"{self.place}: its time is no number")
+            raise JournalDamagedError(f"{self.place}: its time is no number")
         return (entry,)
 
 

@@ -18,7 +18,7 @@ from robochoc.journal.blocks import BEGINNING, LARGEST_BLOCK, PREAMBLE, framed
 from robochoc.journal.columns import columns_of
 from robochoc.journal.entries import Ended, Header, Line
 from robochoc.journal.events import AnyEvent, Began, Decided, Given, Heard, Improved, Refused, Sent, actor
-from robochoc.journal.given import BadGiven, TeamReader
+from robochoc.journal.given import GivenProblemError, TeamReader
 from robochoc.model.outcome import Outcome
 from robochoc.model.priorities import natural
 from robochoc.model.problem import INFINITE
@@ -261,7 +261,7 @@ def _interfaces(reader: TeamReader, given: Given) -> dict[str, tuple[str, ...]]:
     """Return the variables that the robots in `given` show; of none, if it cannot be read."""
     try:
         return {robot.name: robot.interface for robot in reader.team(given).robots}
-    except BadGiven:
+    except GivenProblemError:
         return {}
 
 

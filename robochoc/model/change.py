@@ -32,7 +32,7 @@ LONGEST = 60
 """So many characters of a name, or of a list, stand in a message."""
 
 
-class BadChange(ValueError):  # noqa: N818 - named for what was asked
+class ChangeError(ValueError):
     """A change that the team as it stands cannot take: what is wrong, and what was expected.
 
     `missing` is the name that nobody has, if that is what is wrong. `line` is where an added robot's file says what
@@ -48,7 +48,7 @@ class BadChange(ValueError):  # noqa: N818 - named for what was asked
 
 
 def changed(team: Team, changes: Iterable[Change]) -> Team:
-    """`team` after `changes`, one after the other. Raises `BadChange`."""
+    """`team` after `changes`, one after the other. Raises `ChangeError`."""
     for change in changes:
         match change:
             case RemoveAgent(name):
@@ -83,7 +83,7 @@ def possible(team: Team, changes: Iterable[Change]) -> tuple[Team, list[Change]]
     """`team` after those of `changes` that it can take, one after the other, and which these are."""
     taken = []
     for change in changes:
-        with suppress(BadChange):
+        with suppress(ChangeError):
             team = changed(team, [change])
             taken.append(change)
     return team, taken
@@ -158,7 +158,7 @@ def _still_showing(team: Team) -> Team:
 
 
 def rejoined(team: Team, robot: Robot) -> Team:
-    """`team` with `robot` in the place of its namesake, as far as its neighbours are there. Raises `BadChange`.
+    """`team` with `robot` in the place of its namesake, as far as its neighbours are there. Raises `ChangeError`.
 
     Links that its neighbours have with it stay, and it tells them what their constraints need, whether its file says
     so or leaves that to follow from the constraints.
@@ -175,23 +175,23 @@ def rejoined(team: Team, robot: Robot) -> Team:
     strangers |= {one.name for one in below} - {one.name for one in then.children}
     for name in strangers:
         message = f"{_quoted(robot.name)} names {_quoted(name)}, which does not know it as such"
-        raise BadChange(message, "name the neighbours that it had")
+        raise ChangeError(message, "name the neighbours that it had")
     _check_taken(team, robot)
     if robot.kind is not team.kind:
-        raise BadChange(f"{_quoted(robot.name)} is a {robot.kind} in a team of {team.kind}", "write the same type")
+        raise ChangeError(f"{_quoted(robot.name)} is a {robot.kind} in a team of {team.kind}", "write the same type")
     private = [
         one.name
         for one in (*robot.shared, *(c for child in robot.children for c in child.constraints))
         if one.model is Model.PKC
     ]
     if private:
-        raise BadChange(
+        raise ChangeError(
             f"{_quoted(private[0])} is partially known (PKC)", "a robot that comes back turns its links: use TKC"
         )
     team = _with(team, replace(robot, parents=tuple(parents), children=tuple(below)))
     gone = [name for constraint in team.constraints() for name in constraint.variables if name not in team.owner]
     if gone:
-        raise BadChange(f"the variable {_quoted(gone[0])} is gone, and others need it", "keep the robot's variables")
+        raise ChangeError(f"the variable {_quoted(gone[0])} is gone, and others need it", "keep the robot's variables")
     return _told(team, robot.name)
 
 
@@ -222,7 +222,7 @@ def _with_robot(team: Team, robot: Robot) -> Team:
             try:
                 _check_parents(team, robot, constraint)
                 team = _with_constraint(team, robot.name, parent.name, constraint)
-            except BadChange as bad:
+            except ChangeError as bad:
                 bad.line = constraint.line
                 raise
     return team
@@ -232,13 +232,13 @@ def _check_newcomer(team: Team, robot: Robot) -> None:
     """What can be said before its constraints are looked at."""
     own = _quoted(robot.name)
     if robot.name in team:
-        raise BadChange(f"the robot {own} is there already", "a robot can come again once it has left")
+        raise ChangeError(f"the robot {own} is there already", "a robot can come again once it has left")
     if team.robots and robot.kind is not team.kind:
-        raise BadChange(f"{own} is a {robot.kind} in a team of {team.kind}", "write the same type in both")
+        raise ChangeError(f"{own} is a {robot.kind} in a team of {team.kind}", "write the same type in both")
     _check_taken(team, robot)
     for child in robot.children:
         hint = "it takes the lowest priority, so its file names parents only"
-        raise BadChange(f"{own} has the child {_quoted(child.name)}", hint, line=child.line)
+        raise ChangeError(f"{own} has the child {_quoted(child.name)}", hint, line=child.line)
     for parent in robot.parents:
         if parent.name not in team:
             raise _no_robot(parent.name, parent.line)
@@ -248,7 +248,9 @@ def _check_taken(team: Team, robot: Robot) -> None:
     for variable in robot.variables:
         owner = team.owner.get(variable.name, robot.name)
         if owner != robot.name:
-            raise BadChange(f"the variable {_quoted(variable.name)} belongs to {_quoted(owner)}", "rename one of them")
+            raise ChangeError(
+                f"the variable {_quoted(variable.name)} belongs to {_quoted(owner)}", "rename one of them"
+            )
 
 
 def _check_parents(team: Team, robot: Robot, constraint: Constraint) -> None:
@@ -258,7 +260,7 @@ def _check_parents(team: Team, robot: Robot, constraint: Constraint) -> None:
         owner = team.owner.get(name, robot.name)
         if owner not in parents and owner != robot.name:
             message = f"{_quoted(name)} belongs to {_quoted(owner)}, which is no parent of {_quoted(robot.name)}"
-            raise BadChange(message, "list it under agents_parent as well")
+            raise ChangeError(message, "list it under agents_parent as well")
 
 
 def _with_constraint(team: Team, agent: str, parent: str, constraint: Constraint) -> Team:
@@ -280,18 +282,18 @@ def _check_holder(team: Team, agent: str, parent: str, constraint: Constraint) -
     """A constraint stands with the lowest robot of its scope, under the next."""
     _robot(team, agent), _robot(team, parent)
     if agent == parent:
-        raise BadChange(f"{_quoted(agent)} is no parent of its own", "a shared constraint is one with another robot")
+        raise ChangeError(f"{_quoted(agent)} is no parent of its own", "a shared constraint is one with another robot")
     for name in constraint.variables:
         _check_variable(team, name)
     owners = {team.owner[name] for name in constraint.variables}
     what = _quoted(constraint.name)
     if agent not in owners or parent not in owners:
         message = f"the scope of {what} is not of {_quoted(agent)} and {_quoted(parent)}"
-        raise BadChange(message, "name variables of both")
+        raise ChangeError(message, "name variables of both")
     *_, above, lowest = (name for name in team.order if name in owners)
     if (above, lowest) != (parent, agent):
         hint = f"the lowest robot of its scope holds it, {_quoted(lowest)}, under the next, {_quoted(above)}"
-        raise BadChange(f"{what} does not stand with {_quoted(agent)} under {_quoted(parent)}", hint)
+        raise ChangeError(f"{what} does not stand with {_quoted(agent)} under {_quoted(parent)}", hint)
 
 
 def _linked(team: Team, child: str, parent: str, told: tuple[str, ...]) -> Team:
@@ -319,7 +321,7 @@ def _without_constraint(team: Team, agent: str, parent: str, name: str) -> Team:
     if name not in there:
         hint = f"there are {_shown(' '.join(there))}" if there else "the parent is the higher of two that share one"
         message = f"{_quoted(agent)} shares no constraint {_quoted(name)} with a parent {_quoted(parent)}"
-        raise BadChange(message, hint, missing=name)
+        raise ChangeError(message, hint, missing=name)
     parents = (
         replace(one, constraints=tuple(c for c in one.constraints if c.name != name)) if one.name == parent else one
         for one in holder.parents
@@ -337,7 +339,7 @@ def _less(team: Team, variable: str, value: int) -> Domain:
     if value not in domain:
         ranges = (f"{part[0]}..{part[-1]}" if len(part) > 1 else f"{part[0]}" for part in domain.ranges)
         hint = f"its domain is {_shown(' '.join(ranges))}" if domain.ranges else "its domain is empty"
-        raise BadChange(f"{_quoted(variable)} has no value {value}", hint)
+        raise ChangeError(f"{_quoted(variable)} has no value {value}", hint)
     parts: list[range] = []
     for part in domain.ranges:
         pieces = (range(part.start, value), range(value + 1, part.stop)) if value in part else (part,)
@@ -348,7 +350,7 @@ def _less(team: Team, variable: str, value: int) -> Domain:
 def _more(team: Team, variable: str, value: int) -> Domain:
     domain = _domain(team, variable)
     if value in domain:
-        raise BadChange(f"{_quoted(variable)} has the value {value} already", "add one that it does not have")
+        raise ChangeError(f"{_quoted(variable)} has the value {value} already", "add one that it does not have")
     ranges = sorted((*domain.ranges, range(value, value + 1)), key=lambda part: part.start)
     return Domain(domain.name, tuple(ranges))
 
@@ -361,7 +363,7 @@ def _domain(team: Team, variable: str) -> Domain:
 def _check_variable(team: Team, variable: str) -> None:
     if variable not in team.owner:
         hint = "name a variable of the robots that are there"
-        raise BadChange(f"no robot has the variable {_quoted(variable)}", hint, missing=variable)
+        raise ChangeError(f"no robot has the variable {_quoted(variable)}", hint, missing=variable)
 
 
 def _with_domain(team: Team, variable: str, domain: Domain) -> Team:
@@ -381,9 +383,9 @@ def _robot(team: Team, name: str) -> Robot:
     return team[name]
 
 
-def _no_robot(name: str, line: int = 0) -> BadChange:
+def _no_robot(name: str, line: int = 0) -> ChangeError:
     hint = "name a robot that is there at that time"
-    return BadChange(f"there is no robot {_quoted(name)}", hint, missing=name, line=line)
+    return ChangeError(f"there is no robot {_quoted(name)}", hint, missing=name, line=line)
 
 
 def _quoted(name: str) -> str:

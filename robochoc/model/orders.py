@@ -37,12 +37,12 @@ class Order(StrEnum):
     RANDOM = "random"
 
 
-class CannotTurn(Exception):  # noqa: N818 - it is an answer, not a fault
+class OrderError(Exception):
     """The team cannot follow the order; says why in one sentence."""
 
 
 def in_order(team: Team, order: Order | Sequence[str] | None, seed: int = 0) -> Team:
-    """`team` in the order called, or listed as, `order`; None: as it is. Raises `CannotTurn`."""
+    """`team` in the order called, or listed as, `order`; None: as it is. Raises `OrderError`."""
     if order is None:
         return team
     return reordered(team, order_of(team, order, seed) if isinstance(order, Order) else order)
@@ -75,7 +75,7 @@ def favourable(team: Team) -> Team:
     """`team` in an order that soon shows who has to step aside, if it can be turned around."""
     try:
         return in_order(team, Order.DOM_DEG)
-    except CannotTurn:
+    except OrderError:
         return team
 
 
@@ -179,7 +179,7 @@ def reordered(team: Team, names: Sequence[str]) -> Team:
     team is what its author would have written with these priorities in mind. `Team.robots` follows `names`, which
     may say more than the links do: robots that are not linked may stand in any order.
 
-    Raises `CannotTurn` where a partially known constraint (PKC) would have to be held the other way round, and for a
+    Raises `OrderError` where a partially known constraint (PKC) would have to be held the other way round, and for a
     team with a scenario; `ValueError` unless `names` are the robots' names, each once.
     """
     if sorted(names) != sorted(team.order):
@@ -187,7 +187,7 @@ def reordered(team: Team, names: Sequence[str]) -> Team:
     if tuple(names) == team.order:
         return team
     if team.dynamic:
-        raise CannotTurn(f"{team.name} has a scenario.xml, which speaks of its links: it is solved in its given order")
+        raise OrderError(f"{team.name} has a scenario.xml, which speaks of its links: it is solved in its given order")
     return _Turned(team, names).team()
 
 
@@ -232,7 +232,7 @@ class _Turned:
                 below = _child(self._old[parent.name], robot.name)
                 parts = [one for one in (*parent.constraints, *below.constraints) if one.model is Model.PKC]
                 if parts and self._rank[robot.name] < self._rank[parent.name]:
-                    raise CannotTurn(
+                    raise OrderError(
                         f"{robot.name} shares a partially known constraint (PKC, {parts[0].name}) with its parent"
                         f" {parent.name}; such links are not turned: choose an order with {parent.name} before it"
                     )

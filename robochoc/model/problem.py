@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 
-from robochoc.model.expression import Expression, Undefined, evaluate
+from robochoc.model.expression import Expression, UndefinedValueError, evaluate
 from robochoc.model.ranges import joined
 
 Assignment = Mapping[str, int]
@@ -129,7 +129,7 @@ class Predicate:
         """Whether the body is true of `arguments`; an undefined body (division by zero) is not."""
         try:
             return bool(evaluate(self.body, dict(zip(self.parameters, arguments, strict=True))))
-        except Undefined:
+        except UndefinedValueError:
             return False
 
 

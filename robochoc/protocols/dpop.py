@@ -71,7 +71,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.encoding import TooMuch
+from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact import EXACT, refuse_inexact
 
 GIB = 1 << 30
@@ -231,10 +231,10 @@ class DPOP(TreeProtocol):
             raise ValueError(f"{child} tells dimensions that cannot be")
 
     def _refuse(self, most: Need, width: int) -> None:
-        """The root knows what the tables of the whole tree need. Raises `TooMuch`."""
+        """The root knows what the tables of the whole tree need. Raises `TooLargeError`."""
         refuse_inexact(self._dearest)
         if most.bytes > self.settings.memory:
-            raise TooMuch(
+            raise TooLargeError(
                 f"{most.robot} needs {_told(most.bytes)} for its tables, more than {self.settings.memory:,}: the"
                 f" robots' pseudo-tree has induced width {width} (--set memory=BYTES raises the limit)"
             )

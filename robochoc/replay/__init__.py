@@ -2,11 +2,11 @@
 
 from robochoc.replay.ending import Contradiction
 from robochoc.replay.insight import Choice, State, states_of
-from robochoc.replay.rebuild import CannotReplay, Means
+from robochoc.replay.rebuild import CannotReplayError, Means
 from robochoc.replay.replay import Difference, Replayed, Stopped, replay
 
 __all__ = [
-    "CannotReplay",
+    "CannotReplayError",
     "Choice",
     "Contradiction",
     "Difference",

@@ -22,8 +22,8 @@ from robochoc.replay.steps import Run
 from robochoc.run.evaluation import answered, placed
 from robochoc.run.options import CENTRAL
 from robochoc.run.registry import speaker
-from robochoc.solver.domain import TooManySolutions
-from robochoc.verification.checker import Refuted
+from robochoc.solver.domain import TooManySolutionsError
+from robochoc.verification.checker import RefutedError
 
 _COUNTED = ("messages", "bytes", "ncccs", "checks", "largest")
 _COUNTED_BEFORE = _COUNTED[:-1]
@@ -129,7 +129,7 @@ def _answer(run: Run, ensemble: Ensemble, outcome: Outcome) -> Epoch | Outcome |
             bare = Outcome(outcome.team, outcome.protocol, outcome.runtime, outcome.seed, Verdict.UNKNOWN)
             return placed(bare, team, result, ensemble.compiled, given.aside)
         return answered(Epoch(result.verdict, team.order), team, result, traits, ensemble.compiled)
-    except (Refuted, TooManySolutions):
+    except (RefutedError, TooManySolutionsError):
         return Epoch(Verdict.UNKNOWN, team.order)
 
 

@@ -14,8 +14,8 @@ from robochoc.journal.events import AnyEvent
 from robochoc.journal.journal import Header, Journal
 from robochoc.replay.inspection import Look, carefully
 from robochoc.replay.reasons import Reasons
-from robochoc.replay.rebuild import CannotReplay, Cast, Means
-from robochoc.replay.replay import Difference, Scene, Stops
+from robochoc.replay.rebuild import CannotReplayError, Cast, Means
+from robochoc.replay.replay import Difference, ReplayStopsError, Scene
 from robochoc.replay.steps import Step, runs_of, steps_of
 
 
@@ -57,8 +57,8 @@ def states_of(
 
     `journal` may be events alone, sorted as in one; then `header` is its header, if there is any. They may be those
     of `robot` and to it, where `everything` gives those of all robots when they turn out to be needed. Raises
-    `CannotReplay` where there is nothing to play by, and where it turns out that the protocol is not the one that was
-    recorded. Where the journal does not tell what the robot was told next, the last state says so in `more`.
+    `CannotReplayError` where there is nothing to play by, and where it turns out that the protocol is not the one that
+    was recorded. Where the journal does not tell what the robot was told next, the last state says so in `more`.
     """
     if isinstance(journal, Journal):
         header, events = journal.header, journal.events
@@ -72,12 +72,12 @@ def states_of(
             for state in player.states(events, since):
                 yield state
                 since = state.step + 1
-        except _Unsaid:
+        except _UnsaidError:
             continue
         return
 
 
-class _Unsaid(Exception):  # noqa: N818 - named for what happens
+class _UnsaidError(Exception):
     """What the robot was told can only be made again by those who had said it."""
 
 
@@ -108,9 +108,9 @@ class _Player:
                     continue
                 try:
                     state = self._played(scene, look, step, since)
-                except Stops as stops:
+                except ReplayStopsError as stops:
                     if stops.unsaid and self._alone:
-                        raise _Unsaid from stops
+                        raise _UnsaidError from stops
                     gone.add(step.robot)
                     state = self._last(step, str(stops), since)
                 if state is not None:
@@ -127,7 +127,7 @@ class _Player:
         reasons = Reasons(look, protocol) if wanted else None
         difference = scene.play(step, number, reasons.listen) if reasons else scene.play(step, number)
         if difference is not None:
-            raise CannotReplay(f"{self._robot} does not do again what was recorded: {in_short(difference)}")
+            raise CannotReplayError(f"{self._robot} does not do again what was recorded: {in_short(difference)}")
         heard = scene.heard
         for sent, message in heard:
             look.hear(sent.sender, message)

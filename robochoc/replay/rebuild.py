@@ -7,41 +7,41 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple
 
-from robochoc.communication.host import BadSettings, Host
+from robochoc.communication.host import Host, SettingsError
 from robochoc.communication.session import Epoch
 from robochoc.journal.events import Given, Lost
-from robochoc.journal.given import BadGiven, TeamReader, brief_of, void_of
+from robochoc.journal.given import GivenProblemError, TeamReader, brief_of, void_of
 from robochoc.journal.journal import Header
-from robochoc.model.change import BadChange, changed_by, still_showing, without
-from robochoc.model.orders import CannotTurn, Order, order_of, reordered
+from robochoc.model.change import ChangeError, changed_by, still_showing, without
+from robochoc.model.orders import Order, OrderError, order_of, reordered
 from robochoc.model.problem import Robot, Team
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.replay.steps import Run
-from robochoc.run.registry import UnknownProtocol, speaker, spoken
+from robochoc.run.registry import UnknownProtocolError, speaker, spoken
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.agent_problem import Brief, Part
 from robochoc.solver.cache import SolutionCache
-from robochoc.solver.compile import CompileFailed, Compiler, CompileTimeout, Limits
+from robochoc.solver.compile import CompileError, Compiler, CompileTimeoutError, Limits
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
-from robochoc.solver.domain import CompiledDomain, TooManySolutions
-from robochoc.solver.encoding import Unsupported
-from robochoc.solver.failures import SolverLost, SolverMissing, SolverTimeout
+from robochoc.solver.domain import CompiledDomain, TooManySolutionsError
+from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
 from robochoc.verification.objective import aside_cost
 
 _UNCOMPILED = (
-    TooManySolutions,
-    CompileTimeout,
-    CompileFailed,
-    SolverMissing,
-    SolverLost,
-    SolverTimeout,
-    Unsupported,
-    BadSettings,
+    TooManySolutionsError,
+    CompileTimeoutError,
+    CompileError,
+    SolverMissingError,
+    SolverLostError,
+    SolverTimeoutError,
+    UnsupportedError,
+    SettingsError,
 )
 """What stands in the way of robots that have to be compiled, or set, first."""
 
 
-class CannotReplay(Exception):  # noqa: N818 - named for what was found
+class CannotReplayError(Exception):
     """The run cannot be played again; says why, and what would help. `broken`: it is the journal's fault."""
 
     def __init__(self, why: str, *, broken: bool = False) -> None:
@@ -96,7 +96,7 @@ class Cast:
         self._lost: set[str] = set()
 
     def enter(self, run: Run) -> Ensemble:
-        """The robots of `run`. Raises `CannotReplay`."""
+        """The robots of `run`. Raises `CannotReplayError`."""
         protocol = self._protocol(run)
         try:
             epoch = self._epoch(run, protocol)
@@ -104,10 +104,10 @@ class Cast:
             goes_on = run.began is not None and isinstance(run.began.epoch, int)
             before = self._hosts if goes_on else {}
             self._hosts = {name: _host(protocol, part, before.get(name), epoch) for name, part in parts.items()}
-        except BadGiven as why:
-            raise CannotReplay(str(why), broken=True) from why
+        except GivenProblemError as why:
+            raise CannotReplayError(str(why), broken=True) from why
         except _UNCOMPILED as why:
-            raise CannotReplay(str(why)) from why
+            raise CannotReplayError(str(why)) from why
         self._lost.update(event.robot for event in run.events if isinstance(event, Lost))
         kept = issubclass(protocol, DynamicProtocol)
         mindful = [name for name in parts if kept and name in before and name not in epoch.fresh]
@@ -126,14 +126,14 @@ class Cast:
         if found is not None:
             return found[1]
         hint = "install the package that it came from (robochoc protocols shows what there is)"
-        raise CannotReplay(f"no protocol whose class is called {name!r} is installed; {hint}")
+        raise CannotReplayError(f"no protocol whose class is called {name!r} is installed; {hint}")
 
     @staticmethod
     def _named(name: str) -> type[Protocol]:
         try:
             return spoken(name)
-        except UnknownProtocol as unknown:
-            raise CannotReplay(str(unknown)) from unknown
+        except UnknownProtocolError as unknown:
+            raise CannotReplayError(str(unknown)) from unknown
 
     def _epoch(self, run: Run, protocol: type[Protocol]) -> Epoch:
         if run.given is not None and not (run.given.why and self._means.team):
@@ -147,17 +147,17 @@ class Cast:
     def _as_filed(self, run: Run, protocol: type[Protocol]) -> Epoch:
         """What the files say, for a run whose journal does not; robots that were lost before are left out."""
         if self._means.team is None:
-            raise CannotReplay(
+            raise CannotReplayError(
                 "the journal does not say what the robots were given, as that of a run across machines;"
                 " name the folder with the team's files: --team DIR"
             )
         if run.began is not None and isinstance(run.began.epoch, int):
-            raise CannotReplay("the journal does not say what the robots were given when their problem changed")
+            raise CannotReplayError("the journal does not say what the robots were given when their problem changed")
         try:
             filed = self._ordered(changed_by(self._means.team, events=0))
             team = self._left(filed)
-        except (CannotTurn, BadChange, ValueError) as why:
-            raise CannotReplay(f"the team cannot be brought into the order of the run: {why}") from why
+        except (OrderError, ChangeError, ValueError) as why:
+            raise CannotReplayError(f"the team cannot be brought into the order of the run: {why}") from why
         seed = self._header.seed if self._header else 0
         asked = self._header.protocol if self._header else None
         if asked is None or self._named(asked) is protocol:
@@ -167,7 +167,7 @@ class Cast:
         return Epoch(self._compiled(team), brief=Brief(seed, aside=aside))
 
     def _ordered(self, team: Team) -> Team:
-        """Return `team` in the order of the run. Raises `CannotTurn`, `ValueError`."""
+        """Return `team` in the order of the run. Raises `OrderError`, `ValueError`."""
         order = self._header.order if self._header else None
         if isinstance(order, str):
             order = order_of(team, Order(order), self._header.seed if self._header else 0)
@@ -196,7 +196,7 @@ class Cast:
 
 
 def _host(protocol: type[Protocol], part: Part, before: Host | None, epoch: Epoch) -> Host:
-    """The robot of `part`: the one that was there before, if it goes on, or a new one. Raises `CannotReplay`."""
+    """The robot of `part`: the one that was there before, if it goes on, or a new one. Raises `CannotReplayError`."""
     name = part.robot.name
     try:
         if before is None or name in epoch.fresh:
@@ -205,5 +205,5 @@ def _host(protocol: type[Protocol], part: Part, before: Host | None, epoch: Epoc
     except _UNCOMPILED:
         raise
     except Exception as error:  # a protocol that is being written, or a journal that is not what it says
-        raise CannotReplay(f"{name} could not begin: {type(error).__name__}: {error}") from error
+        raise CannotReplayError(f"{name} could not begin: {type(error).__name__}: {error}") from error
     return before

@@ -93,7 +93,7 @@ class Replayed:
         return self.difference is not None or bool(self.contradictions)
 
 
-class SaysNoEnd(Exception):  # noqa: N818 - named for what happens
+class NoEndError(Exception):
     """A protocol has said so much in one step that it may never end."""
 
 
@@ -106,14 +106,14 @@ class _Outbox(list[tuple[str, Message]]):
         self._listen = listen
 
     def append(self, said: tuple[str, Message]) -> None:
-        """Take one more. Raises `SaysNoEnd`."""
+        """Take one more. Raises `NoEndError`."""
         if len(self) >= self._most:
-            raise SaysNoEnd(f"{len(self):,} messages in one step, and no end of it")
+            raise NoEndError(f"{len(self):,} messages in one step, and no end of it")
         super().append(said)
         self._listen(*said)
 
 
-class Stops(Exception):  # noqa: N818 - named for what happens
+class ReplayStopsError(Exception):
     """The robot cannot be followed any further. `unsaid`: what it was told cannot be made from the journal alone."""
 
     def __init__(self, why: str, *, unsaid: bool = False) -> None:
@@ -124,7 +124,7 @@ class Stops(Exception):  # noqa: N818 - named for what happens
 def replay(
     journal: Journal, means: Means | None = None, *, progress: Callable[[Progress], None] | None = None
 ) -> Replayed:
-    """Play `journal` again, up to the first difference. Raises `CannotReplay`."""
+    """Play `journal` again, up to the first difference. Raises `CannotReplayError`."""
     return _Replay(journal, means or Means(), progress).whole()
 
 
@@ -172,13 +172,14 @@ class Scene:
     def play(
         self, step: Step, number: int, listen: Callable[[str, Message], None] = lambda *_: None
     ) -> Difference | None:
-        """Play the step, its robot's number `number`; returns what was otherwise, if anything. Raises `Stops`.
+        """Play the step, its robot's number `number`; return the difference, if there is one.
 
+        Raises `ReplayStopsError`.
         `listen` is called with each receiver and message at the moment the protocol says it, in mid-step.
         """
         host = self.ensemble.hosts.get(step.robot)
         if host is None:
-            raise Stops("it is not in the team")
+            raise ReplayStopsError("it is not in the team")
         told: list[AnyEvent] = []
         host.observe(told.append, lambda: 0.0)
         recorded = sum(isinstance(event, Sent) for event in step.done)
@@ -199,7 +200,7 @@ class Scene:
             elif not step.received and step.robot not in self._begun:  # nobody begins a run twice
                 said = host.start(quiet=self.ensemble.quiet)
             self._begun.add(step.robot)
-        except Stops:
+        except ReplayStopsError:
             raise
         except Exception as error:  # noqa: BLE001 - a protocol that is being written may raise anything
             raised = _words_of(error)
@@ -223,10 +224,10 @@ class Scene:
     def _handed_on(self, received: Received) -> tuple[Sent, Envelope]:
         sent, envelope = self.channels.hand_on(received)
         if sent is None:
-            raise Stops(f"what {received.sender} had said to it ({received.type}) is not in the journal")
+            raise ReplayStopsError(f"what {received.sender} had said to it ({received.type}) is not in the journal")
         if envelope is None:
             why = f"what {received.sender} had said to it ({received.type}) cannot be made again from the journal"
-            raise Stops(why, unsaid=True)
+            raise ReplayStopsError(why, unsaid=True)
         return sent, envelope
 
     def _delay(self, host: Host, received: Received, told: list[AnyEvent]) -> None:
@@ -328,7 +329,7 @@ class _Replay:
                 continue
             try:
                 difference = scene.play(step, number)
-            except Stops as stops:
+            except ReplayStopsError as stops:
                 self._gone.add(step.robot)
                 self._stopped.append(Stopped(run=scene.run.number, robot=step.robot, step=number, why=str(stops)))
                 continue

@@ -61,7 +61,7 @@ class Loop:
     we would hear ourselves: recordings alone get it. `frame` is of places, `scale` in metres a unit of the
     problem (None: `mission.py` says), `battery` the level below which a drone is out of order.
 
-    Raises `NameClash`, `NoMapping`, `NothingToPublish`; calls raise `SinkFailed` and `SourceFailed`.
+    Raises `NameClashError`, `NoMappingError`, `NothingToPublishError`; calls raise `SinkError` and `SourceError`.
     """
 
     events: list[Event]

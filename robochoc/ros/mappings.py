@@ -26,7 +26,7 @@ _SPELLING = re.compile(r"([A-Za-z]\w*)/(?:msg/)?([A-Za-z]\w*)", re.ASCII)
 _UPRIGHT = {"w": 1.0}
 
 
-class NoMapping(Exception):  # noqa: N818 - named for what is missing
+class NoMappingError(Exception):
     """Nobody says how a waypoint becomes a message of the type that a topic has: which, and what types there are."""
 
 
@@ -55,7 +55,10 @@ def kinds() -> tuple[str, ...]:
 
 @cache
 def mapping_for(kind: str) -> WaypointMapping | None:
-    """How a waypoint becomes a `kind`, in either spelling; None if nobody says. Raises `NoMapping`: it is broken."""
+    """How a waypoint becomes a `kind`, in either spelling; None if nobody says.
+
+    Raises `NoMappingError`: it is broken.
+    """
     short = short_kind(kind)
     if short in _BUILT_IN:
         return WaypointMapping(_BUILT_IN[short])
@@ -64,20 +67,23 @@ def mapping_for(kind: str) -> WaypointMapping | None:
         return None
     found = loaded(namesakes[0], namesakes, _fault)
     if found.broken:
-        raise NoMapping(on_one_line(f"{namesakes[0].value}, installed for waypoints as {kind}, {found.broken}"))
+        raise NoMappingError(on_one_line(f"{namesakes[0].value}, installed for waypoints as {kind}, {found.broken}"))
     if isinstance(found.what, WaypointMapping):
         return found.what
     return WaypointMapping(cast("Callable[[Waypoint], Fields]", found.what))
 
 
 def mapping_of(topic: str, robot: str, kind: str) -> WaypointMapping:
-    """How waypoints of `robot` become what is published on `topic`. Raises `NoMapping`, which names those there are."""
+    """How waypoints of `robot` become what is published on `topic`.
+
+    Raises `NoMappingError`, which names those there are.
+    """
     found = mapping_for(kind)
     if found is None:
         who = f"topic {topic!r} of {robot}" if robot else f"topic {topic!r}"
         told = f"{who} has the type {kind!r}, and nobody says how a waypoint becomes one"
         known = f"known are {', '.join(kinds())}; a package may offer others ({GROUP})"
-        raise NoMapping(on_one_line(f"{told}: {known}"))
+        raise NoMappingError(on_one_line(f"{told}: {known}"))
     return found
 
 
@@ -85,7 +91,7 @@ def definition_of(kind: str) -> str:
     """The definition of `kind` that an installed package brings; empty if none does."""
     try:
         found = mapping_for(kind)
-    except NoMapping:
+    except NoMappingError:
         return ""
     return found.definition if found else ""
 

@@ -35,12 +35,12 @@ _TAKEN = {"/tf", "/tf_static", "/clock", "/rosout", "/rosout_agg", "/parameter_e
 """Topics with a meaning of their own in every ROS."""
 
 
-class NameClash(Exception):  # noqa: N818 - named for what happened
+class NameClashError(Exception):
     """Two topics would have one name in ROS, or a name is too long for it: which, and what to do."""
 
 
 class Names:
-    """The names in ROS of what `drones` publish; drones are known by their numbers. Raises `NameClash`."""
+    """The names in ROS of what `drones` publish; drones are known by their numbers. Raises `NameClashError`."""
 
     original: Mapping[str, str]
     """The way back: from a waypoint's topic in ROS to its name in the robot's file, and, for a drone whose file names
@@ -52,10 +52,10 @@ class Names:
         owners: dict[str, int] = {}
         for number, topic in self._topics():
             if len(topic) > LONGEST:
-                raise NameClash(on_one_line(f"{_told(drones[number])}: the name is too long for ROS: shorten it"))
+                raise NameClashError(on_one_line(f"{_told(drones[number])}: the name is too long for ROS: shorten it"))
             other = owners.setdefault(topic, number)
             if other != number:
-                raise NameClash(_clash(topic, drones[other], drones[number]))
+                raise NameClashError(_clash(topic, drones[other], drones[number]))
         table = zip(self._waypoints, self._spaces, drones, strict=True)
         self.original = MappingProxyType(
             {topic or space: drone.name if drone.topic is None else drone.topic.name for topic, space, drone in table}

@@ -32,18 +32,18 @@ class Outlet:
         self._counts = dict.fromkeys(("waypoint", "landing", "report", "pose"), 0)
 
     def decide(self, leg: Leg, at_ns: int) -> None:
-        """Publish where `leg` sends drones. Raises `SinkFailed`, `NoMapping`."""
+        """Publish where `leg` sends drones. Raises `SinkError`, `NoMappingError`."""
         for waypoint in waypoints(leg, self._drones, self._publisher.names, self._frame, at_ns):
             self._counts["landing" if waypoint.lands else "waypoint"] += 1
         self._publisher.decide(leg, at_ns)
 
     def report(self, report: Report) -> None:
-        """Publish what a drone reports, at the report's time. Raises `SinkFailed`."""
+        """Publish what a drone reports, at the report's time. Raises `SinkError`."""
         self._counts["report"] += 1
         self._publisher.report(report, nanoseconds(report.at_s))
 
     def poses(self, positions: npt.NDArray[np.float64], attitudes: npt.NDArray[np.float64], at_s: float) -> None:
-        """Publish where all drones are, see `Publisher.poses`. Raises `SinkFailed`."""
+        """Publish where all drones are, see `Publisher.poses`. Raises `SinkError`."""
         self._counts["pose"] += len(positions)
         self._publisher.poses(positions, attitudes, nanoseconds(at_s))
 
@@ -64,7 +64,7 @@ class Broadcast:
         self._ticks = 0
 
     def tell(self, outlets: Sequence[Outlet], flown: Flown, reports: Sequence[Report], until_s: float) -> None:
-        """Publish what was not yet told of `flown` up to `until_s`, and `reports` among it. Raises `SinkFailed`."""
+        """Publish what was not yet told of `flown` up to `until_s`, and `reports` among it. Raises `SinkError`."""
         untold = deque(reports)
         while (at_s := self._ticks / POSES_HZ) <= until_s:
             while untold and untold[0].at_s <= at_s:
@@ -78,7 +78,7 @@ class Broadcast:
 
 
 def publish_flight(mission: Mission, flown: Flown, outlets: Sequence[Outlet]) -> None:
-    """Publish a whole flight: each leg's waypoints as it begins, poses, and who falls. Raises `SinkFailed`."""
+    """Publish a whole flight: each leg's waypoints as it begins, poses, and who falls. Raises `SinkError`."""
     if not outlets:
         return
     fallen = {number for number, error in enumerate(flown.errors_m) if np.isnan(error)}

@@ -12,7 +12,7 @@ from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone, Leg
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.mappings import NoMapping, WaypointMapping, mapping_of, point
+from robochoc.ros.mappings import NoMappingError, WaypointMapping, mapping_of, point
 from robochoc.ros.names import REPORTS, Names
 from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.waypoint import Waypoint, waypoints
@@ -24,22 +24,22 @@ _NOT_MEASURED = {
 """As `sensor_msgs/BatteryState` says: "if unmeasured NaN"."""
 
 
-class NothingToPublish(Exception):  # noqa: N818 - named for what was found
+class NothingToPublishError(Exception):
     """No drone of the team has a topic: why, and what to do."""
 
 
 class Publisher:
     """Publishes what `drones` of `team` are to do, and what they report, to each of `sinks`, which it does not close.
 
-    Times are in nanoseconds since the epoch; places in metres, in `frame`. Raises `NameClash`, `NoMapping`,
-    `NothingToPublish`, and `SinkFailed`; its methods raise `SinkFailed`, and `NoMapping` where a package's mapping
-    fails.
+    Times are in nanoseconds since the epoch; places in metres, in `frame`. Raises `NameClashError`, `NoMappingError`,
+    `NothingToPublishError`, and `SinkError`; its methods raise `SinkError`, and `NoMappingError` where a package's
+    mapping fails.
     """
 
     def __init__(self, team: str, drones: Sequence[Drone], sinks: Sequence[Sink], frame: str = "map") -> None:
         if all(drone.topic is None for drone in drones):
             told = f"no drone of {team or 'the team'} has a topic to publish its waypoints on"
-            raise NothingToPublish(on_one_line(f"{told}: give its robot's file a <topic> (docs/format.md)"))
+            raise NothingToPublishError(on_one_line(f"{told}: give its robot's file a <topic> (docs/format.md)"))
         self.names = Names(drones)
         self._drones = drones
         self._sinks = sinks
@@ -93,7 +93,7 @@ class Publisher:
             return self._mappings[waypoint.kind].fields(waypoint)
         except Exception as error:
             told = f"what is installed for waypoints as {waypoint.kind} failed: {type(error).__name__}: {error}"
-            raise NoMapping(on_one_line(told)) from error
+            raise NoMappingError(on_one_line(told)) from error
 
     def _header(self, at_ns: int) -> Fields:
         return {"stamp": at_ns, "frame_id": self._frame}

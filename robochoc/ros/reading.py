@@ -23,7 +23,7 @@ _FAR_M = 1e9
 
 
 class Reading:
-    """Reads what `drones` report. Raises `NameClash` where their topics cannot be told apart.
+    """Reads what `drones` report. Raises `NameClashError` where their topics cannot be told apart.
 
     Places count in `frame`; a message that names no frame is taken to mean it.
     """

@@ -23,11 +23,11 @@ FAILS_S = 2.0
 """When a drone fails, where nobody says when: it is in the air by then."""
 
 
-class CannotFly(Exception):  # noqa: N818 - named for what happened
+class CannotFlyError(Exception):
     """The decision cannot be flown as asked: why."""
 
 
-class NoSuchDrone(Exception):  # noqa: N818 - named for what is missing
+class UnknownDroneError(Exception):
     """A drone is to fail that is not there: which, and who is."""
 
 
@@ -47,11 +47,11 @@ class Surroundings:
     obstacles: tuple[Point, ...] = ()
 
     def check(self, drones: Sequence[Drone]) -> None:
-        """Raise `NoSuchDrone` unless all that are to fail are there, and `ValueError` for what no flight can meet."""
+        """Raise `UnknownDroneError` for a drone that is not there, and `ValueError` for what no flight can meet."""
         self.conditions(drones, 1.0)
 
     def conditions(self, drones: Sequence[Drone], scale: float) -> Conditions:
-        """The same for a flight of `drones`, in metres. Raises `NoSuchDrone` and `ValueError`."""
+        """The same for a flight of `drones`, in metres. Raises `UnknownDroneError` and `ValueError`."""
         return Conditions(
             distance=self.distance,
             wind=self.wind,
@@ -68,7 +68,9 @@ def _named(drones: Sequence[Drone], name: str) -> str:
     if not found:
         known = [drone.name for drone in drones]
         more = f" and {len(known) - MOST_NAMES} more" * (len(known) > MOST_NAMES)
-        raise NoSuchDrone(f"there is no drone {name!r} that could fail, but {', '.join(known[:MOST_NAMES])}{more}")
+        raise UnknownDroneError(
+            f"there is no drone {name!r} that could fail, but {', '.join(known[:MOST_NAMES])}{more}"
+        )
     return found[0].name
 
 
@@ -108,7 +110,7 @@ class Flying(Senses):
                 names = [drone.name for drone in cast.drones]
                 self._flight = Flight(names, homes, conditions, lambda _: self.idle())
             except ValueError as refused:
-                raise CannotFly(on_one_line(str(refused))) from refused
+                raise CannotFlyError(on_one_line(str(refused))) from refused
         elif not self._calls[-1] and self._leg is not None:
             self._go(self._flight, self._leg, {})
         self._leg = leg
@@ -124,7 +126,7 @@ class Flying(Senses):
         return self._waiting.popleft()
 
     def flown(self) -> Flown | None:
-        """All that was flown, a stage for each decision; None if nothing was. Raises `CannotFly`."""
+        """All that was flown, a stage for each decision; None if nothing was. Raises `CannotFlyError`."""
         if self._flight is None or self._leg is None:
             return None
         if not self._calls[-1]:
@@ -157,7 +159,7 @@ class Flying(Senses):
         try:
             return flight.fly(leg.opened_by, goals, heed=heed)
         except ValueError as refused:
-            raise CannotFly(on_one_line(f"the decision cannot be flown: {refused}")) from refused
+            raise CannotFlyError(on_one_line(f"the decision cannot be flown: {refused}")) from refused
 
     def _fallen(self, flown: Flown) -> list[Report]:
         """What those would report that have fallen while nobody asked."""

@@ -12,14 +12,14 @@ Fields = Mapping[str, Any]
 zero, or empty."""
 
 
-class SinkFailed(Exception):  # noqa: N818 - named for what happened
+class SinkError(Exception):
     """The sink cannot be opened, or written to any more: why, and what might help."""
 
 
 class Sink(ABC):
     """Takes messages. Whoever opens it closes it: it is a context manager.
 
-    `place` is what stands behind its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SinkFailed`.
+    `place` is what stands behind its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SinkError`.
     """
 
     live: bool = True
@@ -29,18 +29,18 @@ class Sink(ABC):
         self.place = place
 
     def explain(self, original: Mapping[str, str]) -> None:  # noqa: B027 - only a recording can keep it
-        """What topics (by their ROS names) are called in the team's files. Raises `SinkFailed`."""
+        """What topics (by their ROS names) are called in the team's files. Raises `SinkError`."""
 
     def advertise(self, topics: Mapping[str, str]) -> None:  # noqa: B027 - nothing to do for files
-        """Messages of these types will be published on these topics (both by their ROS names). Raises `SinkFailed`."""
+        """Messages of these types will be published on these topics (both by their ROS names). Raises `SinkError`."""
 
     @abstractmethod
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
-        """Publish a message of the ROS type `kind` on `topic`, at a time since the epoch. Raises `SinkFailed`."""
+        """Publish a message of the ROS type `kind` on `topic`, at a time since the epoch. Raises `SinkError`."""
 
     @abstractmethod
     def close(self) -> None:
-        """All has been published. What is written becomes what was asked for only now. Raises `SinkFailed`."""
+        """All has been published. What is written becomes what was asked for only now. Raises `SinkError`."""
 
     def discard(self) -> None:
         """Something went wrong: leave nothing half-written."""

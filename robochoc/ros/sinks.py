@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import cast
 
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.sink import Sink, SinkFailed
-from robochoc.ros.source import Source, SourceFailed
+from robochoc.ros.sink import Sink, SinkError
+from robochoc.ros.source import Source, SourceError
 from robochoc.system.entry_points import EntryPoint
 from robochoc.system.files import resolved
 from robochoc.system.installed import loaded, missing, named
@@ -22,24 +22,24 @@ _ENDINGS = {".mcap": "mcap", ".bag": "rosbag"}
 """Files that may stand alone, without the name of what writes or reads them."""
 
 
-class NoSuchSink(SinkFailed):
+class UnknownSinkError(SinkError):
     """Nothing of that name is installed, or it cannot be used: why, and what to install or write instead."""
 
 
-class NoSuchSource(SourceFailed):
+class UnknownSourceError(SourceError):
     """Nothing of that name is installed, or it cannot be used: why, and what to install or write instead."""
 
 
 def open_sink(text: str) -> Sink:
-    """The sink that `text` names. Raises `NoSuchSink`, and `SinkFailed` where it cannot be opened."""
+    """The sink that `text` names. Raises `UnknownSinkError`, and `SinkError` where it cannot be opened."""
     name, place = _parts(text)
-    return cast("type[Sink]", _offered(SINKS, "sink", name, Sink, NoSuchSink))(place)
+    return cast("type[Sink]", _offered(SINKS, "sink", name, Sink, UnknownSinkError))(place)
 
 
 def open_source(text: str) -> Source:
-    """The source that `text` names. Raises `NoSuchSource`, and `SourceFailed` where it cannot be opened."""
+    """The source that `text` names. Raises `UnknownSourceError`, and `SourceError` where it cannot be opened."""
     name, place = _parts(text)
-    return cast("type[Source]", _offered(SOURCES, "source", name, Source, NoSuchSource))(place)
+    return cast("type[Source]", _offered(SOURCES, "source", name, Source, UnknownSourceError))(place)
 
 
 def place_of(text: str) -> Path | str:

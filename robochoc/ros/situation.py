@@ -17,7 +17,7 @@ from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone
 from robochoc.flight.places import Places
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
-from robochoc.model.expression import Expression, Name, Undefined, evaluate, names
+from robochoc.model.expression import Expression, Name, UndefinedValueError, evaluate, names
 from robochoc.model.problem import AddValue, Change, Domain, RemoveAgent, RemoveValue, Robot, Team
 
 BATTERY = 0.2
@@ -216,7 +216,7 @@ def _fixed(expression: Expression | None) -> int | None:
         return None
     try:
         return evaluate(expression, {})
-    except Undefined:
+    except UndefinedValueError:
         return None
 
 

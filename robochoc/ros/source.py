@@ -10,7 +10,7 @@ from typing import NamedTuple, Self
 from robochoc.ros.sink import Fields
 
 
-class SourceFailed(Exception):  # noqa: N818 - named for what happened
+class SourceError(Exception):
     """The source cannot be opened, or read any further: why, and what might help."""
 
 
@@ -26,7 +26,7 @@ class Heard(NamedTuple):
 class Source(ABC):
     """Gives messages. Whoever opens it closes it: it is a context manager.
 
-    `place` is what stands behind its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SourceFailed`.
+    `place` is what stands behind its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SourceError`.
     """
 
     live: bool = True
@@ -41,12 +41,12 @@ class Source(ABC):
     def listen(self, topics: Mapping[str, str]) -> None:
         """From now on, give what is published on these topics with these types (both by their ROS names).
 
-        What stands on such a topic with another type is passed over. Raises `SourceFailed`.
+        What stands on such a topic with another type is passed over. Raises `SourceError`.
         """
 
     @abstractmethod
     def next(self, wait_s: float) -> Heard | None:
-        """The next message. None: a recording is over, or nothing came within `wait_s`. Raises `SourceFailed`."""
+        """The next message. None: a recording is over, or nothing came within `wait_s`. Raises `SourceError`."""
 
     @abstractmethod
     def close(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from robochoc.communication.host import BadSettings, settings_of
+from robochoc.communication.host import SettingsError, settings_of
 from robochoc.model.change import changed_by
 from robochoc.model.problem import Kind, Model, Team
 from robochoc.protocols.first_fit import FirstFit
@@ -12,7 +12,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.run.registry import offers
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.exact import EXACT, refuse_inexact
 from robochoc.solver.weighted import HIGHEST
 from robochoc.verification.objective import aside_cost
@@ -22,7 +22,7 @@ LARGEST = 2**62
 """Costs that add up to more are refused: a message holds integers of 64 bits."""
 
 
-class _Unfit(Unsupported):
+class _UnfitError(UnsupportedError):
     """What does not fit is the protocol: another one may do. `complete`: if it proves what it finds."""
 
     def __init__(self, why: str, *, complete: bool = False) -> None:
@@ -31,15 +31,15 @@ class _Unfit(Unsupported):
 
 
 def refuse_unfit(team: Team, options: Options, protocol: type[Protocol]) -> None:
-    """Raise `Unsupported` for what the options ask for and the protocol, or this version, cannot do."""
+    """Raise `UnsupportedError` for what the options ask for and the protocol, or this version, cannot do."""
     try:
         settings_of(protocol, options.settings)
-    except BadSettings as wrong:
-        raise Unsupported(f"--set: {wrong} (protocol {options.protocol})") from None
+    except SettingsError as wrong:
+        raise UnsupportedError(f"--set: {wrong} (protocol {options.protocol})") from None
     try:
         _check(team, options, protocol.traits)
-    except _Unfit as unfit:
-        raise Unsupported(f"{unfit}{instead(team, options, complete=unfit.complete)}") from None
+    except _UnfitError as unfit:
+        raise UnsupportedError(f"{unfit}{instead(team, options, complete=unfit.complete)}") from None
 
 
 def instead(team: Team, options: Options, *, complete: bool = False, costs: bool = False) -> str:
@@ -70,7 +70,7 @@ def _takes(team: Team, options: Options, traits: Traits) -> bool:
         _check(team, options, traits)
         if traits.tables:
             refuse_inexact(_most(team, aside=options.withdraw is not None))
-    except Unsupported:
+    except UnsupportedError:
         return False
     return True
 
@@ -83,13 +83,13 @@ def _judge_takes(team: Team, options: Options) -> bool:
         return False
     try:
         refuse_central(team, replace(options, protocol=CENTRAL))
-    except Unsupported:
+    except UnsupportedError:
         return False
     return _most(team, aside=options.withdraw is not None) <= HIGHEST
 
 
 def _check(team: Team, options: Options, traits: Traits) -> None:
-    """Raise `_Unfit` where another protocol could do it, and `Unsupported` where none could."""
+    """Raise `_UnfitError` where another protocol could do it, and `UnsupportedError` where none could."""
     _refuse_channel(options)
     if options.withdraw is not None:
         refuse_scenario(team, "--withdraw")
@@ -103,7 +103,9 @@ def _check(team: Team, options: Options, traits: Traits) -> None:
             refuse(changed_by(team, events), options.protocol, traits)
     if options.withdraw is Withdrawal.MAXIMAL:
         if team.kind is Kind.DISWCSP:
-            raise Unsupported(f"{team.name} is a DisWCSP; --withdraw maximal knows no costs, --withdraw fewest does")
+            raise UnsupportedError(
+                f"{team.name} is a DisWCSP; --withdraw maximal knows no costs, --withdraw fewest does"
+            )
         refuse(team, "--withdraw maximal", FirstFit.traits)
     if options.spares:
         refuse(team, "--spare", Traits(costs=True))
@@ -115,65 +117,65 @@ def _refuse_network(team: Team, options: Options) -> None:
     if options.runtime is Runtime.NETWORK:
         refuse_scenario(team, "--runtime network")
         if options.spares:
-            raise Unsupported("--spare starts processes of this machine again; drop --runtime network")
+            raise UnsupportedError("--spare starts processes of this machine again; drop --runtime network")
     elif options.filters:
-        raise Unsupported("--filter is for messages that cross a network; add --runtime network")
+        raise UnsupportedError("--filter is for messages that cross a network; add --runtime network")
 
 
 def refuse_central(team: Team, options: Options) -> None:
-    """Raise `Unsupported` for what the options ask of the central judge and it does not do."""
+    """Raise `UnsupportedError` for what the options ask of the central judge and it does not do."""
     refuse(team, options.protocol, Traits(partially_known=True, costs=True))
     if options.count:
         refuse_scenario(team, "--count")
         if team.kind is Kind.DISWCSP:
-            raise Unsupported(
+            raise UnsupportedError(
                 f"{team.name} is a DisWCSP, where every assignment that breaks nothing hard is a solution; --count is"
                 " for problems without costs"
             )
         if options.withdraw is not None:
-            raise Unsupported("--count is of solutions for all robots; --withdraw asks who can do without")
+            raise UnsupportedError("--count is of solutions for all robots; --withdraw asks who can do without")
     if options.withdraw is not None:
         refuse_scenario(team, "--withdraw")
     if options.withdraw is Withdrawal.MAXIMAL:
-        raise Unsupported(
+        raise UnsupportedError(
             "--withdraw maximal is settled by the robots, in priority order; the central judge finds the fewest"
             " (--withdraw fewest)"
         )
 
 
 def refuse_field(team: Team, options: Options) -> None:
-    """Raise `Unsupported` for what cannot be had of a problem that changes with its robots' situation."""
+    """Raise `UnsupportedError` for what cannot be had of a problem that changes with its robots' situation."""
     asked = {
         "--protocol central": options.protocol == CENTRAL,
         "--withdraw": options.withdraw is not None,
         "--runtime network": options.runtime is Runtime.NETWORK,
     }
     for option in (name for name, given in asked.items() if given):
-        raise Unsupported(
+        raise UnsupportedError(
             f"{team.name} is to change with its robots' situation; {option} is for problems that do not change so"
         )
 
 
 def refuse_scenario(team: Team, option: str) -> None:
-    """Raise `Unsupported` when the problem changes over time."""
+    """Raise `UnsupportedError` when the problem changes over time."""
     if team.dynamic:
-        raise Unsupported(f"{team.name} has a scenario.xml; {option} is for problems that do not change")
+        raise UnsupportedError(f"{team.name} has a scenario.xml; {option} is for problems that do not change")
 
 
 def refuse(team: Team, name: str, traits: Traits) -> None:
-    """Raise `Unsupported` for what whoever is called `name` cannot take of `team`."""
+    """Raise `UnsupportedError` for what whoever is called `name` cannot take of `team`."""
     if team.kind is Kind.DISWCSP and not traits.costs:
-        raise _Unfit(f"{team.name} is a DisWCSP, and {name} does not minimise costs")
+        raise _UnfitError(f"{team.name} is a DisWCSP, and {name} does not minimise costs")
     for robot in team.robots:
         parts = (part for child in robot.children for part in child.constraints)
         for constraint in (*robot.shared, *parts):
             if constraint.model is Model.PKC and not traits.partially_known:
-                raise _Unfit(
+                raise _UnfitError(
                     f"{robot.name} shares a partially known constraint (PKC, {constraint.name}), which {name}"
                     " does not support"
                 )
             if not traits.n_ary and len({team.owner[variable] for variable in constraint.variables}) > PAIR:
-                raise _Unfit(
+                raise _UnfitError(
                     f"{robot.name} holds a constraint over more than two robots ({constraint.name}), which {name}"
                     " does not support"
                 )
@@ -182,15 +184,15 @@ def refuse(team: Team, name: str, traits: Traits) -> None:
 def _refuse_channel(options: Options) -> None:
     """A channel model is another schedule of the simulator."""
     if options.channel and options.runtime is not Runtime.SIMULATOR:
-        raise Unsupported("a channel model (--channel) is the simulator's; add --runtime simulator")
+        raise UnsupportedError("a channel model (--channel) is the simulator's; add --runtime simulator")
     if options.channel and (options.delay or options.schedule is not ScheduleName.CONCURRENT):
-        raise Unsupported("a channel model (--channel) says how long messages take; drop --delay and --schedule")
+        raise UnsupportedError("a channel model (--channel) says how long messages take; drop --delay and --schedule")
 
 
 def _refuse_fewest(team: Team, options: Options, traits: Traits) -> None:
     """Who steps aside is a question of costs: a protocol for these answers it alone, any other is asked first."""
     if traits.costs and not traits.complete:
-        raise _Unfit(f"--withdraw fewest has to be proven, and {options.protocol} proves nothing", complete=True)
+        raise _UnfitError(f"--withdraw fewest has to be proven, and {options.protocol} proves nothing", complete=True)
     if team.kind is Kind.DISCSP:
         refuse(team, options.protocol, traits)
     refuse(team, "--withdraw fewest", Traits(costs=True, n_ary=traits.n_ary or not traits.costs))
@@ -200,7 +202,7 @@ def _refuse_dear(team: Team, *, aside: bool) -> None:
     """Costs, and what stepping aside costs, must fit into messages, however they add up."""
     most = _most(team, aside=aside)
     if most >= LARGEST:
-        raise Unsupported(f"{team.name}'s costs could add up to {most:,}, more than {LARGEST:,}; scale them down")
+        raise UnsupportedError(f"{team.name}'s costs could add up to {most:,}, more than {LARGEST:,}; scale them down")
 
 
 def _most(team: Team, *, aside: bool) -> float:

@@ -11,7 +11,7 @@ from robochoc.model.problem import Kind, Team
 from robochoc.protocols.traits import Traits
 from robochoc.run.incumbent import absent, best_of, bound_of, joined, tree_of
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.verification.checker import Refuted, cost, could_join, objections
+from robochoc.verification.checker import RefutedError, cost, could_join, objections
 
 
 def answered(epoch: Epoch, team: Team, result: RunResult, traits: Traits, compiled: CompiledTeam) -> Epoch:
@@ -20,7 +20,7 @@ def answered(epoch: Epoch, team: Team, result: RunResult, traits: Traits, compil
     `team` is what the answer is held against, as the files have it; `compiled` is what the robots have worked on.
 
     A protocol that minimises has one whenever it is asked; whether that is proven depends on the protocol, and on
-    whether it came to its end. A solution of a team without costs needs no proof. Raises `Refuted`.
+    whether it came to its end. A solution of a team without costs needs no proof. Raises `RefutedError`.
     """
     epoch = replace(epoch, tree=tree_of(result.findings))
     ended = result.verdict is Verdict.SOLUTION
@@ -39,7 +39,7 @@ def placed(outcome: Outcome, team: Team, result: RunResult, compiled: CompiledTe
     """`outcome`, with the robots that step aside as `result` has it: so that nobody could be added, or the fewest.
 
     `aside` is what it cost that a robot of weight 1 does so; None where nothing was minimised. Robots that were lost
-    before are withdrawn as well. Raises `Refuted`.
+    before are withdrawn as well. Raises `RefutedError`.
     """
     outcome = replace(outcome, verdict=Verdict.UNKNOWN, verified=False, confirmed=False, tree=tree_of(result.findings))
     ended = result.verdict is Verdict.SOLUTION
@@ -65,13 +65,13 @@ def placed(outcome: Outcome, team: Team, result: RunResult, compiled: CompiledTe
 def check(team: Team, assignment: Mapping[str, int], withdrawn: Sequence[str] = (), *, maximal: bool = True) -> None:
     """Hold the claim against every constraint of every file: also that nobody could be added (`maximal`).
 
-    Raises `Refuted`.
+    Raises `RefutedError`.
     """
     faults = [*objections(team, assignment, withdrawn)]
     if maximal:
         faults += [f"{name} has stepped aside and could be added" for name in could_join(team, assignment, withdrawn)]
     if faults:
-        raise Refuted(f"the checker refutes the answer for {team.name}: {faults[0]} ({len(faults)} objections)")
+        raise RefutedError(f"the checker refutes the answer for {team.name}: {faults[0]} ({len(faults)} objections)")
 
 
 def _best_verdict(team: Team) -> Verdict:

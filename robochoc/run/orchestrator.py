@@ -8,13 +8,13 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.communication.run_result import Progress
 from robochoc.communication.session import Session
 from robochoc.formats import check_team, held_to_rules
 from robochoc.journal.events import Observer
 from robochoc.model.change import changed_by, described
-from robochoc.model.orders import CannotTurn, Order, favourable, order_of
+from robochoc.model.orders import Order, OrderError, favourable, order_of
 from robochoc.model.outcome import Epoch, Metrics, Outcome, Verdict
 from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.protocol import Protocol
@@ -29,19 +29,19 @@ from robochoc.run.runtimes import opened
 from robochoc.run.scenario import Announcer, Field, Journey, Opening, Played
 from robochoc.solver.agent_problem import Brief
 from robochoc.solver.cache import SolutionCache
-from robochoc.solver.compile import CompileTimeout
+from robochoc.solver.compile import CompileTimeoutError
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.domain import TooManySolutions
-from robochoc.solver.encoding import TooMuch, Unsupported
+from robochoc.solver.domain import TooManySolutionsError
+from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.solver.team_compiler import NoLocalSolutionError, OutOfTimeError, TeamCompiler
-from robochoc.verification.checker import Refuted
+from robochoc.verification.checker import RefutedError
 from robochoc.verification.objective import aside_cost
 
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess
     from robochoc.solver.central import Judge
 
-__all__ = ["CENTRAL", "OnLoss", "Options", "Refuted", "Runtime", "ScheduleName", "Withdrawal", "solve"]
+__all__ = ["CENTRAL", "OnLoss", "Options", "RefutedError", "Runtime", "ScheduleName", "Withdrawal", "solve"]
 
 
 def solve(
@@ -57,8 +57,9 @@ def solve(
 
     Who solves many teams may lend a `solver` that stays warm between them. A `field` is told of each epoch's answer,
     and says what happens next: the problem changes over time. When a limit is reached, the verdict is `unknown`. Raises
-    `InvalidInput` (team, field's event), `UnknownProtocol`, `Unsupported`, `RobotsLost` (processes), `CompileFailed`,
-    `SolverLost` (the constraint solver), `SolverMissing`, and `Refuted` when a second opinion does not agree.
+    `InvalidInputError` (team, field's event), `UnknownProtocolError`, `UnsupportedError`, `RobotsLostError`
+    (processes), `CompileError`, `SolverLostError` (the constraint solver), `SolverMissingError`, and `RefutedError`
+    when a second opinion does not agree.
     """
     check_team(team)
     field = field and held_to_rules(field)
@@ -67,8 +68,8 @@ def solve(
             refuse_field(team, options)
         run = _Run(team, options, observer, progress, solver, field)
         return run.centrally() if options.protocol == CENTRAL else run.distributed()
-    except CannotTurn as refused:
-        raise Unsupported(str(refused)) from None
+    except OrderError as refused:
+        raise UnsupportedError(str(refused)) from None
 
 
 class _Run:
@@ -123,9 +124,9 @@ class _Run:
         )
         try:
             return self._travel(journey, protocol)
-        except TooMuch as refused:
-            raise Unsupported(f"{refused}{instead(self._team, options, complete=True, costs=True)}") from None
-        except (TooManySolutions, CompileTimeout, OutOfTimeError) as limit:
+        except TooLargeError as refused:
+            raise UnsupportedError(f"{refused}{instead(self._team, options, complete=True, costs=True)}") from None
+        except (TooManySolutionsError, CompileTimeoutError, OutOfTimeError) as limit:
             outcome = replace(self._summary(), verdict=Verdict.UNKNOWN, assignment={}, verified=False)
             return replace(_without(outcome, journey), reason="; ".join([str(limit), *journey.regrets]))
 
@@ -136,7 +137,7 @@ class _Run:
         try:
             lost = self._play(journey, protocol)
             if lost:
-                raise RobotsLost(lost)
+                raise RobotsLostError(lost)
             outcome = _without(self._summary(), journey)
         except NoLocalSolutionError as alone:
             sure = self._confirmed(journey.team, alone.robot)
@@ -199,7 +200,7 @@ class _Run:
                 break
             journey.leave(result.lost.keys())
             if not journey.team.robots:
-                raise RobotsLost(result.lost)
+                raise RobotsLostError(result.lost)
         spent = replace(outcome.metrics + result.metrics, compile_s=self._compiler.seconds)
         outcome = replace(_without(outcome, journey), metrics=spent)
         outcome = placed(outcome, journey.team, result, compiled, brief.aside)
@@ -295,7 +296,7 @@ class _Run:
     def _confirmed(
         self, team: Team, alone: str | None = None, *, total: float = INFINITE, aside: int | None = None
     ) -> bool:
-        """Whether the central judge comes to the same, if it is asked for. Raises `Refuted` (see `confirmed`)."""
+        """Whether the central judge comes to the same, if it is asked for. Raises `RefutedError` (see `confirmed`)."""
         if not self._options.verify:
             return False
         from robochoc.run.second_opinion import confirmed  # noqa: PLC0415 - start-up: seldom asked for

@@ -17,7 +17,7 @@ from robochoc.system.installed import all_in, loaded, missing, named, names_in
 GROUP = "robochoc.protocols"
 
 
-class UnknownProtocol(LookupError):  # noqa: N818 - named for what was asked for
+class UnknownProtocolError(LookupError):
     """No installed package offers a protocol of that name, or what it offers cannot be used."""
 
 
@@ -57,18 +57,18 @@ def offers() -> tuple[Offer, ...]:
 
 
 def offer_named(name: str) -> Offer:
-    """What is offered as `name`. Raises `UnknownProtocol`, which names those there are."""
+    """What is offered as `name`. Raises `UnknownProtocolError`, which names those there are."""
     found = named(GROUP, name)
     if not found:
-        raise UnknownProtocol(missing(GROUP, "protocol", name))
+        raise UnknownProtocolError(missing(GROUP, "protocol", name))
     return _offer(found[0], found)
 
 
 def protocol_named(name: str) -> type[Protocol]:
-    """The class of the protocol called `name`. Raises `UnknownProtocol`, which names those there are."""
+    """The class of the protocol called `name`. Raises `UnknownProtocolError`, which names those there are."""
     offer = offer_named(name)
     if offer.protocol is None:
-        raise UnknownProtocol(f"{offer.place}, installed as protocol {name!r}, {offer.broken}")
+        raise UnknownProtocolError(f"{offer.place}, installed as protocol {name!r}, {offer.broken}")
     return offer.protocol
 
 
@@ -83,7 +83,7 @@ def speaker(class_name: str, likely: Iterable[str] = ()) -> tuple[str, type[Prot
     None: nothing that is installed is called that.
     """
     for name in (*likely, FIRST_FIT, MINIMISES):
-        with suppress(UnknownProtocol):
+        with suppress(UnknownProtocolError):
             protocol = spoken(name)
             if protocol.__name__ == class_name:
                 return name, protocol

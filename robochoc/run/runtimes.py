@@ -15,7 +15,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName
 from robochoc.solver.agent_problem import Brief
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 
 if TYPE_CHECKING:
     from robochoc.communication.simulator.schedule import Schedule
@@ -35,7 +35,10 @@ def opened(
     observer: Observer | None,
     progress: Callable[[Progress], None] | None,
 ) -> Session:
-    """Return a session of `protocol` in the runtime of `options`. Raises `Unsupported` when it is not installed."""
+    """Return a session of `protocol` in the runtime of `options`.
+
+    Raises `UnsupportedError` when it is not installed.
+    """
     rest: _Rest = {"brief": brief, "observer": observer, "progress": progress}
     match options.runtime:
         case Runtime.PROCESSES:
@@ -58,7 +61,9 @@ def _network(protocol: type[Protocol], team: CompiledTeam, options: Options, res
         from robochoc.communication.network.local import LocalNetwork  # noqa: PLC0415 - and it is an extra
         from robochoc.communication.network.settings import PATIENCE_S, Conditions  # noqa: PLC0415 - as above
     except ModuleNotFoundError as missing:
-        raise Unsupported(f"--runtime network needs {missing.name}; say: pip install 'robochoc[network]'") from None
+        raise UnsupportedError(
+            f"--runtime network needs {missing.name}; say: pip install 'robochoc[network]'"
+        ) from None
     survive, patience_s = options.on_loss is OnLoss.WITHDRAW, options.patience or PATIENCE_S
     conditions = Conditions(filters=options.filters, survive=survive, patience_s=patience_s)
     return LocalNetwork(team, protocol, conditions=conditions, **rest)

@@ -17,10 +17,10 @@ from typing import Any, NamedTuple, Self
 
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.session import Epoch, Session
-from robochoc.formats import InvalidInput, read_robot
+from robochoc.formats import InvalidInputError, read_robot
 from robochoc.journal.events import Began, Observer
 from robochoc.journal.given import TeamWriter
-from robochoc.model.change import BadChange, changed, changed_by, concerns, described, possible, rejoined, without
+from robochoc.model.change import ChangeError, changed, changed_by, concerns, described, possible, rejoined, without
 from robochoc.model.orders import reordered
 from robochoc.model.outcome import Epoch as Answered
 from robochoc.model.outcome import Verdict
@@ -123,11 +123,11 @@ class Journey:
         self._loose = False
 
     def arranged(self) -> Team:
-        """The team as the robots see it: in the order of the run. Raises `CannotTurn`."""
+        """The team as the robots see it: in the order of the run. Raises `OrderError`."""
         return self.team if self._order is None else reordered(self.team, self._order)
 
     def compiled(self) -> CompiledTeam:
-        """Return the team as the robots see it, compiled. Raises `CannotTurn`, and what compiling raises."""
+        """Return the team as the robots see it, compiled. Raises `OrderError`, and what compiling raises."""
         return self._compile(self.arranged())
 
     def go(self, session: Session, announce: Callable[[Opening], None]) -> Iterator[Played]:
@@ -215,7 +215,7 @@ class Journey:
                 try:
                     self._read_again(name)
                     back.append(name)
-                except (InvalidInput, BadChange, OSError) as why:
+                except (InvalidInputError, ChangeError, OSError) as why:
                     self.regrets.append(f"{name} could not come back: {why}")
         self.withdrawn += [name for name in lost if name not in back]
         if back:

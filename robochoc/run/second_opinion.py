@@ -9,15 +9,15 @@ from robochoc.model.problem import INFINITE, Kind, Team
 from robochoc.run.incumbent import absent
 from robochoc.run.options import Options, Withdrawal
 from robochoc.solver.central import Judge, Judgement
-from robochoc.solver.failures import SolverLost
-from robochoc.verification.checker import Refuted, cost, has_local_solution
+from robochoc.solver.failures import SolverLostError
+from robochoc.verification.checker import RefutedError, cost, has_local_solution
 
 
 def decided(judge: Judge, team: Team, options: Options, aside: int) -> Epoch:
     """What `judge` makes of `team`, with the fewest robots aside if that is asked for and has to be.
 
-    `aside` is the price at which a robot of weight 1 steps aside. Raises as `Judge.judge` does, and `SolverLost` when
-    an answer does not cost what the solver says.
+    `aside` is the price at which a robot of weight 1 steps aside. Raises as `Judge.judge` does, and `SolverLostError`
+    when an answer does not cost what the solver says.
     """
     price = None
     judgement = None
@@ -41,14 +41,14 @@ def confirmed(
     """Return whether `judge` agrees with `protocol`: the least cost is `total`, or (infinite) there is no solution.
 
     A robot that had none `alone` is looked at by the checker as well, as judge and compiler share their encoding.
-    Raises `Refuted` when one of them finds something else.
+    Raises `RefutedError` when one of them finds something else.
     """
     opinion = judge.judge(team, aside=aside)
     against = contradiction(opinion, total)
     if against or (alone is not None and has_local_solution(team[alone])):
         claim = "no solution" if total == INFINITE else f"a solution of the least cost, {total:,}"
         found = f"{team.name} has {claim}, and a judge has found {against or 'one'}"
-        raise Refuted(f"{protocol} says that {found}")
+        raise RefutedError(f"{protocol} says that {found}")
     return opinion.verdict is not Verdict.UNKNOWN
 
 
@@ -79,7 +79,7 @@ def _told(judgement: Judgement, team: Team, aside: int | None) -> Epoch:
     if judgement.cost is not None:
         total = total_cost(team, assignment, aside)
         if total != judgement.cost:
-            raise SolverLost(f"the constraint solver's answer costs {total:,}, and it says {judgement.cost:,}")
+            raise SolverLostError(f"the constraint solver's answer costs {total:,}, and it says {judgement.cost:,}")
     if verdict is Verdict.UNKNOWN and judgement.bound is not None:
         bound = judgement.bound // (aside or 1)
     if verdict is Verdict.OPTIMAL and team.kind is Kind.DISCSP and not absent(team, assignment):

@@ -41,7 +41,7 @@ FAILURES = frozenset({Reason.ALREADY_REGISTERED, Reason.NOT_REGISTERED, Reason.I
 """Reasons that show only when a request is carried out; it is refused for any other."""
 
 
-class Refused(Exception):  # noqa: N818 - named as the directory's answer
+class RequestRefusedError(Exception):
     """The Directory does not do what it was asked: for `reason`, and what that is about."""
 
     def __init__(self, reason: Reason, *about: str) -> None:
@@ -92,28 +92,30 @@ def matches(template: AgentDescription, description: AgentDescription) -> bool:
 
 
 def check(description: AgentDescription) -> None:
-    """Raises `Refused` where a registration lacks a name, or anything is more than the Directory takes."""
+    """Raises `RequestRefusedError` where a registration lacks a name, or anything is more than the Directory takes."""
     what = "df-agent-description"
     if not description.name:
-        raise Refused(Reason.MISSING_PARAMETER, what, "name")
+        raise RequestRefusedError(Reason.MISSING_PARAMETER, what, "name")
     for service in description.services:
         for parameter in ("name", "type"):
             if not getattr(service, parameter):
-                raise Refused(Reason.MISSING_PARAMETER, "service-description", parameter)
+                raise RequestRefusedError(Reason.MISSING_PARAMETER, "service-description", parameter)
     lease_s = description.lease_s
     if lease_s is not None and not (math.isfinite(lease_s) and 0 < lease_s <= MAX_LEASE_S):
-        raise Refused(Reason.UNRECOGNISED_PARAMETER_VALUE, what, "lease-time")
+        raise RequestRefusedError(Reason.UNRECOGNISED_PARAMETER_VALUE, what, "lease-time")
     check_bounds(description)
 
 
 def check_bounds(description: AgentDescription) -> None:
-    """Raises `Refused` where a description or a template is larger than the Directory takes."""
+    """Raises `RequestRefusedError` where a description or a template is larger than the Directory takes."""
     _bound("df-agent-description", "services", description.services, MAX_SERVICES)
     _bound_strings("df-agent-description", description, ("protocols", "ontologies", "languages", "addresses"))
     _bound_text("df-agent-description", "name", (description.name,))
     size = sum(map(len, _texts(description)))
     if size > MAX_SIZE:
-        raise Refused(Reason.INTERNAL_ERROR, f"a description of {size} characters is too large: at most {MAX_SIZE}")
+        raise RequestRefusedError(
+            Reason.INTERNAL_ERROR, f"a description of {size} characters is too large: at most {MAX_SIZE}"
+        )
     for service in description.services:
         _bound_strings("service-description", service, ("protocols", "ontologies", "languages"))
         _bound("service-description", "properties", service.properties, MAX_PROPERTIES)
@@ -160,9 +162,9 @@ def _bound_strings(what: str, description: msgspec.Struct, parameters: Iterable[
 
 def _bound(what: str, parameter: str, items: tuple[object, ...], most: int) -> None:
     if len(items) > most:
-        raise Refused(Reason.UNRECOGNISED_PARAMETER_VALUE, what, parameter)
+        raise RequestRefusedError(Reason.UNRECOGNISED_PARAMETER_VALUE, what, parameter)
 
 
 def _bound_text(what: str, parameter: str, texts: Iterable[str]) -> None:
     if any(len(text) > MAX_CHARACTERS for text in texts):
-        raise Refused(Reason.UNRECOGNISED_PARAMETER_VALUE, what, parameter)
+        raise RequestRefusedError(Reason.UNRECOGNISED_PARAMETER_VALUE, what, parameter)

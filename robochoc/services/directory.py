@@ -13,7 +13,7 @@ from typing import NamedTuple
 from robochoc.services.descriptions import (
     AgentDescription,
     Reason,
-    Refused,
+    RequestRefusedError,
     check,
     check_bounds,
     matches,
@@ -40,7 +40,7 @@ class _Registration(NamedTuple):
 
 
 class Directory:
-    """The registrations of a platform. What it cannot do raises `Refused`, and then has changed nothing."""
+    """The registrations of a platform. What it cannot do raises `RequestRefusedError`, and then has changed nothing."""
 
     def __init__(self) -> None:
         self._registered: dict[str, _Registration] = {}
@@ -59,9 +59,9 @@ class Directory:
         _authorise(description.name, requester)
         self._lapse(now)
         if description.name in self._registered:
-            raise Refused(Reason.ALREADY_REGISTERED)
+            raise RequestRefusedError(Reason.ALREADY_REGISTERED)
         if len(self._registered) >= MAX_REGISTRATIONS:
-            raise Refused(Reason.INTERNAL_ERROR, f"the directory is full: {MAX_REGISTRATIONS} agents")
+            raise RequestRefusedError(Reason.INTERNAL_ERROR, f"the directory is full: {MAX_REGISTRATIONS} agents")
         self._lapsed.pop(description.name, None)
         self._put(description, now)
 
@@ -83,7 +83,7 @@ class Directory:
     def deregister(self, name: str, *, requester: str) -> None:
         """`name`, who asks for it, can no longer be found."""
         if not name:
-            raise Refused(Reason.MISSING_PARAMETER, "df-agent-description", "name")
+            raise RequestRefusedError(Reason.MISSING_PARAMETER, "df-agent-description", "name")
         _authorise(name, requester)
         self._known(name)
         self._remove(name)
@@ -111,7 +111,9 @@ class Directory:
         check_bounds(template)
         if (subscriber, template) not in self._subscriptions:
             if len(self._subscriptions) >= MAX_SUBSCRIPTIONS:
-                raise Refused(Reason.INTERNAL_ERROR, f"the directory is full: {MAX_SUBSCRIPTIONS} subscriptions")
+                raise RequestRefusedError(
+                    Reason.INTERNAL_ERROR, f"the directory is full: {MAX_SUBSCRIPTIONS} subscriptions"
+                )
             self._subscriptions.append((subscriber, template))
         for description in self.search(template, now):
             self._note(subscriber, description.name, description)
@@ -122,7 +124,7 @@ class Directory:
             one for one in self._subscriptions if one[0] != subscriber or (template is not None and one[1] != template)
         ]
         if len(kept) == len(self._subscriptions):
-            raise Refused(Reason.NOT_REGISTERED)
+            raise RequestRefusedError(Reason.NOT_REGISTERED)
         self._subscriptions = kept
         if template is None:
             self._notices = {key: notice for key, notice in self._notices.items() if key[0] != subscriber}
@@ -135,7 +137,7 @@ class Directory:
 
     def _known(self, name: str) -> _Registration:
         if name not in self._registered:
-            raise Refused(Reason.NOT_REGISTERED)
+            raise RequestRefusedError(Reason.NOT_REGISTERED)
         return self._registered[name]
 
     def _put(self, description: AgentDescription, now: float) -> None:
@@ -175,7 +177,7 @@ class Directory:
 
 def _authorise(name: str, requester: str) -> None:
     if name != requester:
-        raise Refused(Reason.UNAUTHORISED)
+        raise RequestRefusedError(Reason.UNAUTHORISED)
 
 
 def _end(description: AgentDescription, now: float) -> float:

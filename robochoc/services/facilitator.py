@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robochoc.services.communicative_acts import Performative
-from robochoc.services.descriptions import FAILURES, AgentDescription, Reason, Refused
+from robochoc.services.descriptions import FAILURES, AgentDescription, Reason, RequestRefusedError
 from robochoc.services.directory import Directory, Notice
 from robochoc.services.identifier import AgentIdentifier, expression_of
 from robochoc.services.sl import (
@@ -22,7 +22,7 @@ from robochoc.services.sl import (
     description_of,
     max_results_of,
 )
-from robochoc.services.symbolic import BadExpression, Expression, String, Word, listed, name
+from robochoc.services.symbolic import Expression, String, SymbolicExpressionError, Word, listed, name
 
 
 def handle(directory: Directory, requester: str, content: str, now: float) -> tuple[Performative, str]:
@@ -34,10 +34,10 @@ def handle(directory: Directory, requester: str, content: str, now: float) -> tu
         action = action_in(content)
         try:
             answer = _answer(directory, requester, action, now)
-        except Refused as refused:
+        except RequestRefusedError as refused:
             performative = Performative.FAILURE if refused.reason in FAILURES else Performative.REFUSE
             return performative, content_of(action.whole, _proposition(refused.reason, refused.about))
-    except BadExpression as bad:
+    except SymbolicExpressionError as bad:
         return Performative.NOT_UNDERSTOOD, content_of(listed("unsupported-value", String(f"{bad} (at {bad.at})")))
     return Performative.INFORM, content_of(answer)
 
@@ -52,11 +52,11 @@ def subscribe(directory: Directory, requester: str, content: str, now: float) ->
         action = action_in(content)
         try:
             if action.function != Function.SEARCH:
-                raise Refused(Reason.UNSUPPORTED_FUNCTION, action.function[:40])  # noqa: TRY301 - as in `handle`
+                raise RequestRefusedError(Reason.UNSUPPORTED_FUNCTION, action.function[:40])  # noqa: TRY301 - as in `handle`
             directory.subscribe(requester, description_of(_arguments(action, at_most=2)[0]), now)
-        except Refused as refused:
+        except RequestRefusedError as refused:
             return Performative.REFUSE, content_of(action.whole, _proposition(refused.reason, refused.about))
-    except BadExpression as bad:
+    except SymbolicExpressionError as bad:
         return Performative.NOT_UNDERSTOOD, content_of(listed("unsupported-value", String(f"{bad} (at {bad.at})")))
     return Performative.AGREE, content_of(action.whole, Word("true"))
 
@@ -72,7 +72,7 @@ def told(df: AgentIdentifier, notice: Notice) -> str:
 def _answer(directory: Directory, requester: str, action: Action, now: float) -> Expression:
     """`(done <action>)`, or of a search `(result <action> (set ...))`."""
     if action.actor.local != DIRECTORY:
-        raise Refused(Reason.UNRECOGNISED_PARAMETER_VALUE, "action", "actor")
+        raise RequestRefusedError(Reason.UNRECOGNISED_PARAMETER_VALUE, "action", "actor")
     match action.function:
         case Function.REGISTER:
             directory.register(_only(action), now, requester=requester)
@@ -84,7 +84,7 @@ def _answer(directory: Directory, requester: str, action: Action, now: float) ->
             found = _search(directory, action, now)
             return listed("result", action.whole, listed("set", *map(described, found)))
         case other:
-            raise Refused(Reason.UNSUPPORTED_FUNCTION, other[:40])
+            raise RequestRefusedError(Reason.UNSUPPORTED_FUNCTION, other[:40])
     return listed("done", action.whole)
 
 
@@ -102,9 +102,9 @@ def _only(action: Action) -> AgentDescription:
 
 def _arguments(action: Action, at_most: int) -> tuple[Expression, ...]:
     if not action.arguments:
-        raise Refused(Reason.MISSING_ARGUMENT, "df-agent-description")
+        raise RequestRefusedError(Reason.MISSING_ARGUMENT, "df-agent-description")
     if len(action.arguments) > at_most:
-        raise Refused(Reason.UNEXPECTED_ARGUMENT, action.function)
+        raise RequestRefusedError(Reason.UNEXPECTED_ARGUMENT, action.function)
     return action.arguments
 
 

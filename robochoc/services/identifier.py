@@ -5,9 +5,9 @@ from __future__ import annotations
 import msgspec
 
 from robochoc.services.symbolic import (
-    BadExpression,
     Expression,
     List,
+    SymbolicExpressionError,
     Word,
     items_of,
     listed,
@@ -61,14 +61,14 @@ def expression_of(identifier: AgentIdentifier) -> List:
 def identifier_of(expression: Expression) -> AgentIdentifier:
     """The identifier that `expression` is; parameters of others' own (`:X-...`) are passed over.
 
-    Raises `BadExpression`. Recurses into resolvers, as deep as the reader of the expression allowed.
+    Raises `SymbolicExpressionError`. Recurses into resolvers, as deep as the reader of the expression allowed.
     """
     found = parameters(items_of(expression, ("agent-identifier",), WHAT), WHAT)
     for key, value in found.items():
         if key not in {"name", "addresses", "resolvers"} and not key.startswith("x-"):
-            raise BadExpression(f"{WHAT} has no parameter :{key[:40]}", value.at)
+            raise SymbolicExpressionError(f"{WHAT} has no parameter :{key[:40]}", value.at)
     if "name" not in found or not (called := text_of(found["name"], "the name of an agent")):
-        raise BadExpression(f"{WHAT} needs a :name", expression.at)
+        raise SymbolicExpressionError(f"{WHAT} needs a :name", expression.at)
     return AgentIdentifier(
         called,
         tuple(text_of(one, "an address") for one in _sequence(found.get("addresses"), ":addresses")),

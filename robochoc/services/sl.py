@@ -13,13 +13,13 @@ from collections.abc import Iterable
 from enum import StrEnum
 from typing import NamedTuple
 
-from robochoc.services.descriptions import AgentDescription, Reason, Refused, ServiceDescription
+from robochoc.services.descriptions import AgentDescription, Reason, RequestRefusedError, ServiceDescription
 from robochoc.services.identifier import AgentIdentifier, expression_of, identifier_of, identifier_on
 from robochoc.services.symbolic import (
-    BadExpression,
     Caps,
     Expression,
     List,
+    SymbolicExpressionError,
     Word,
     head_of,
     items_of,
@@ -77,12 +77,12 @@ def request(
 
 
 def action_in(content: str) -> Action:
-    """The one action that the content of a REQUEST is about. Raises `BadExpression`."""
+    """The one action that the content of a REQUEST is about. Raises `SymbolicExpressionError`."""
     (whole,) = _content(content, REQUEST_CAPS)
     what = "an action"
     actor_and_act = items_of(whole, ("action",), what)
     if len(actor_and_act) != 2:  # noqa: PLR2004 - who, and what
-        raise BadExpression("an action is (action <agent-identifier> (<function> ...))", whole.at)
+        raise SymbolicExpressionError("an action is (action <agent-identifier> (<function> ...))", whole.at)
     actor, act = actor_and_act
     function = head_of(act, "what is to be done")
     return Action(whole, identifier_of(actor), function, items_of(act, (function,), what))
@@ -91,17 +91,20 @@ def action_in(content: str) -> Action:
 def descriptions_in(content: str) -> tuple[AgentDescription, ...]:
     """What a search has found: the content of the INFORM that answers it, `((result <action> (set ...)))`.
 
-    Raises `BadExpression`, and `Refused` where a description has what no description has.
+    Raises `SymbolicExpressionError`, and `RequestRefusedError` where a description has what no description has.
     """
     (whole,) = _content(content, ANSWER_CAPS)
     parts = items_of(whole, ("result",), "the answer to a search")
     if len(parts) != 2:  # noqa: PLR2004 - the action, and its result
-        raise BadExpression("a result is (result <action> <set>)", whole.at)
+        raise SymbolicExpressionError("a result is (result <action> <set>)", whole.at)
     return tuple(map(description_of, _members(parts[1], "the result of a search")))
 
 
 def searched_in(content: str) -> AgentDescription:
-    """What the search was for whose result `content` tells. Raises `BadExpression`, and `Refused`."""
+    """What the search was for whose result `content` tells.
+
+    Raises `SymbolicExpressionError`, and `RequestRefusedError`.
+    """
     (whole,) = _content(content, ANSWER_CAPS)
     action = items_of(whole, ("result",), "the answer to a search")[0]
     _, act = items_of(action, ("action",), "an action")
@@ -128,7 +131,8 @@ def described(description: AgentDescription) -> List:
 def description_of(expression: Expression) -> AgentDescription:
     """The agent that `(df-agent-description ...)` describes.
 
-    Raises `BadExpression` where it is no such thing, and `Refused` for parameters and values that it may not have.
+    Raises `SymbolicExpressionError` where it is no such thing, and `RequestRefusedError` for parameters and values that
+    it may not have.
     """
     slots = _slots(expression, _AGENT, {"name", "services", *_NAMES, "lease-time"})
     identifier = identifier_of(slots["name"]) if "name" in slots else AgentIdentifier("")
@@ -153,7 +157,7 @@ def max_results_of(expression: Expression) -> int | None:
         return None
     count = text_of(slots["max-results"], ":max-results")
     if not _COUNT.fullmatch(count):
-        raise Refused(Reason.UNRECOGNISED_PARAMETER_VALUE, "search-constraints", "max-results")
+        raise RequestRefusedError(Reason.UNRECOGNISED_PARAMETER_VALUE, "search-constraints", "max-results")
     return int(count)
 
 
@@ -161,7 +165,9 @@ def _content(content: str, caps: Caps) -> tuple[Expression]:
     """The only expression between the outer parentheses."""
     outer = read(content, caps)
     if not isinstance(outer, List) or len(outer.items) != 1:
-        raise BadExpression("the content is to be one expression between parentheses: ((action ...))", outer.at)
+        raise SymbolicExpressionError(
+            "the content is to be one expression between parentheses: ((action ...))", outer.at
+        )
     return (outer.items[0],)
 
 
@@ -195,16 +201,19 @@ def _property_of(expression: Expression) -> tuple[str, str]:
     slots = _slots(expression, _PROPERTY, {"name", "value"})
     for key in ("name", "value"):
         if key not in slots:
-            raise Refused(Reason.MISSING_PARAMETER, _PROPERTY, key)
+            raise RequestRefusedError(Reason.MISSING_PARAMETER, _PROPERTY, key)
     return text_of(slots["name"], "a property's name"), text_of(slots["value"], "a property's value")
 
 
 def _slots(expression: Expression, what: str, known: set[str]) -> dict[str, Expression]:
-    """The parameters of `(what ...)`. Others' own ones (`:X-...`) are passed over; `Refused` for what is unknown."""
+    """The parameters of `(what ...)`.
+
+    Others' own ones (`:X-...`) are passed over; `RequestRefusedError` for what is unknown.
+    """
     slots = parameters(items_of(expression, (what,), f"a {what}"), f"a {what}")
     for key in slots:
         if key not in known and not key.startswith("x-"):
-            raise Refused(Reason.UNEXPECTED_PARAMETER, what, key[:40])
+            raise RequestRefusedError(Reason.UNEXPECTED_PARAMETER, what, key[:40])
     return slots
 
 
@@ -244,7 +253,7 @@ def _lease_of(expression: Expression) -> float:
     """Seconds. A time of day is refused: the Directory need not know what time it is."""
     found = _LEASE.fullmatch(text_of(expression, ":lease-time"))
     if not found:
-        raise Refused(Reason.UNRECOGNISED_PARAMETER_VALUE, _AGENT, "lease-time")
+        raise RequestRefusedError(Reason.UNRECOGNISED_PARAMETER_VALUE, _AGENT, "lease-time")
     days, hours, minutes, seconds, milliseconds = map(int, found.groups())
     whole = ((days * 24 + hours) * 60 + minutes) * 60 + seconds
     return (whole * 1000 + milliseconds) / 1000

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, assert_never
 
 
-class BadExpression(ValueError):  # noqa: N818 - the error is the text's
+class SymbolicExpressionError(ValueError):
     """A text that is no expression, or not the one expected; `at` is the character it is about, from 0."""
 
     def __init__(self, message: str, at: int) -> None:
@@ -66,19 +66,21 @@ _SHOWN = 40
 
 
 def read(text: str, caps: Caps) -> Expression:
-    """The one expression that `text` is. Raises `BadExpression`, which says what is wrong and where."""
+    """The one expression that `text` is. Raises `SymbolicExpressionError`, which says what is wrong and where."""
     if len(text) > caps.characters:
-        raise BadExpression(f"{len(text)} characters are too many: at most {caps.characters}", caps.characters)
+        raise SymbolicExpressionError(
+            f"{len(text)} characters are too many: at most {caps.characters}", caps.characters
+        )
     opened: list[tuple[int, list[Expression]]] = []
     count = 0
     at = _after_space(text, 0)
     while at < len(text):
         count += 1
         if count > caps.expressions:
-            raise BadExpression(f"more than {caps.expressions} words, strings and lists", at)
+            raise SymbolicExpressionError(f"more than {caps.expressions} words, strings and lists", at)
         if text[at] == "(":
             if len(opened) == caps.depth:
-                raise BadExpression(f"lists within lists deeper than {caps.depth}", at)
+                raise SymbolicExpressionError(f"lists within lists deeper than {caps.depth}", at)
             opened.append((at, []))
             at = _after_space(text, at + 1)
             continue
@@ -87,10 +89,10 @@ def read(text: str, caps: Caps) -> Expression:
         if opened:
             opened[-1][1].append(done)
         elif at < len(text):
-            raise BadExpression("the expression has ended, but the text goes on", at)
+            raise SymbolicExpressionError("the expression has ended, but the text goes on", at)
         else:
             return done
-    raise BadExpression("the text ends before its expression does" if opened else "no expression", len(text))
+    raise SymbolicExpressionError("the text ends before its expression does" if opened else "no expression", len(text))
 
 
 def written(expression: Expression) -> str:
@@ -123,39 +125,44 @@ def listed(head: str, *items: Expression) -> List:
 
 
 def text_of(expression: Expression, what: str) -> str:
-    """The text of a word or a string. Raises `BadExpression`, which calls the expression `what`."""
+    """The text of a word or a string. Raises `SymbolicExpressionError`, which calls the expression `what`."""
     if isinstance(expression, List):
-        raise BadExpression(f"{what} is to be a word or a string, not a list", expression.at)
+        raise SymbolicExpressionError(f"{what} is to be a word or a string, not a list", expression.at)
     return expression.text
 
 
 def head_of(expression: Expression, what: str) -> str:
-    """The word, in small letters, that a list begins with. Raises `BadExpression` where there is none."""
+    """The word, in small letters, that a list begins with. Raises `SymbolicExpressionError` where there is none."""
     if not isinstance(expression, List) or not expression.items or not isinstance(expression.items[0], Word):
-        raise BadExpression(f"{what} is to be a list that begins with a word", expression.at)
+        raise SymbolicExpressionError(f"{what} is to be a list that begins with a word", expression.at)
     return expression.items[0].text.lower()
 
 
 def items_of(expression: Expression, heads: tuple[str, ...], what: str) -> tuple[Expression, ...]:
-    """What follows in a list that begins with one of `heads`. Raises `BadExpression` for any other expression."""
+    """What follows in a list that begins with one of `heads`.
+
+    Raises `SymbolicExpressionError` for any other expression.
+    """
     head = head_of(expression, what)
     if head not in heads or not isinstance(expression, List):
-        raise BadExpression(f"{what} is to begin with {' or '.join(heads)}, not with {_shown(head)}", expression.at)
+        raise SymbolicExpressionError(
+            f"{what} is to begin with {' or '.join(heads)}, not with {_shown(head)}", expression.at
+        )
     return expression.items[1:]
 
 
 def parameters(items: tuple[Expression, ...], what: str) -> dict[str, Expression]:
-    """`:key value :key value ...` by key in small letters, without the colon. Raises `BadExpression`."""
+    """`:key value :key value ...` by key in small letters, without the colon. Raises `SymbolicExpressionError`."""
     found: dict[str, Expression] = {}
     for key, value in zip(items[::2], items[1::2], strict=False):
         if not isinstance(key, Word) or not key.text.startswith(":"):
-            raise BadExpression(f"a parameter of {what} is to begin with a colon", key.at)
+            raise SymbolicExpressionError(f"a parameter of {what} is to begin with a colon", key.at)
         known = key.text[1:].lower()
         if known in found:
-            raise BadExpression(f"{what} has {_shown(key.text)} twice", key.at)
+            raise SymbolicExpressionError(f"{what} has {_shown(key.text)} twice", key.at)
         found[known] = value
     if len(items) % 2:
-        raise BadExpression(f"the last parameter of {what} has no value", items[-1].at)
+        raise SymbolicExpressionError(f"the last parameter of {what} has no value", items[-1].at)
     return found
 
 
@@ -166,7 +173,7 @@ def _after_space(text: str, at: int) -> int:
 
 def _closed(text: str, at: int, opened: list[tuple[int, list[Expression]]]) -> tuple[List, int]:
     if not opened:
-        raise BadExpression(f"{text[at]} closes nothing", at)
+        raise SymbolicExpressionError(f"{text[at]} closes nothing", at)
     began, items = opened.pop()
     return List(tuple(items), began), at + 1
 
@@ -179,14 +186,14 @@ def _atom(text: str, at: int) -> tuple[Word | String, int]:
         return _sized_string(text, at, sized.end(), int(sized[1]))
     found = _WORD.match(text, at)
     if not found:
-        raise BadExpression("no expression begins here", at)
+        raise SymbolicExpressionError("no expression begins here", at)
     return Word(found[0], at), found.end()
 
 
 def _string(text: str, began: int) -> tuple[String, int]:
     found = _STRING.match(text, began)
     if not found:
-        raise BadExpression("a string is never closed", began)
+        raise SymbolicExpressionError("a string is never closed", began)
     # Two backslashes first: what is between them has none that is escaped itself.
     content = "\\".join(part.replace('\\"', '"') for part in found[1].split("\\\\"))
     return String(content, began), found.end()
@@ -198,9 +205,9 @@ def _sized_string(text: str, began: int, start: int, size: int) -> tuple[String,
     try:
         decoded = content.decode()
     except UnicodeDecodeError:
-        raise BadExpression(f"{size} bytes are no whole characters of UTF-8", began) from None
+        raise SymbolicExpressionError(f"{size} bytes are no whole characters of UTF-8", began) from None
     if len(content) < size:
-        raise BadExpression(f"a string is to have {size} bytes, and the text ends before", began)
+        raise SymbolicExpressionError(f"a string is to have {size} bytes, and the text ends before", began)
     return String(decoded, began), start + len(decoded)
 
 

@@ -15,10 +15,10 @@ import msgspec
 from robochoc.services.communicative_acts import Performative
 from robochoc.services.identifier import AgentIdentifier, expression_of, identifier_of
 from robochoc.services.symbolic import (
-    BadExpression,
     Caps,
     Expression,
     String,
+    SymbolicExpressionError,
     Word,
     head_of,
     items_of,
@@ -37,7 +37,7 @@ _DATE_TIME = re.compile(r"[+-]?[0-9]{8}T[0-9]{9}[A-Za-z]?")
 _USER_DEFINED = re.compile(r"x-[a-z0-9_.-]{1,64}")
 
 
-class BadACL(ValueError):  # noqa: N818 - the error is the text's
+class ACLError(ValueError):
     """A text or message that cannot be used; `at` is the character it is about, None: it is not about its form."""
 
     def __init__(self, message: str, at: int | None = None) -> None:
@@ -103,12 +103,12 @@ def text(message: ACLMessage) -> str:
 def parse(message: str) -> ACLMessage:
     """The message that a text in the form of FIPA00070 is.
 
-    Values that may be any expression there are to be words or strings here. Raises `BadACL`, whatever is wrong.
+    Values that may be any expression there are to be words or strings here. Raises `ACLError`, whatever is wrong.
     """
     try:
         return _message(read(message, CAPS))
-    except BadExpression as bad:
-        raise BadACL(str(bad), bad.at) from None
+    except SymbolicExpressionError as bad:
+        raise ACLError(str(bad), bad.at) from None
 
 
 def _message(whole: Expression) -> ACLMessage:
@@ -116,11 +116,13 @@ def _message(whole: Expression) -> ACLMessage:
     try:
         performative = Performative(act)
     except ValueError:
-        raise BadExpression(f"{act[:40]!r} is no performative of FIPA00037", whole.at) from None
+        raise SymbolicExpressionError(f"{act[:40]!r} is no performative of FIPA00037", whole.at) from None
     found = parameters(items_of(whole, (act,), "a message"), "the message")
     for key, value in found.items():
         if key not in _KNOWN and not key.startswith("x-"):
-            raise BadExpression(f"a message has no parameter :{key[:40]}; other ones are to begin with :X-", value.at)
+            raise SymbolicExpressionError(
+                f"a message has no parameter :{key[:40]}; other ones are to begin with :X-", value.at
+            )
     texts = {key: text_of(value, f":{key}") for key, value in found.items() if key in _TEXTS or key == "reply-by"}
     try:
         return ACLMessage(
@@ -139,10 +141,10 @@ def _message(whole: Expression) -> ACLMessage:
             reply_by=texts.get("reply-by"),
             user=tuple((key, text_of(value, f":{key[:40]}")) for key, value in found.items() if key.startswith("x-")),
         )
-    except BadExpression:
+    except SymbolicExpressionError:
         raise
     except ValueError as error:
-        raise BadExpression(str(error), whole.at) from None
+        raise SymbolicExpressionError(str(error), whole.at) from None
 
 
 def _agents(expression: Expression | None, what: str) -> tuple[AgentIdentifier, ...]:

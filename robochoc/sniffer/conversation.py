@@ -19,7 +19,7 @@ import msgspec
 from robochoc.model.message import Envelope, Message
 from robochoc.protocols.protocol import Protocol
 from robochoc.services.identifier import AgentIdentifier, identifier_on
-from robochoc.sniffer.acl import ACLMessage, BadACL
+from robochoc.sniffer.acl import ACLError, ACLMessage
 from robochoc.sniffer.performatives import act_of
 
 ONTOLOGY = "robochoc"
@@ -37,7 +37,7 @@ _NOT_FINITE = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
 _MARKS = {"base64", "float", "map"}
 
 
-class _Inexpressible(Exception):  # noqa: N818 - never leaves this module
+class _InexpressibleError(Exception):
     """JSON has no words for a value."""
 
 
@@ -58,7 +58,7 @@ class Conversation:
     def acl_of(self, envelope: Envelope, sequence: int, reply_to: int | None = None) -> ACLMessage:
         """The ACL message of `envelope`, the sender's message number `sequence`.
 
-        It answers the receiver's number `reply_to`. Raises `BadACL` where the content is no message of the protocol.
+        It answers the receiver's number `reply_to`. Raises `ACLError` where the content is no message of the protocol.
         """
         message = self._decoded(envelope.content)
         said = _json_of(envelope.content, self._fields)
@@ -81,7 +81,7 @@ class Conversation:
     def envelope_of(self, acl: ACLMessage) -> tuple[Envelope, Message]:
         """The envelope that `acl` was made of, and the message in it, checked by the protocol's own decoder.
 
-        Raises `BadACL` for a message that is not of this conversation, or that no robot would send.
+        Raises `ACLError` for a message that is not of this conversation, or that no robot would send.
         """
         for what, found, expected in (
             ("ontology", acl.ontology, ONTOLOGY),
@@ -89,24 +89,24 @@ class Conversation:
             ("conversation-id", acl.conversation_id, self._id),
         ):
             if found != expected:
-                raise BadACL(f"{what} {_shown(found)} is to be {expected!r}")
+                raise ACLError(f"{what} {_shown(found)} is to be {expected!r}")
         clock = dict(acl.user).get(CLOCK, "")
         if not _NUMBER.fullmatch(clock):
-            raise BadACL(f"{CLOCK} {_shown(clock)} is to be a number of constraint checks")
+            raise ACLError(f"{CLOCK} {_shown(clock)} is to be a number of constraint checks")
         content = self._content(acl)
         message = self._decoded(content)
         performative = act_of(type(message).__name__).performative
         if acl.performative is not performative:
-            raise BadACL(f"a message of type {type(message).__name__} is {performative}, not {acl.performative}")
+            raise ACLError(f"a message of type {type(message).__name__} is {performative}, not {acl.performative}")
         if acl.sender is None or len(acl.receiver) != 1:
-            raise BadACL("an envelope has one sender and one receiver")
+            raise ACLError("an envelope has one sender and one receiver")
         return Envelope(self._local(acl.sender), self._local(acl.receiver[0]), content, int(clock)), message
 
     def _decoded(self, content: bytes) -> Message:
         try:
             message: Message = self._decoder.decode(content)
         except (msgspec.MsgspecError, RecursionError) as error:
-            raise BadACL(f"the content is no message of {self._protocol}: {error}") from None
+            raise ACLError(f"the content is no message of {self._protocol}: {error}") from None
         return message
 
     def _content(self, acl: ACLMessage) -> bytes:
@@ -116,15 +116,15 @@ class Conversation:
             return _content_of(said, self._fields)
         if form != PACKED:
             forms = " or ".join(" in ".join(known) for known in (JSON, PACKED))
-            raise BadACL(f"language and encoding {_shown(form)} are to be {forms}")
+            raise ACLError(f"language and encoding {_shown(form)} are to be {forms}")
         try:
             return b64decode(said, validate=True)
         except ValueError as error:
-            raise BadACL(f"the content is no base64: {error}") from None
+            raise ACLError(f"the content is no base64: {error}") from None
 
     def _local(self, agent: AgentIdentifier) -> str:
         if agent.platform != self._platform:
-            raise BadACL(f"{_shown(agent.name)} is not on the platform {self._platform!r}")
+            raise ACLError(f"{_shown(agent.name)} is not on the platform {self._platform!r}")
         return agent.local
 
 
@@ -144,35 +144,35 @@ def _json_of(content: bytes, fields: Mapping[str, Sequence[str]]) -> str | None:
         said = [kind, {name: _plain(value, 0) for name, value in zip(fields[kind], values, strict=True)}]
         text = msgspec.json.encode(said).decode()
         return text if len(text) <= MAX_JSON and _content_of(text, fields) == content else None
-    except (_Inexpressible, msgspec.MsgspecError, LookupError, ValueError, TypeError, RecursionError):
+    except (_InexpressibleError, msgspec.MsgspecError, LookupError, ValueError, TypeError, RecursionError):
         return None
 
 
 def _content_of(text: str, fields: Mapping[str, Sequence[str]]) -> bytes:
-    """The msgpack of a content in JSON. Raises `BadACL`."""
+    """The msgpack of a content in JSON. Raises `ACLError`."""
     if len(text) > MAX_JSON:
-        raise BadACL(f"a content of {len(text)} characters is too long: at most {MAX_JSON} as JSON")
+        raise ACLError(f"a content of {len(text)} characters is too long: at most {MAX_JSON} as JSON")
     try:
         kind, given = msgspec.json.decode(text, type=tuple[str, dict[str, Any]])
         return msgspec.msgpack.encode([kind, *(_raw(given[name], 0) for name in _names(kind, given, fields))])
-    except BadACL:
+    except ACLError:
         raise
     except (msgspec.MsgspecError, ValueError, TypeError, OverflowError, RecursionError) as error:
-        raise BadACL(f'the content is no JSON like ["Ok",{{"value":[3]}}]: {error}') from None
+        raise ACLError(f'the content is no JSON like ["Ok",{{"value":[3]}}]: {error}') from None
 
 
 def _names(kind: str, given: Collection[str], fields: Mapping[str, Sequence[str]]) -> Sequence[str]:
-    """The fields of `kind` in their order. Raises `BadACL` unless it is those that are `given`."""
+    """The fields of `kind` in their order. Raises `ACLError` unless it is those that are `given`."""
     if kind not in fields:
-        raise BadACL(f"there is no message {_shown(kind)}, only {', '.join(fields)}")
+        raise ACLError(f"there is no message {_shown(kind)}, only {', '.join(fields)}")
     names = fields[kind]
     if set(names) != set(given):
-        raise BadACL(f"{kind} has the fields {_shown(list(names))}, not {_shown(sorted(given))}")
+        raise ACLError(f"{kind} has the fields {_shown(list(names))}, not {_shown(sorted(given))}")
     return names
 
 
 def _plain(value: object, depth: int) -> object:
-    """`value`, as msgpack has it, in the words of JSON. Raises `_Inexpressible`."""
+    """`value`, as msgpack has it, in the words of JSON. Raises `_InexpressibleError`."""
     match value:
         case None | bool() | int() | str():
             return value
@@ -187,7 +187,7 @@ def _plain(value: object, depth: int) -> object:
             if all(isinstance(key, str) for key in members) and not _is_mark(members):
                 return members
             return {"map": [[_plain(key, depth + 1), one] for key, one in members.items()]}
-    raise _Inexpressible
+    raise _InexpressibleError
 
 
 def _raw(value: Any, depth: int) -> Any:  # noqa: ANN401 - any JSON

@@ -29,7 +29,7 @@ _LONGEST_LABEL = 60
 _encode = msgspec.json.encode
 
 
-class TooMuchToDraw(ValueError):  # noqa: N818 - named for what was asked
+class TooMuchToDrawError(ValueError):
     """More messages than a diagram can have."""
 
 
@@ -78,10 +78,10 @@ def _row(cells: Sequence[object]) -> bytes:
 def mermaid(feed: Feed, messages: Sequence[int]) -> bytes:
     """The messages as a sequence diagram of mermaid, with notes where robots decide; Markdown pages can hold it.
 
-    Raises `TooMuchToDraw`.
+    Raises `TooMuchToDrawError`.
     """
     if len(messages) > MOST_ARROWS:
-        raise TooMuchToDraw(f"{len(messages):,} messages are too many for a diagram: at most {MOST_ARROWS}")
+        raise TooMuchToDrawError(f"{len(messages):,} messages are too many for a diagram: at most {MOST_ARROWS}")
     trace, of = feed.trace, feed.trace.messages
     robots = sorted({*(of.sender[one] for one in messages), *(of.receiver[one] for one in messages)})
     lines = ["sequenceDiagram"]
@@ -98,7 +98,9 @@ def mermaid(feed: Feed, messages: Sequence[int]) -> bytes:
         lines += _note(trace, *note, drawn)
     diagram = "\n".join([*lines, ""])
     if len(diagram) > MOST_CHARACTERS:
-        raise TooMuchToDraw(f"the diagram has {len(diagram):,} characters: mermaid takes {MOST_CHARACTERS:,} at most")
+        raise TooMuchToDrawError(
+            f"the diagram has {len(diagram):,} characters: mermaid takes {MOST_CHARACTERS:,} at most"
+        )
     return diagram.encode()
 
 
@@ -108,7 +110,7 @@ def drawable(feed: Feed, messages: Sequence[int]) -> Sequence[int]:
     while part:
         try:
             mermaid(feed, part)
-        except TooMuchToDraw:
+        except TooMuchToDrawError:
             part = part[: len(part) // 2]
         else:
             break

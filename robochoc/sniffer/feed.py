@@ -45,7 +45,7 @@ _OFTEN = {"heard", "improved"}
 _encode = msgspec.json.Encoder(enc_hook=str).encode
 
 
-class BadRequest(ValueError):  # noqa: N818 - named for what was asked
+class BadRequestError(ValueError):
     """There is no such answer."""
 
 
@@ -135,7 +135,7 @@ class Feed:
         return ""
 
     def columns(self, first: int, end: int) -> bytes:
-        """Messages. Raises `BadRequest`, as the others do."""
+        """Messages. Raises `BadRequestError`, as the others do."""
         _check(first, end, len(self.trace.messages.t))
         return columns_of(self.trace, first, end)
 
@@ -154,7 +154,7 @@ class Feed:
         first = chunk * DETAILS
         count = len(self.trace.messages.t)
         if chunk < 0 or first >= max(count, 1):
-            raise BadRequest(f"there is no chunk {chunk} of details")
+            raise BadRequestError(f"there is no chunk {chunk} of details")
         return _encode([self.detail(message) for message in range(first, min(first + DETAILS, count))])
 
     def detail(self, message: int) -> dict[str, Any]:
@@ -182,9 +182,9 @@ class Feed:
 
 def _check(first: int, end: int, count: int) -> None:
     if not 0 <= first <= end <= count:
-        raise BadRequest(f"there are no rows from {first} to {end}, only {count}")
+        raise BadRequestError(f"there are no rows from {first} to {end}, only {count}")
     if end - first > MOST_ROWS:
-        raise BadRequest(f"{end - first} rows are too many at once: at most {MOST_ROWS}")
+        raise BadRequestError(f"{end - first} rows are too many at once: at most {MOST_ROWS}")
 
 
 def _kind(name: str) -> dict[str, str]:

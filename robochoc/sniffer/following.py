@@ -21,7 +21,7 @@ import msgspec
 
 from robochoc.journal.blocks import MAGIC
 from robochoc.journal.events import AnyEvent, Began
-from robochoc.journal.journal import BadJournal, Ended, Follower, Header, Line, is_journal
+from robochoc.journal.journal import Ended, Follower, Header, JournalError, Line, is_journal
 from robochoc.model.outcome import Outcome
 from robochoc.sniffer.trace import Trace
 from robochoc.sniffer.window import Window
@@ -85,7 +85,7 @@ class Following:
         return self.trace is not None and (self._done or self._waits or self._worked_s > _AT_ONCE_S)
 
     def advance(self) -> bool:
-        """Do a bit of work; False when there was none. Raises `BadJournal`, and `TraceTooLarge`."""
+        """Do a bit of work; False when there was none. Raises `JournalError`, and `TraceTooLargeError`."""
         began = time.monotonic()
         done = self._advance()
         self._worked_s += time.monotonic() - began
@@ -117,7 +117,7 @@ class Following:
     def _read(self) -> bool:
         """Take in a few entries, which may be few bytes; whether there was anything to do."""
         if self.trace is None and not _may_begin(self._window.head):
-            raise BadJournal("it does not begin as a journal does")
+            raise JournalError("it does not begin as a journal does")
         lines = self._follower.read(_EVENTS_AT_ONCE)
         self._take(lines)
         if self._follower.damage is None:
@@ -146,7 +146,7 @@ class Following:
 
     def _end(self) -> None:
         if self.trace is None:
-            raise BadJournal("it has no header")
+            raise JournalError("it has no header")
         if self._disordered:  # and not over yet: the order is not the last one
             self._ordering = self._in_order(self.trace.header)
         else:

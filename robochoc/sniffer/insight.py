@@ -15,10 +15,10 @@ import msgspec
 
 from robochoc.journal.events import AnyEvent, Began, Concluded, Decided, Given, Heard, Received, Sent, Settled
 from robochoc.journal.journal import Ended, Follower, Header
-from robochoc.replay import CannotReplay
+from robochoc.replay import CannotReplayError
 from robochoc.replay.insight import State, states_of
 from robochoc.sniffer.cache import Cache
-from robochoc.sniffer.feed import STATES, BadRequest
+from robochoc.sniffer.feed import STATES, BadRequestError
 from robochoc.sniffer.following import entries_of
 from robochoc.sniffer.window import Window
 
@@ -44,7 +44,7 @@ class Insight:
         self.stopped = False
 
     def chunk(self, window: Window, robot: str, number: int, *, final: bool) -> bytes:
-        """The states after the steps of chunk `number`, as JSON; `[]` past the last one. Raises `BadRequest`.
+        """The states after the steps of chunk `number`, as JSON; `[]` past the last one. Raises `BadRequestError`.
 
         `window` is not touched; the file is read up to its present end. What is kept is what is `final`: in mid-run
         something may be missing yet of what a robot was told.
@@ -60,10 +60,10 @@ class Insight:
         while self._next <= number and not self.stopped:
             try:
                 states = list(islice(playing.states, STATES))
-            except CannotReplay as reason:
+            except CannotReplayError as reason:
                 self._playing = None
-                raise BadRequest(str(reason)) from reason
-            except BadRequest:
+                raise BadRequestError(str(reason)) from reason
+            except BadRequestError:
                 self._playing = None
                 raise
             answer = msgspec.json.encode(states)
@@ -96,7 +96,7 @@ class Insight:
                     continue
                 count += 1
                 if count > MOST_EVENTS:
-                    raise BadRequest(f"{whose} did too much to be played again here (see robochoc replay)")
+                    raise BadRequestError(f"{whose} did too much to be played again here (see robochoc replay)")
                 if isinstance(line, Began):
                     yield from sorted(run, key=_time)
                     run.clear()

@@ -16,10 +16,10 @@ import msgspec
 
 from robochoc.flight.crafts import Craft, crafts_of, lone_craft, possible_crafts
 from robochoc.flight.layout import Field, Point, field_of
-from robochoc.formats import InvalidInput, robot_in
+from robochoc.formats import InvalidInputError, robot_in
 from robochoc.model.priorities import natural
 from robochoc.model.problem import Assignment, Robot
-from robochoc.sniffer.feed import BadRequest
+from robochoc.sniffer.feed import BadRequestError
 from robochoc.sniffer.trace import Trace
 from robochoc.view.scene import Drone, Scene
 from robochoc.view.stage import path_of, still
@@ -43,7 +43,7 @@ def robots_given(trace: Trace) -> dict[str, Robot]:
     """The robots, by what they were given in the run that began last; those whose file makes sense."""
     robots = {}
     for name, file in (trace.runs[-1].files if trace.runs else {}).items():
-        with suppress(InvalidInput, UnicodeEncodeError):
+        with suppress(InvalidInputError, UnicodeEncodeError):
             robots[name] = robot_in(file.encode(), name)
     return robots
 
@@ -76,7 +76,7 @@ class Stage:
         """What the page draws, with the moves of the decisions from the `first` on; JSON."""
         upto = len(self._trace.decisions)
         if first > upto:
-            raise BadRequest(f"there are {upto} decisions")
+            raise BadRequestError(f"there are {upto} decisions")
         commands = self._commands() if self and not first else []
         return {
             "commands": [base64.b64encode(command).decode() for command in commands],

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from robochoc.formats import InvalidInput
-from robochoc.journal.given import BadGiven, TeamReader
+from robochoc.formats import InvalidInputError
+from robochoc.journal.given import GivenProblemError, TeamReader
 from robochoc.model.problem import Team
 from robochoc.protocols.order import PseudoTree
 from robochoc.sniffer.phrases import Setting
@@ -90,7 +90,7 @@ class Names:
             if given is not None:
                 try:
                     team = self._reader.team(given)
-                except (BadGiven, InvalidInput, ValueError):
+                except (GivenProblemError, InvalidInputError, ValueError):
                     team = None
             self._teams.append(team)
         return self._teams[number]

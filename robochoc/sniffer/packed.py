@@ -12,7 +12,7 @@ from itertools import islice
 import msgspec
 
 from robochoc.journal.journal import Journal
-from robochoc.replay import CannotReplay, states_of
+from robochoc.replay import CannotReplayError, states_of
 from robochoc.sniffer.feed import DETAILS, STATES, Feed, columns_of, steps_of
 
 _encode = msgspec.json.encode
@@ -54,5 +54,5 @@ def _states(feed: Feed, journal: Journal, most: int) -> Iterator[tuple[str, byte
             while states := list(islice(coming, STATES)):
                 yield f"states:{number}:{chunk}", _encode(states)
                 chunk += 1
-        except CannotReplay:
+        except CannotReplayError:
             continue  # the page says that they are not there

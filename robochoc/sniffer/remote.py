@@ -11,15 +11,15 @@ from typing import NamedTuple
 from robochoc.authority.identity import Identity
 from robochoc.communication.network.access import journal_key
 from robochoc.communication.network.control_messages import Sniff, Sniffable
-from robochoc.communication.network.framing import MASTER, Letters, Refused
+from robochoc.communication.network.framing import MASTER, FrameRefusedError, Letters
 from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.journal_server import piece_in, question
 from robochoc.communication.network.refusals import LONGEST
 from robochoc.communication.network.transport import Post
-from robochoc.journal.blocks import Damaged, Unframer
-from robochoc.journal.entries import BadJournal
-from robochoc.run.networked.address import Place
-from robochoc.run.networked.consult import ANSWER_S, ASK_AGAIN_S, NoAnswer
+from robochoc.journal.blocks import JournalDamagedError, Unframer
+from robochoc.journal.entries import JournalError
+from robochoc.run.networked.address import Address
+from robochoc.run.networked.consult import ANSWER_S, ASK_AGAIN_S, NoAnswerError
 
 LOOK_S = 0.1
 """How often it is asked for what is new."""
@@ -37,7 +37,7 @@ class WholeBlocks(Unframer):
         self._passed = 0
 
     def take(self, content: bytes) -> bytes:
-        """What is whole with `content`, and was not passed on yet. Raises `BadJournal` and `Damaged`."""
+        """What is whole with `content`, and was not passed on yet. Raises `JournalError` and `JournalDamagedError`."""
         self._held += content
         self.feed(content)
         while self.next() is not None:
@@ -60,7 +60,7 @@ STOPPED = Followed(over=False, why="stopped")
 
 
 def receive(
-    place: Place,
+    place: Address,
     identity: Identity,
     sink: Callable[[bytes], object],
     *,
@@ -71,8 +71,8 @@ def receive(
     """Give the run's journal to `sink`, whole blocks in their order, until the run or the master ends.
 
     Each block's checksum, which includes that of the block before it, is checked before it is passed on. `granted`
-    is called when the master has agreed, `stopped` asked now and then whether to stop. Raises `CannotConnect` and, when
-    the master does not agree, `NoAnswer`.
+    is called when the master has agreed, `stopped` asked now and then whether to stop. Raises `CannotConnectError` and,
+    when the master does not agree, `NoAnswerError`.
     """
     with Post(str(place), identity, watch=(), patience_s=patience_s) as post:
         sniffer = _Sniffer(place, post)
@@ -86,7 +86,7 @@ def receive(
 class Arriving:
     """The journal of `run` of the master at `place`, as far as it is here; `sink` gets what of it is good."""
 
-    def __init__(self, place: Place, run: str, sink: Callable[[bytes], object]) -> None:
+    def __init__(self, place: Address, run: str, sink: Callable[[bytes], object]) -> None:
         self._place = place
         self._run = run
         self._blocks = WholeBlocks()
@@ -109,7 +109,7 @@ class Arriving:
             if piece.start != self._start:  # an answer to an earlier question
                 return None
             whole = self._blocks.take(piece.content)
-        except (BadJournal, Damaged) as bad:
+        except (JournalError, JournalDamagedError) as bad:
             return Followed(over=False, why=f"what the master at {self._place} sends is no journal: {bad}")
         if whole:
             self._sink(whole)
@@ -124,7 +124,7 @@ class Arriving:
 class _Sniffer:
     """One who asks the master at `place`, by its `post`."""
 
-    def __init__(self, place: Place, post: Post) -> None:
+    def __init__(self, place: Address, post: Post) -> None:
         self._place = place
         self._name = post.name
         self._post = post
@@ -132,7 +132,7 @@ class _Sniffer:
         self._number = secrets.randbits(_NUMBER_BITS)
 
     def admitted(self, patience_s: float, stopped: Callable[[], bool]) -> str | None:
-        """The run that may be followed; None: stopped. Raises `NoAnswer` where it may not, or nobody says so."""
+        """The run that may be followed; None: stopped. Raises `NoAnswerError` where it may not, or nobody says so."""
         until, asked = time.monotonic() + patience_s, 0.0
         while time.monotonic() < until and not stopped():
             if time.monotonic() - asked > ASK_AGAIN_S:
@@ -140,12 +140,16 @@ class _Sniffer:
                 self._ask()
             answer = self._answer(LOOK_S)
             if answer and answer.why:
-                raise NoAnswer(f"the master at {self._place} does not let {self._name} sniff: {answer.why[:LONGEST]}")
+                raise NoAnswerError(
+                    f"the master at {self._place} does not let {self._name} sniff: {answer.why[:LONGEST]}"
+                )
             if answer:
                 return answer.run
         if stopped():
             return None
-        raise NoAnswer(f"the master at {self._place} does not answer {self._name}; is it enrolled with its Authority?")
+        raise NoAnswerError(
+            f"the master at {self._place} does not answer {self._name}; is it enrolled with its Authority?"
+        )
 
     def follow(self, journal: Arriving, patience_s: float, stopped: Callable[[], bool]) -> Followed:
         """Ask for piece after piece."""
@@ -197,6 +201,6 @@ class _Sniffer:
     def _read(self, item: Arrived) -> Sniffable | None:
         try:
             word = self._letters.read(item.sender, item.content).word
-        except Refused:
+        except FrameRefusedError:
             return None
         return word if isinstance(word, Sniffable) else None

@@ -9,7 +9,7 @@ from robochoc.sniffer.patterns import matching, unmatched
 from robochoc.sniffer.trace import Trace
 
 
-class NothingMeant(ValueError):  # noqa: N818 - named for what was found
+class NothingSelectedError(ValueError):
     """A part of the selection fits nothing in the journal; says which, and what there is."""
 
 
@@ -33,18 +33,18 @@ class Selection:
         return self == Selection()
 
     def of(self, trace: Trace) -> range | list[int]:
-        """The numbers of the messages that are meant, in order. Raises `NothingMeant`."""
+        """The numbers of the messages that are meant, in order. Raises `NothingSelectedError`."""
         count = len(trace.messages.t)
         numbers = range(min(self.first, count), count if self.last is None else min(self.last + 1, count))
         if count and not numbers:
             upto = "on" if self.last is None else f"to {self.last}"
-            raise NothingMeant(f"there is no message from {self.first} {upto}, only 0 to {count - 1}")
+            raise NothingSelectedError(f"there is no message from {self.first} {upto}, only 0 to {count - 1}")
         if not (self.robots or self.kinds or self.run is not None):
             return numbers
         robots = _places(trace.robots, self.robots, "robot")
         kinds = _places(trace.kinds, self.kinds, "type of message")
         if self.run is not None and not 1 <= self.run <= len(trace.runs):
-            raise NothingMeant(f"there is no conversation {self.run}, only 1 to {len(trace.runs)}")
+            raise NothingSelectedError(f"there is no conversation {self.run}, only 1 to {len(trace.runs)}")
         of = trace.messages
         return [
             number
@@ -62,6 +62,6 @@ def _places(names: Sequence[str], patterns: Sequence[str], what: str) -> set[int
     lost = unmatched(names, patterns)
     if lost:
         known = ", ".join(sorted(names)[:12]) + (", ..." if len(names) > 12 else "")  # noqa: PLR2004 - a line's worth
-        raise NothingMeant(f"no {what} is called {lost[0]!r}; there are {known or 'none'}")
+        raise NothingSelectedError(f"no {what} is called {lost[0]!r}; there are {known or 'none'}")
     meant = set(matching(names, patterns))
     return {place for place, name in enumerate(names) if name in meant}

@@ -18,9 +18,9 @@ import msgspec
 from tornado.web import Application
 from tornado.websocket import WebSocketClosedError
 
-from robochoc.sniffer.feed import BadRequest
+from robochoc.sniffer.feed import BadRequestError
 from robochoc.sniffer.page import page
-from robochoc.sniffer.session import NotBegun, Session
+from robochoc.sniffer.session import NotBegunError, Session
 from robochoc.view.address import listening, secret_path, url_of
 from robochoc.view.loopback import SecretHandler, SecretPage, SecretSocket, application, in_browser, served
 
@@ -101,11 +101,11 @@ class Server:
         while self.trouble is None:
             version = self.version
             if self.session.begun:
-                with suppress(NotBegun):
+                with suppress(NotBegunError):
                     return await loop.run_in_executor(self._reader, answer)
             async with asyncio.timeout(_HEAD_PATIENCE_S):
                 await self.change(version)
-        raise BadRequest(self.trouble)
+        raise BadRequestError(self.trouble)
 
     async def look_into(self, answer: Callable[[], R]) -> R:
         """What `answer` says, in the thread that takes its time."""
@@ -174,7 +174,7 @@ class _Answer(_Known):
     async def get(self, _token: str, what: str) -> None:
         try:
             content = await self._content(what)
-        except BadRequest as wrong:
+        except BadRequestError as wrong:
             self._refuse(400, str(wrong))
         except TimeoutError:
             self._refuse(503, "the run has not begun yet")
@@ -207,7 +207,7 @@ class _Answer(_Known):
         if text is None and default is not None:
             return default
         if text is None or not text.isdecimal() or len(text) > _MOST_DIGITS:
-            raise BadRequest(f"{name} is to be a number")
+            raise BadRequestError(f"{name} is to be a number")
         return int(text)
 
     def _refuse(self, status: int, why: str) -> None:
@@ -264,7 +264,7 @@ class _News(SecretSocket):
                     await self.write_message(news)  # returns when it has left: the next news is as new as it can be
                 await asyncio.sleep(NEWS_S)
                 await self.server.change(version)
-        except (WebSocketClosedError, BadRequest, TimeoutError):
+        except (WebSocketClosedError, BadRequestError, TimeoutError):
             self.close()
 
     def on_close(self) -> None:

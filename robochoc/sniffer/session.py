@@ -13,7 +13,7 @@ import msgspec
 
 from robochoc.model.problem import Robot
 from robochoc.sniffer.cache import Cache
-from robochoc.sniffer.feed import DETAILS, BadRequest, Feed
+from robochoc.sniffer.feed import DETAILS, BadRequestError, Feed
 from robochoc.sniffer.following import Following
 from robochoc.sniffer.trace import Trace
 from robochoc.sniffer.window import Window, opened
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _KEPT_BYTES = 1 << 26
 
 
-class NotBegun(BadRequest):
+class NotBegunError(BadRequestError):
     """There is nothing yet, or, as another journal has taken its place, nothing any more."""
 
 
@@ -59,7 +59,7 @@ class Session:
         return self._following.presentable
 
     def advance(self) -> bool:
-        """Read on a bit; False when there was nothing. Raises `BadJournal`, `TraceTooLarge`, `OSError`."""
+        """Read on a bit; False when there was nothing. Raises `JournalError`, `TraceTooLargeError`, `OSError`."""
         return self._following.advance() or self._replaced()
 
     def begin(self) -> None:
@@ -116,7 +116,7 @@ class Session:
     def _trace(self) -> Trace:
         trace = self._following.trace
         if trace is None:
-            raise NotBegun("the journal has not begun")
+            raise NotBegunError("the journal has not begun")
         return trace
 
     def about(self) -> bytes:
@@ -128,7 +128,7 @@ class Session:
         return {**self._answers.news(), "loaded": round(self._following.loaded, 3)}
 
     def rows(self, what: str, first: int, end: int) -> bytes:
-        """Messages (`columns`), `steps` or `decisions`. Raises `BadRequest`."""
+        """Messages (`columns`), `steps` or `decisions`. Raises `BadRequestError`."""
         match what:
             case "columns":
                 return self._answers.columns(first, end)
@@ -138,7 +138,7 @@ class Session:
                 return self._answers.decisions(first, end)
 
     def details(self, chunk: int) -> bytes:
-        """What the messages of a chunk hold; JSON. Raises `BadRequest`."""
+        """What the messages of a chunk hold; JSON. Raises `BadRequestError`."""
         trace = self._trace
         key = (trace.generation, chunk)
         answer = self._details.get(key)
@@ -149,14 +149,14 @@ class Session:
         return answer
 
     def robot(self, number: int) -> str:
-        """The name of a robot. Raises `BadRequest`."""
+        """The name of a robot. Raises `BadRequestError`."""
         robots = self._trace.robots
         if number >= len(robots):
-            raise BadRequest(f"there is no robot {number}, only {len(robots)}")
+            raise BadRequestError(f"there is no robot {number}, only {len(robots)}")
         return robots[number]
 
     def states(self, robot: str, chunk: int) -> bytes:
-        """What a robot knew after its steps of a chunk; JSON. Takes its time. Raises `BadRequest`."""
+        """What a robot knew after its steps of a chunk; JSON. Takes its time. Raises `BadRequestError`."""
         from robochoc.sniffer.insight import Insight  # noqa: PLC0415 - the page comes first
 
         self._insight = self._insight or Insight()

@@ -16,7 +16,7 @@ import msgspec
 
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.registry import UnknownProtocol, speaker, spoken
+from robochoc.run.registry import UnknownProtocolError, speaker, spoken
 from robochoc.services.identifier import AgentIdentifier, identifier_on
 from robochoc.sniffer.acl import ACLMessage
 from robochoc.sniffer.conversation import CLOCK, JSON, ONTOLOGY, Conversation
@@ -129,7 +129,7 @@ def spoken_in(trace: Trace, number: int) -> tuple[str, type[Protocol]] | None:
     """The protocol of a run, and its name, if it is installed: journals name runs' protocols by their classes."""
     called = trace.runs[number].protocol
     if called == trace.header.protocol:  # a journal of one run without a beginning
-        with suppress(UnknownProtocol):
+        with suppress(UnknownProtocolError):
             return called, spoken(called)
     return speaker(called, [trace.header.protocol])
 

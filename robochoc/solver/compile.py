@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Self
 
 from robochoc.model.problem import Robot
 from robochoc.solver.cache import SolutionCache
-from robochoc.solver.domain import MOST_SOLUTIONS, CompiledDomain, TooManySolutions, compiled_domain
-from robochoc.solver.encoding import Codes, Network, Unsupported
-from robochoc.solver.failures import SolverLost, SolverTimeout
+from robochoc.solver.domain import MOST_SOLUTIONS, CompiledDomain, TooManySolutionsError, compiled_domain
+from robochoc.solver.encoding import Codes, Network, UnsupportedError
+from robochoc.solver.failures import SolverLostError, SolverTimeoutError
 
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess
@@ -45,7 +45,7 @@ class Source(StrEnum):
     ACE = "ace"
 
 
-class CompileTimeout(Exception):  # noqa: N818 - a limit that was reached
+class CompileTimeoutError(Exception):
     """A robot's local problem took too long."""
 
     def __init__(self, robot: str, limit_s: float) -> None:
@@ -56,7 +56,7 @@ class CompileTimeout(Exception):  # noqa: N818 - a limit that was reached
         self.robot = robot
 
 
-class CompileFailed(Exception):  # noqa: N818 - named for what happened
+class CompileError(Exception):
     """The solver was lost over a robot's local problem."""
 
     def __init__(self, robot: str, why: str) -> None:
@@ -109,8 +109,9 @@ class Compiler:
     def compile(self, robot: Robot) -> Compilation:
         """The compiled domain of `robot`.
 
-        Raises `TooManySolutions`, `CompileTimeout`, `CompileFailed`, `SolverMissing`, and `Unsupported` when a
-        constraint is too large; and `SolverTimeout` when the time for all together is over.
+        Raises `TooManySolutionsError`, `CompileTimeoutError`, `CompileError`, `SolverMissingError`, and
+        `UnsupportedError` when a constraint is too large; and `SolverTimeoutError` when the time for all together is
+        over.
         """
         began = time.monotonic()
         sources = [Source.DIRECT]
@@ -122,14 +123,14 @@ class Compiler:
 
         try:
             domain = compiled_domain(robot, solve, self._limits.solutions)
-        except Unsupported as refusal:
-            raise Unsupported(f"{robot.name}: {refusal}") from refusal
+        except UnsupportedError as refusal:
+            raise UnsupportedError(f"{robot.name}: {refusal}") from refusal
         costliest = max(sources, key=list(Source).index)
         return Compilation(robot.name, domain, costliest, time.monotonic() - began)
 
     def _solutions(self, robot: str, network: Network, limit: float) -> tuple[tuple[Codes, ...], Source]:
         if network in self._too_slow:
-            raise CompileTimeout(robot, self._limits.time_s)
+            raise CompileTimeoutError(robot, self._limits.time_s)
         known = self._known.get(network)
         source = Source.EQUAL
         if known is None and self._cache is not None:
@@ -142,20 +143,20 @@ class Compiler:
                 self._cache.put(network, known)
         self._known[network] = known
         if len(known) > self._limits.solutions:
-            raise TooManySolutions(robot, self._limits.solutions)
+            raise TooManySolutionsError(robot, self._limits.solutions)
         return known, source
 
     def _solved(self, robot: str, network: Network, limit: float) -> Answer:
         deadline = limit if self._deadline is None else min(limit, self._deadline)
         try:
             return self._solver().solve(network, limit=self._limits.solutions + 1, strategy="static", deadline=deadline)
-        except SolverTimeout as timeout:
+        except SolverTimeoutError as timeout:
             if self._deadline is not None and self._deadline <= limit:
                 raise
             self._too_slow.add(network)
-            raise CompileTimeout(robot, self._limits.time_s) from timeout
-        except SolverLost as lost:
-            raise CompileFailed(robot, str(lost)) from lost
+            raise CompileTimeoutError(robot, self._limits.time_s) from timeout
+        except SolverLostError as lost:
+            raise CompileError(robot, str(lost)) from lost
 
     def _solver(self) -> AceProcess:
         """The solver that was lent, or one of our own, which is made when the first network asks for it."""

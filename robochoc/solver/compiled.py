@@ -142,7 +142,7 @@ class LocalProblem:
 
     @property
     def places(self) -> Sequence[int]:
-        """For each own value its place in filters. Raises `Unsupported` when there are too many for a filter."""
+        """For each own value its place in filters. Raises `UnsupportedError` when there are too many for a filter."""
         return self._filters.places
 
     def violated(self, index: int, view: Mapping[str, Value]) -> int:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.model.message import Value
-from robochoc.solver.encoding import MOST_TUPLES, Unsupported
+from robochoc.solver.encoding import MOST_TUPLES, UnsupportedError
 from robochoc.solver.shared import Others, SharedConstraint
 
 Array = NDArray[np.float64]
@@ -37,12 +37,12 @@ def cost_table(
 ) -> tuple[int, CostTable]:
     """How many checks it takes, and the table of `constraint` over `domains` and the `size` own values.
 
-    Raises `Unsupported` when that is too large.
+    Raises `UnsupportedError` when that is too large.
     """
     columns = [domains[agent] for agent in constraint.agents]
     entries = math.prod(map(len, columns)) * size
     if entries > MOST_TUPLES:
-        raise Unsupported(
+        raise UnsupportedError(
             f"the table of constraint {constraint.key} has {entries:,} entries, more than {MOST_TUPLES:,}; split the"
             " constraint, or choose a protocol that computes without tables"
         )

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from robochoc.model.message import Value
 from robochoc.model.problem import Constraint, Robot
-from robochoc.solver.encoding import Codes, Component, Network, Unsupported, components, is_soft, price_on
+from robochoc.solver.encoding import Codes, Component, Network, UnsupportedError, components, is_soft, price_on
 
 MOST_SOLUTIONS = 100_000
 """How many local solutions a robot may have, unless more are asked for."""
@@ -23,7 +23,7 @@ SolveNetwork = Callable[[Network], Iterable[Sequence[int]]]
 """All solutions of a network of several variables, in codes; `solver/ace.py` has one."""
 
 
-class TooManySolutions(Exception):  # noqa: N818 - a limit that was reached
+class TooManySolutionsError(Exception):
     """The robot has more local solutions, or values, than the limit."""
 
     def __init__(self, robot: str, limit: int) -> None:
@@ -80,7 +80,7 @@ def compiled_domain(robot: Robot, solve: SolveNetwork | None = None, limit: int 
     """The compiled domain of `robot`, values in the order of its variables and their values.
 
     `solve` is asked for the solutions of what private constraints connect; a robot without such needs none. Raises
-    `TooManySolutions`, and `Unsupported` when there is a part to solve and no `solve`.
+    `TooManySolutionsError`, and `UnsupportedError` when there is a part to solve and no `solve`.
     """
     soft = [constraint for constraint in robot.private if is_soft(constraint)]
     parts = components(robot.variables, robot.private, [constraint.variables for constraint in soft])
@@ -93,17 +93,19 @@ def compiled_domain(robot: Robot, solve: SolveNetwork | None = None, limit: int 
         for part, charged in zip(parts, paid, strict=True)
     ]
     if math.prod(len(groups) for groups in grouped) > limit:
-        raise TooManySolutions(robot.name, limit)
+        raise TooManySolutionsError(robot.name, limit)
     return _joined(robot, [part.names for part in parts], grouped)
 
 
 def _solutions(robot: Robot, part: Component, solve: SolveNetwork | None, limit: int) -> Iterable[Sequence[int]]:
     if not part.network.tables:
         if math.prod(map(len, part.network.domains)) > limit:
-            raise TooManySolutions(robot.name, limit)
+            raise TooManySolutionsError(robot.name, limit)
         return itertools.product(*part.network.domains)
     if solve is None:
-        raise Unsupported(f"{robot.name} has private constraints among its variables, and no solver to compile them")
+        raise UnsupportedError(
+            f"{robot.name} has private constraints among its variables, and no solver to compile them"
+        )
     return solve(part.network)
 
 

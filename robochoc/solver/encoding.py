@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from robochoc.model.expression import Undefined, compiled
+from robochoc.model.expression import UndefinedValueError, compiled
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Variable
 
 MOST_TUPLES = 4_000_000
@@ -25,11 +25,11 @@ LONGEST_ALLOWED = 100_000
 Codes = tuple[int, ...]
 
 
-class Unsupported(Exception):  # noqa: N818 - it is an answer, not a fault
+class UnsupportedError(Exception):
     """The problem is well-formed, and this version (or this protocol) cannot take it; says why and what can."""
 
 
-class TooMuch(Unsupported):
+class TooLargeError(UnsupportedError):
     """The problem is too much for this protocol, as could be seen during the search only; another may take it."""
 
 
@@ -78,8 +78,8 @@ def components(
     """The problem of `variables` and the hard part of `constraints`, split into what does not depend on each other.
 
     Components are in the order of their first variables, variables within in their given order. Constraints are on
-    `variables` only; so are the scopes in `together`, each of which is to be in one component. Raises `Unsupported`
-    when a constraint has too many tuples to be made a table.
+    `variables` only; so are the scopes in `together`, each of which is to be in one component. Raises
+    `UnsupportedError` when a constraint has too many tuples to be made a table.
     """
     domains = {variable.name: sorted(variable.domain) for variable in variables}
     unary: list[Constraint] = []
@@ -145,7 +145,7 @@ def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]
     def holds(values: Sequence[int]) -> bool:
         try:
             return bool(body(arguments(values)))
-        except Undefined:
+        except UndefinedValueError:
             return False
 
     return holds
@@ -255,7 +255,7 @@ def _rows(constraint: Constraint, domains: Mapping[str, list[int]]) -> _Rows | N
         allows = definition.semantics is Semantics.SUPPORTS
         return _Rows(scope, allows, listed) if allows or listed else None
     if size > MOST_TUPLES:
-        raise Unsupported(
+        raise UnsupportedError(
             f"constraint {constraint.name} has {size:,} combinations of values to try, more than {MOST_TUPLES:,};"
             " state it as a relation, or split it"
         )

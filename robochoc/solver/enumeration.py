@@ -28,7 +28,7 @@ PLACES_A_STEP = 4
 """At every node a step copies what is left of so many domains and tables. That bounds the memory, too."""
 
 
-class OutOfSteps(Exception):  # noqa: N818 - a limit that was reached
+class OutOfStepsError(Exception):
     """The steps are used up, and the search has not seen everything."""
 
 
@@ -40,11 +40,11 @@ class Budget:
         self.used = 0
 
     def spend(self, steps: int) -> None:
-        """Use `steps` more. Raises `OutOfSteps` when there are not so many left; none are left then."""
+        """Use `steps` more. Raises `OutOfStepsError` when there are not so many left; none are left then."""
         self.used += steps
         if self.used > self.steps:
             self.used = self.steps
-            raise OutOfSteps
+            raise OutOfStepsError
 
 
 class Found(NamedTuple):
@@ -58,7 +58,7 @@ class Found(NamedTuple):
 def enumerated(network: Network, budget: Budget, *, limit: int | None, count_only: bool) -> Found:
     """Return the solutions of `network`, up to `limit`, in lexicographic order.
 
-    `network` is propagated. Raises `OutOfSteps` when the budget does not suffice.
+    `network` is propagated. Raises `OutOfStepsError` when the budget does not suffice.
     """
     search = _Search(network, budget)
     solutions: list[Codes] = []
@@ -78,7 +78,7 @@ def enumerated(network: Network, budget: Budget, *, limit: int | None, count_onl
 def cheapest(network: Network, budget: Budget, costs: Codes) -> Codes | None:
     """Return a solution of `network` in which the codes at the places `costs` sum up to the least, if there is one.
 
-    `network` is propagated. Raises `OutOfSteps` when the budget does not suffice.
+    `network` is propagated. Raises `OutOfStepsError` when the budget does not suffice.
     """
     return _Search(network, budget).cheapest(costs)
 
@@ -129,7 +129,7 @@ class _Search:
         return found
 
     def solutions(self) -> Iterator[list[Codes]]:
-        """Yield all solutions, several at a time. Raises `OutOfSteps`."""
+        """Yield all solutions, several at a time. Raises `OutOfStepsError`."""
         place, bit = 0, self._domains[0]
         stack = [(self._domains, self._left, place, bit)]
         while stack:
@@ -147,7 +147,7 @@ class _Search:
                 yield [self._codes(_with(domains, place, bit)) for bit in bits]
 
     def cheapest(self, costs: Codes) -> Codes | None:
-        """Return the first of the cheapest solutions. Raises `OutOfSteps`."""
+        """Return the first of the cheapest solutions. Raises `OutOfStepsError`."""
         best: Codes | None = None
         least: int | None = None
         stack = [(self._domains, self._left)]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from robochoc.solver.encoding import TooMuch
+from robochoc.solver.encoding import TooLargeError
 
 EXACT = 1 << 53
 """Below it, floats hold all integers."""
 
 
 def refuse_inexact(most: float) -> None:
-    """Raise `TooMuch` where costs could add up to `most`, and floats do not hold all integers up to there."""
+    """Raise `TooLargeError` where costs could add up to `most`, and floats do not hold all integers up to there."""
     if most >= EXACT:
-        raise TooMuch("costs could add up to 2^53 or more, which tables do not hold exactly")
+        raise TooLargeError("costs could add up to 2^53 or more, which tables do not hold exactly")

@@ -5,15 +5,15 @@ from __future__ import annotations
 from robochoc.solver.encoding import Codes
 
 
-class SolverMissing(Exception):  # noqa: N818 - named for what is missing
+class SolverMissingError(Exception):
     """There is no Java to run ACE with; says how to get it."""
 
 
-class SolverLost(Exception):  # noqa: N818 - named for what happened
+class SolverLostError(Exception):
     """The solver's process died, or failed at the task; says what is known about it."""
 
 
-class SolverTimeout(Exception):  # noqa: N818 - a limit that was reached
+class SolverTimeoutError(Exception):
     """The time was over before the solver's answer. `best` is the cheapest solution so far, where one was sought."""
 
     def __init__(self, best: Codes | None = None) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 from robochoc.model.message import Value
 from robochoc.solver.agent_problem import Part
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.shared import SharedConstraint
 
 LARGEST = 65_536
@@ -23,7 +23,7 @@ class Filters:
     """Makes the filters that one robot sends, and says where its own values stand in those that it gets.
 
     `constraints` are those to be looked at for each receiver; whoever is not in it has a full filter. Raises
-    `Unsupported` when the robot's own values are too many for a filter.
+    `UnsupportedError` when the robot's own values are too many for a filter.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class Filters:
         columns = self._columns(part.robot.name)
         size = math.prod(len(column) for column in columns)
         if size > LARGEST:
-            raise Unsupported(
+            raise UnsupportedError(
                 f"{part.robot.name} shows its neighbours {size:,} combinations of values, and a filter has a bit for"
                 f" each, {LARGEST:,} at most; make its domains smaller, or take another protocol"
             )

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from robochoc.model.problem import Constraint, Kind, Team
 from robochoc.solver.cliques import strengthened
-from robochoc.solver.encoding import Codes, Component, Network, Table, Unsupported, components, is_soft
+from robochoc.solver.encoding import Codes, Component, Network, Table, UnsupportedError, components, is_soft
 from robochoc.solver.propagation import propagated
 from robochoc.solver.weighted import HIGHEST, charged_anyway, charges_on
 
@@ -23,11 +23,11 @@ def merged(team: Team) -> tuple[Network, Codes]:
 
     Unary constraints are folded into domains, cliques of `ne` are said outright. What soft constraints charge are
     variables too, after the others: those at the places that are returned, whose sum is what the problem costs.
-    Raises `Unsupported` for a team that changes over time, and when a constraint is too large to be a table, or
+    Raises `UnsupportedError` for a team that changes over time, and when a constraint is too large to be a table, or
     charges too much, or a value is none that XCSP3's solvers take.
     """
     if team.dynamic:
-        raise Unsupported(f"{team.name} has a scenario.xml; an XCSP3 file holds one problem, not its changes")
+        raise UnsupportedError(f"{team.name} has a scenario.xml; an XCSP3 file holds one problem, not its changes")
     place = {name: index for index, name in enumerate(team.variables)}
     domains = {name: tuple(sorted(variable.domain)) for name, variable in team.variables.items()}
     tables: list[Table] = []
@@ -51,7 +51,9 @@ def merged(team: Team) -> tuple[Network, Codes]:
     if anyway or (team.kind is Kind.DISWCSP and not paid):
         paid.append((anyway,))
     if sum(map(max, paid)) > HIGHEST:
-        raise Unsupported(f"{team.name} has costs that add up to more than {HIGHEST:,}, too much for XCSP3's solvers")
+        raise UnsupportedError(
+            f"{team.name} has costs that add up to more than {HIGHEST:,}, too much for XCSP3's solvers"
+        )
     costs = tuple(range(len(domains), len(domains) + len(paid)))
     tables += [replace(table, scope=(*table.scope, cost)) for table, cost in zip(charges, costs, strict=False)]
     _refuse_far_values(team, domains)
@@ -78,12 +80,12 @@ def _readable(network: Network, *, impossible: bool) -> Network:
 
 
 def _refuse_far_values(team: Team, domains: Mapping[str, Codes]) -> None:
-    """Raise `Unsupported` when values of `domains` are none that ACE reads."""
+    """Raise `UnsupportedError` when values of `domains` are none that ACE reads."""
     for name, values in domains.items():
         far = [f"{value:,}" for value in (values[0], values[-1]) if not LEAST_VALUE <= value <= GREATEST_VALUE]
         if far or values[-1] - values[0] > WIDEST:
             told = far[0] if far else f"{values[0]:,} and {values[-1]:,}"
-            raise Unsupported(
+            raise UnsupportedError(
                 f"{team.name} has a variable {name} with the value {told}; XCSP3's solvers compute with 32 bits: ACE"
                 f" takes values from {LEAST_VALUE:,} to {GREATEST_VALUE:,}, and in one domain no further apart than"
                 f" {WIDEST:,}; shift the problem's values, or scale them"

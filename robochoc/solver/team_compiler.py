@@ -13,7 +13,7 @@ from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import Compiler, Limits, Source
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain
-from robochoc.solver.failures import SolverTimeout
+from robochoc.solver.failures import SolverTimeoutError
 
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess
@@ -64,7 +64,7 @@ class TeamCompiler:
             self._stage(f"compiling {robot.name} ({next(number)} of {len(team.robots)})")
             try:
                 compilation = compiler.compile(robot)
-            except SolverTimeout:
+            except SolverTimeoutError:
                 raise OutOfTimeError(f"the time (--timeout) was over while {robot.name} was compiled") from None
             solved = solved or compilation.source is not Source.DIRECT
             if not (compilation.domain.values or every):

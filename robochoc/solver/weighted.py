@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from robochoc.model.problem import INFINITE, Constraint, Team, Variable
-from robochoc.solver.encoding import Codes, Component, Network, Table, Unsupported, components, is_soft, price_on
+from robochoc.solver.encoding import Codes, Component, Network, Table, UnsupportedError, components, is_soft, price_on
 from robochoc.solver.propagation import propagated
 
 MOST_PRICED = 1_000_000
@@ -52,8 +52,8 @@ class Priced:
 def priced(variables: Iterable[Variable], constraints: Sequence[Constraint]) -> list[Priced]:
     """The problem of `variables` and `constraints`, split into what does not depend on each other.
 
-    What constraints on constants charge is left out. Raises `Unsupported` when a constraint has too many tuples, or
-    charges are too high.
+    What constraints on constants charge is left out. Raises `UnsupportedError` when a constraint has too many tuples,
+    or charges are too high.
     """
     soft = [constraint for constraint in constraints if is_soft(constraint) and constraint.variables]
     parts = components(variables, constraints, [constraint.variables for constraint in soft])
@@ -95,14 +95,14 @@ def _by_scope(part: Component, soft: Iterable[Constraint]) -> dict[Codes, list[C
 def with_charges(part: Component, network: Network, charges: Mapping[Codes, Prices]) -> Priced:
     """`network`, which is that of `part`, with a variable for every scope that is charged.
 
-    Combinations of codes that a scope has no price for are forbidden. Raises `Unsupported` when they are too high.
+    Combinations of codes that a scope has no price for are forbidden. Raises `UnsupportedError` when they are too high.
     """
     least = {scope: int(min(prices.values(), default=0)) for scope, prices in charges.items()}
     above = {scope: {row: int(price) - least[scope] for row, price in charges[scope].items()} for scope in charges}
     unit = math.gcd(*(price for prices in above.values() for price in prices.values())) or 1
     worst = sum(max(prices.values(), default=0) for prices in above.values()) // unit
     if worst > HIGHEST:
-        raise Unsupported(
+        raise UnsupportedError(
             f"costs add up to {worst * unit:,} at worst, which is more than the central judge can minimise; costs that"
             " stand for 'never' are better written as infinity"
         )
@@ -186,7 +186,7 @@ def _prices(part: Component, network: Network, scope: Codes, charging: Iterable[
     size = math.prod(len(network.domains[place]) for place in scope)
     if size > MOST_PRICED:
         names = ", ".join(constraint.name for constraint in charging)
-        raise Unsupported(
+        raise UnsupportedError(
             f"constraint {names} has a price for {size:,} combinations of values, more than {MOST_PRICED:,} that the"
             " central judge can list; split it"
         )

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 
-from robochoc.model.expression import Undefined, evaluate
+from robochoc.model.expression import UndefinedValueError, evaluate
 from robochoc.model.problem import INFINITE, Assignment, Constraint, Relation, Robot, Semantics, Team, Variable
 
 PLACES = 20_000
 """Values to be tried for the variables of a robot that stepped aside."""
 
 
-class Refuted(Exception):  # noqa: N818 - named for what happened to the claim
+class RefutedError(Exception):
     """What a protocol claims is refuted by the checker, or by a second opinion: a fault of the protocol, or ours."""
 
 
@@ -90,7 +90,7 @@ def price(constraint: Constraint, assignment: Assignment) -> float:
         return _price_in_extension(definition, values)
     try:
         holds = evaluate(definition.body, dict(zip(definition.parameters, values, strict=True)))
-    except Undefined:
+    except UndefinedValueError:
         holds = 0
     return 0 if holds else constraint.cost
 

@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from robochoc.communication.simulator.channel import CHANNELS, LARGEST_FILE, ChannelModel, read_channel
-from robochoc.formats import InvalidInput
+from robochoc.formats import InvalidInputError
 from tests.support.entries import entries_of
 from tests.support.program import ROOT, robochoc
 
@@ -71,7 +71,7 @@ BAD = {
 def test_a_bad_file_is_told_in_one_line(tmp_path: Path, content: str, message: str) -> None:
     path = tmp_path / "bad.toml"
     path.write_text(content)
-    with pytest.raises(InvalidInput) as caught:
+    with pytest.raises(InvalidInputError) as caught:
         read_channel(path)
     (line,) = str(caught.value).splitlines()
     assert line.startswith(f"{path}: ")
@@ -82,7 +82,7 @@ def test_a_bad_file_is_told_in_one_line(tmp_path: Path, content: str, message: s
 def test_what_is_no_file_or_no_text(tmp_path: Path) -> None:
     (tmp_path / "raw.toml").write_bytes(b"\xff\xfe")
     for name, message in (("", "is no file"), ("none.toml", "is no file"), ("raw.toml", "is not UTF-8")):
-        with pytest.raises(InvalidInput, match=message):
+        with pytest.raises(InvalidInputError, match=message):
             read_channel(tmp_path / name)
 
 

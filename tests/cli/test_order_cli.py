@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.cli.options.order import NAMES
-from robochoc.formats import InvalidInput, read_team, write_team
+from robochoc.formats import InvalidInputError, read_team, write_team
 from robochoc.formats.order import read_order
 from robochoc.journal.journal import read_journal
 from robochoc.model.orders import Order
@@ -60,7 +60,7 @@ def test_every_mistake_of_an_order_file_is_told_with_its_line(
 ) -> None:
     listed = tmp_path / "order.txt"
     listed.write_text(content)
-    with pytest.raises(InvalidInput) as caught:
+    with pytest.raises(InvalidInputError) as caught:
         read_order(listed, graph_team(["AB", "BC"]))
     found = caught.value.diagnostics
     assert [one.line for one in found] == [line for line, _ in told]
@@ -85,7 +85,7 @@ def test_a_wrong_order_file_is_invalid_input(four: Path) -> None:
 def test_what_is_no_text_is_no_order(tmp_path: Path, content: bytes | None, said: str) -> None:
     listed = tmp_path / "order.txt"
     listed.mkdir() if content is None else listed.write_bytes(content)
-    with pytest.raises(InvalidInput, match=said):
+    with pytest.raises(InvalidInputError, match=said):
         read_order(listed, graph_team(["AB"]))
 
 

@@ -19,7 +19,7 @@ import pytest
 
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
-from robochoc.run.registry import UnknownProtocol, protocol_named, protocol_names
+from robochoc.run.registry import UnknownProtocolError, protocol_named, protocol_names
 from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
 from tests.support import golden
@@ -207,7 +207,7 @@ def solved(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
 )
 def test_what_cannot_be_used_is_said(place: str, why: str, here: Path) -> None:
     package(here, "mine", {"own": place})
-    with pytest.raises(UnknownProtocol, match=re.escape(f"{place}, installed as protocol 'own', {why}")):
+    with pytest.raises(UnknownProtocolError, match=re.escape(f"{place}, installed as protocol 'own', {why}")):
         protocol_named("own")
 
 
@@ -228,7 +228,7 @@ def test_a_name_that_two_packages_offer_is_refused(here: Path) -> None:
     package(here, "mine", {"own": "mine:Silent", "abt": "mine:Silent"})
     package(here, "yours", {"own": "yours:Silent"})
     with pytest.raises(
-        UnknownProtocol, match=r"'own', is offered by several .* only one may: mine:Silent \(mine\) and yours:"
+        UnknownProtocolError, match=r"'own', is offered by several .* only one may: mine:Silent \(mine\) and yours:"
     ):
         protocol_named("own")
     assert list(protocol_names()).count("own") == 1

@@ -15,7 +15,7 @@ from robochoc import __version__
 from robochoc.cli.group import cli
 from robochoc.cli.reports.protocols import print_table, rows
 from robochoc.protocols import abt
-from robochoc.run.registry import UnknownProtocol, offer_named, offers, protocol_named, protocol_names
+from robochoc.run.registry import UnknownProtocolError, offer_named, offers, protocol_named, protocol_names
 from tests.support.program import robochoc
 
 WITHOUT_DOCSTRING = """
@@ -129,7 +129,7 @@ def test_what_is_broken_is_shown_with_its_reason(name: str, reason: str) -> None
     assert asked.exit_code == 2
     assert reason in asked.stderr
     assert len(asked.stderr.splitlines()) == 1
-    with pytest.raises(UnknownProtocol, match=name):
+    with pytest.raises(UnknownProtocolError, match=name):
         protocol_named(name)
 
 
@@ -139,7 +139,7 @@ def test_of_two_with_one_name_none_is_taken(package: Path) -> None:
     assert {first.package, second.package} == {"others-protocols 1.2", f"robochoc {__version__}"}
     assert first.protocol is second.protocol is offer_named("abt").protocol is None
     assert "several packages, and only one may" in run().stdout
-    with pytest.raises(UnknownProtocol, match=r"others:Other \(others-protocols\)"):
+    with pytest.raises(UnknownProtocolError, match=r"others:Other \(others-protocols\)"):
         protocol_named("abt")
 
 

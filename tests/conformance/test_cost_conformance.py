@@ -13,7 +13,7 @@ from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Te
 from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 from tests.conformance.test_conformance import ENOUGH, any_way
 from tests.support.cost_problems import fewest_aside, random_complex_cost_team, random_cost_team
 from tests.support.loose_problems import any_order, least, loosened
@@ -132,5 +132,5 @@ def test_costs_that_do_not_fit_into_messages_are_refused() -> None:
     own = Constraint("D", dear, (first.variables[0].name,), (first.variables[0].name,), model=None)
     team = replace(team, robots=(replace(first, private=(*first.private, *[own] * 10)), *others))
     for protocol in MINIMISING:
-        with pytest.raises(Unsupported, match="scale them down"):
+        with pytest.raises(UnsupportedError, match="scale them down"):
             solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))

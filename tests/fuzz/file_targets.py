@@ -16,15 +16,15 @@ from robochoc.cli.group import cli
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.flight.mission import mission_of
-from robochoc.formats import InvalidInput, read_team, write_team
-from robochoc.formats.result import BadResult, read_result, result_json
-from robochoc.journal.blocks import BEGINNING, PREAMBLE, Damaged, Unframer, framed
-from robochoc.journal.journal import BadJournal, Header, Recorder, lines_of, read_journal
+from robochoc.formats import InvalidInputError, read_team, write_team
+from robochoc.formats.result import ResultError, read_result, result_json
+from robochoc.journal.blocks import BEGINNING, PREAMBLE, JournalDamagedError, Unframer, framed
+from robochoc.journal.journal import Header, JournalError, Recorder, lines_of, read_journal
 from robochoc.model.outcome import Epoch, Metrics, Outcome, Place, Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.dpop import DPOP
-from robochoc.ros.source import SourceFailed
+from robochoc.ros.source import SourceError
 from tests.fuzz.harness import Target, assert_clear
 from tests.fuzz.mutations import (
     files_of,
@@ -121,7 +121,7 @@ def check_team(content: bytes) -> bool:
             return False
         try:
             team = read_team(place)
-        except InvalidInput as invalid:
+        except InvalidInputError as invalid:
             assert_clear(str(invalid))
             ran("validate", place)
             return False
@@ -188,7 +188,7 @@ def check_result(content: bytes) -> bool:
         file.write_bytes(content)
         try:
             outcome = read_result(content)
-        except BadResult:
+        except ResultError:
             ran("animate", file, "-o", place / "page.html")
             return False
         mission_of(outcome)
@@ -235,7 +235,7 @@ def spoilt_journal(chance: Random, content: bytes) -> bytes:
     unframer.feed(content)
     try:
         contents = list(iter(unframer.next, None))
-    except (Damaged, BadJournal):
+    except (JournalDamagedError, JournalError):
         return spoilt_bytes(chance, content)
     if not contents:
         return content
@@ -255,7 +255,7 @@ def check_journal(content: bytes) -> bool:
         file.write_bytes(content)
         try:
             journal = read_journal(content)
-        except BadJournal:
+        except JournalError:
             ran("journal", "show", file)
             return False
         for words in (("journal", "show", file), ("replay", file)):
@@ -289,7 +289,7 @@ def check_recording(kind: str, content: bytes) -> bool:
         file.write_bytes(content)
         try:
             heard = read(f"{kind}:{file}")
-        except SourceFailed as failed:
+        except SourceError as failed:
             assert_clear(str(failed))
             return False
         times = [one.at_ns for one in heard]

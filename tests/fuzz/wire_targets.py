@@ -9,7 +9,7 @@ from random import Random
 import msgspec
 
 from robochoc.authority.certificates import (
-    BadCertificate,
+    CertificateError,
     ca_certificate,
     check_issued,
     holder_of,
@@ -23,9 +23,9 @@ from robochoc.authority.certificates import (
     signing_request,
 )
 from robochoc.authority.frames import (
-    BadFrame,
     Certified,
     Denied,
+    FrameError,
     Introduce,
     Introduction,
     Redeem,
@@ -33,13 +33,13 @@ from robochoc.authority.frames import (
     decode_answer,
     decode_question,
 )
-from robochoc.authority.keyring import BadCard, KeyCard
+from robochoc.authority.keyring import KeyCard, KeyCardError
 from robochoc.communication.control import Conclusion, Counters, Events, Failed, Pause, Ready, Wave
 from robochoc.communication.network import control_messages as words
-from robochoc.communication.network.framing import MASTER, Letters, Refused
+from robochoc.communication.network.framing import MASTER, FrameRefusedError, Letters
 from robochoc.communication.network.profile import (
-    BadProfile,
     Profile,
+    ProfileError,
     acquaintances,
     contradictions,
     domain_of,
@@ -48,7 +48,7 @@ from robochoc.communication.network.profile import (
     profile_of,
     silhouette,
 )
-from robochoc.communication.network.shared import BadShared, SharedRecord, known_of, record_of
+from robochoc.communication.network.shared import SharedConstraintError, SharedRecord, known_of, record_of
 from robochoc.formats import on_one_line
 from robochoc.journal.events import AnyEvent, Decided, Sent
 from robochoc.model.outcome import Metrics, Place, Verdict
@@ -60,7 +60,7 @@ from robochoc.services.directory import Directory
 from robochoc.services.facilitator import handle, subscribe
 from robochoc.services.identifier import AgentIdentifier, identifier_on
 from robochoc.services.sl import Function, df_on, request
-from robochoc.sniffer.acl import ACLMessage, BadACL, parse, text
+from robochoc.sniffer.acl import ACLError, ACLMessage, parse, text
 from robochoc.solver.explanation import Known
 from tests.fuzz.harness import Target, assert_said
 from tests.fuzz.mutations import one_of, spoilt_bytes, spoilt_msgpack, spoilt_text
@@ -162,7 +162,7 @@ def check_letter(receiver: str, content: bytes) -> bool:
                 pass
             try:
                 opened = reader.read(sender, content)
-            except Refused as refused:
+            except FrameRefusedError as refused:
                 on_one_line(str(refused)).encode()
                 continue
             accepted = True
@@ -179,9 +179,9 @@ def _look_into(word: words.Word) -> None:
             _introduce(profile)
         case words.Shown(variables):
             for name, ranges in variables.items():
-                _refused_or(BadProfile, partial(domain_of, name, ranges))
+                _refused_or(ProfileError, partial(domain_of, name, ranges))
         case words.Joined(_, card):
-            _refused_or(BadCard, partial(KeyCard.decode, card))
+            _refused_or(KeyCardError, partial(KeyCard.decode, card))
         case words.Ask(_, text):
             check_request(text.encode())
         case words.Copies(_, content):
@@ -203,7 +203,7 @@ def _refused_or(refusal: type[ValueError], act: Callable[[], object]) -> bool:
 def _introduce(profile: Profile) -> bool:
     try:
         robot = silhouette(profile, {})
-    except BadProfile as bad:
+    except ProfileError as bad:
         assert_said(bad)
         return False
     others = {one.name: profile_of(one) for one in _teams()[0].robots}
@@ -243,7 +243,7 @@ def check_records(content: bytes) -> bool:
     for record in found:
         try:
             known = known_of(record)
-        except BadShared as bad:
+        except SharedConstraintError as bad:
             assert_said(bad)
             continue
         accepted = True
@@ -307,7 +307,7 @@ def check_act(content: bytes) -> bool:
     """A message of FIPA ACL is read or refused; what is read is written, and read as the same."""
     try:
         message = parse(content.decode("utf-8", "replace"))
-    except BadACL as bad:
+    except ACLError as bad:
         assert_said(bad)
         return False
     assert parse(text(message)) == message, "another message is read from what was written"
@@ -339,16 +339,16 @@ def check_question(content: bytes) -> bool:
     for decode in (decode_question, decode_answer):
         try:
             frame = decode(content)
-        except BadFrame as bad:
+        except FrameError as bad:
             assert_said(bad)
             continue
         accepted = True
         assert decode(_packed(frame)) == frame
         match frame:
             case Redeem(_, asked) | Renew(asked):
-                _refused_or(BadCertificate, partial(read_request, asked))
+                _refused_or(CertificateError, partial(read_request, asked))
             case Introduction(certificate) | Certified(certificate):
-                _refused_or(BadCertificate, partial(_look_at, certificate))
+                _refused_or(CertificateError, partial(_look_at, certificate))
             case _:
                 pass
     return accepted

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.authority.certificates import (
-    BadCertificate,
+    CertificateError,
     ca_certificate,
     moment,
     new_key,
@@ -17,7 +17,7 @@ from robochoc.authority.certificates import (
     read_request,
     signing_request,
 )
-from robochoc.formats.result import BadResult, read_result
+from robochoc.formats.result import ResultError, read_result
 from robochoc.ros.recordings.types import types_of
 from tests.fuzz.file_targets import TARGETS as FILES
 from tests.fuzz.harness import Findings, Target, TooDearError, spoilt, tried
@@ -87,17 +87,17 @@ def test_requests_and_certificates_of_other_versions_are_malformed() -> None:
     request, certificate = signing_request(key, "R1"), pem(ca_certificate(key, moment(1_800_000_000.0)))
     version = b"\x02\x01\x00"
     assert read_request(of_version(request, version, 0))[0] == "R1"
-    with pytest.raises(BadCertificate, match="malformed"):
+    with pytest.raises(CertificateError, match="malformed"):
         read_request(of_version(request, version, 1))
     version = b"\xa0\x03\x02\x01\x02"
     assert read_certificate(of_version(certificate, version, 2)).serial_number
-    with pytest.raises(BadCertificate, match="no certificate"):
+    with pytest.raises(CertificateError, match="no certificate"):
         read_certificate(of_version(certificate, version, 34))
 
 
 @pytest.mark.parametrize("content", [b'"\xd2"', b'{"team": "\xff"}', b"[" * 10**6])
 def test_what_is_not_utf_8_or_too_deep_is_no_result(content: bytes) -> None:
-    with pytest.raises(BadResult):
+    with pytest.raises(ResultError):
         read_result(content)
 
 

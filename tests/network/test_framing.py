@@ -34,7 +34,15 @@ from robochoc.communication.network.control_messages import (
     Welcome,
     Word,
 )
-from robochoc.communication.network.framing import LARGEST_LETTER, MASTER, Letter, Letters, Opened, Refused, TooLarge
+from robochoc.communication.network.framing import (
+    LARGEST_LETTER,
+    MASTER,
+    FrameRefusedError,
+    Letter,
+    Letters,
+    MessageTooLargeError,
+    Opened,
+)
 from robochoc.communication.network.profile import Profile
 from robochoc.journal.events import Received
 from robochoc.model.outcome import Metrics, Place
@@ -132,7 +140,7 @@ def test_letters_are_numbered_by_pair_and_come_once() -> None:
         opened = reader.read("R1", content)
         assert opened == Opened(number, said(number))
         reader.take("R1", opened.number)
-        with pytest.raises(Refused, match=f"replay: letter {number} has come before"):
+        with pytest.raises(FrameRefusedError, match=f"replay: letter {number} has come before"):
             reader.read("R1", content)
 
 
@@ -141,14 +149,14 @@ def test_what_was_not_taken_may_come_again() -> None:
     content = writer.write("R2", said(1))
     assert [reader.read("R1", content) for _ in range(2)] == [(1, said(1))] * 2
     reader.take("R1", 1)
-    with pytest.raises(Refused, match="replay"):
+    with pytest.raises(FrameRefusedError, match="replay"):
         reader.read("R1", content)
 
 
 def test_a_missing_letter_is_missed() -> None:
     writer, reader = pair()
     first, second = (writer.write("R2", said(n)) for n in (1, 2))
-    with pytest.raises(Refused, match="letter 1 is missing before letter 2"):
+    with pytest.raises(FrameRefusedError, match="letter 1 is missing before letter 2"):
         reader.read("R1", second)
     reader.take("R1", reader.read("R1", first).number)
     assert reader.read("R1", second).word == said(2)
@@ -159,24 +167,24 @@ def test_senders_do_not_use_up_each_others_numbers() -> None:
     for sender in ("R1", "R2"):
         opened = reader.read(sender, Letters(sender, "run").write("R9", said(1)))
         reader.take(sender, opened.number)
-    with pytest.raises(Refused, match="letter 2 is missing before letter 3"):
+    with pytest.raises(FrameRefusedError, match="letter 2 is missing before letter 3"):
         reader.read("R2", msgspec.msgpack.encode(Letter("run", 3, said(3))))
 
 
 @pytest.mark.parametrize("number", [0, -1, -(2**63)])
 def test_numbers_begin_at_1(number: int) -> None:
-    with pytest.raises(Refused, match="replay"):
+    with pytest.raises(FrameRefusedError, match="replay"):
         pair()[1].read("R1", msgspec.msgpack.encode(Letter("run", number, said(1))))
 
 
 def test_letters_of_another_run_are_replays() -> None:
     old, reader = Letters("R1", "before"), Letters("R2", "run")
     content = old.write("R2", said(1))
-    with pytest.raises(Refused, match="another run"):
+    with pytest.raises(FrameRefusedError, match="another run"):
         reader.read("R1", content)
-    with pytest.raises(Refused, match="another run"):
+    with pytest.raises(FrameRefusedError, match="another run"):
         Letters("R2").read("R1", content)
-    with pytest.raises(Refused, match="another run"):
+    with pytest.raises(FrameRefusedError, match="another run"):
         Letters("R2").read("R1", Letters("R1").write("R2", said(1)))  # no run is no run in common
 
 
@@ -197,7 +205,7 @@ def test_another_life_begins_at_1_for_that_robot_only() -> None:
     master.forget("R7")
     assert (master.next_number("R1"), master.next_number("R2")) == (1, 2)
     assert master.read("R1", Letters("R1", "run").write(MASTER, Ready(1))).number == 1
-    with pytest.raises(Refused, match="replay"):
+    with pytest.raises(FrameRefusedError, match="replay"):
         master.read("R2", Letters("R2", "run").write(MASTER, Ready(1)))
 
 
@@ -219,14 +227,14 @@ def test_words_before_a_run_have_no_number() -> None:
 
 def test_a_letter_that_is_too_large_is_not_written_and_uses_no_number() -> None:
     writer, reader = pair()
-    with pytest.raises(TooLarge, match=r"R1 to R2 has 8,\d\d\d,\d\d\d bytes, more than 8,388,608"):
+    with pytest.raises(MessageTooLargeError, match=r"R1 to R2 has 8,\d\d\d,\d\d\d bytes, more than 8,388,608"):
         writer.write("R2", Said(1, 0, bytes(LARGEST_LETTER)))
     assert reader.read("R1", writer.write("R2", said(1))).number == 1
 
 
 def test_a_letter_that_is_too_large_is_not_read() -> None:
     content = msgspec.msgpack.encode(Letter("run", 1, Said(1, 0, bytes(LARGEST_LETTER))))
-    with pytest.raises(Refused, match="more than 8,388,608"):
+    with pytest.raises(FrameRefusedError, match="more than 8,388,608"):
         pair()[1].read("R1", content)
 
 
@@ -259,7 +267,7 @@ def test_words_of_another_direction_are_refused(
             if place == direction:
                 assert type(reader.read(sender, content).word) is kind
             else:
-                with pytest.raises(Refused, match="malformed"):
+                with pytest.raises(FrameRefusedError, match="malformed"):
                     reader.read(sender, content)
 
 
@@ -270,7 +278,7 @@ def test_words_of_another_direction_are_refused(
 @given(content=st.binary(max_size=200))
 @settings(max_examples=100, deadline=None)
 def test_arbitrary_bytes_are_refused(sender: str, receiver: str, content: bytes) -> None:
-    with pytest.raises(Refused, match="malformed"):
+    with pytest.raises(FrameRefusedError, match="malformed"):
         Letters(receiver, "run").read(sender, content)
 
 
@@ -298,7 +306,7 @@ def test_damaged_letters_are_refused_or_read_never_worse(letter: tuple[str, str,
         reader = Letters(receiver, "run")
         try:
             opened = reader.read(sender, damaged)
-        except Refused:
+        except FrameRefusedError:
             continue
         assert opened.number in {0, 1}  # a bit of the content can be another
 
@@ -306,11 +314,11 @@ def test_damaged_letters_are_refused_or_read_never_worse(letter: tuple[str, str,
 @pytest.mark.parametrize("nested", [b"\x91" * 5000, b"\x81" * 5000, b"\x93\xa3run\x01" + b"\x92" * 100_000])
 def test_deep_nesting_is_refused(nested: bytes) -> None:
     for sender in (MASTER, "R1"):
-        with pytest.raises(Refused, match="malformed"):
+        with pytest.raises(FrameRefusedError, match="malformed"):
             Letters("R2", "run").read(sender, nested)
 
 
 def test_a_length_that_lies_allocates_nothing() -> None:
     for lie in (b"\xdd\xff\xff\xff\xff", b"\xc6\xff\xff\xff\xff", b"\xdb\xff\xff\xff\xff"):
-        with pytest.raises(Refused, match="malformed"):
+        with pytest.raises(FrameRefusedError, match="malformed"):
             pair()[1].read("R1", b"\x93\xa3run\x01\x94\xa4Said\x01\x01" + lie)

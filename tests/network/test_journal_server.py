@@ -18,7 +18,7 @@ from robochoc.communication.network.journal_server import (
     ANSWERED_AT_MOST,
     PIECE_BYTES,
     SNIFF,
-    NotAnswered,
+    NotAnsweredError,
     Piece,
     Publication,
     PublicationDesk,
@@ -26,7 +26,7 @@ from robochoc.communication.network.journal_server import (
     question,
 )
 from robochoc.communication.network.master_events import Chronicle
-from robochoc.journal.entries import BadJournal
+from robochoc.journal.entries import JournalError
 from robochoc.journal.events import AnyEvent, Granted, Refused
 
 RUN = "run"
@@ -65,7 +65,7 @@ def test_all_of_it_in_pieces_from_wherever_one_is(publication: Publication) -> N
     publication.end()
     assert piece(publication, len(got)) == Piece(RUN, len(got), b"", over=True)
     assert not piece(publication, 0).over  # a late one has more to ask for
-    with pytest.raises(NotAnswered, match="has 256,000 bytes"):
+    with pytest.raises(NotAnsweredError, match="has 256,000 bytes"):
         piece(publication, len(got) + 1)
 
 
@@ -99,7 +99,7 @@ def test_one_who_asks_without_end_is_not_answered_and_others_are(publication: Pu
         for _ in range(20 * ANSWERED_AT_MOST):
             piece(publication, 0)
 
-    with pytest.raises(NotAnswered, match="questions a second"):
+    with pytest.raises(NotAnsweredError, match="questions a second"):
         ask_on()
     assert piece(publication, 0, "Ear").content == b""
 
@@ -119,7 +119,7 @@ def test_where_nothing_can_be_written_the_run_goes_on_and_followers_are_told() -
 def test_after_it_is_closed_the_file_is_not_touched(publication: Publication, file: BinaryIO) -> None:
     publication.close()
     file.close()
-    with pytest.raises(NotAnswered):
+    with pytest.raises(NotAnsweredError):
         piece(publication, 0)
 
 
@@ -127,17 +127,17 @@ def test_after_it_is_closed_the_file_is_not_touched(publication: Publication, fi
 def test_no_bytes_are_answered_or_read_otherwise(content: bytes) -> None:
     with tempfile.TemporaryFile() as file:
         publication = Publication(file.fileno())
-        with pytest.raises(NotAnswered):
+        with pytest.raises(NotAnsweredError):
             publication.answer("Eye", content)
-    with pytest.raises(BadJournal):
+    with pytest.raises(JournalError):
         piece_in(content)
 
 
 @pytest.mark.parametrize("start", [-1, 2**53 + 1, 2**70, 1.5, "0", None])
 def test_places_that_no_journal_has(start: object, publication: Publication) -> None:
-    with pytest.raises(NotAnswered, match="malformed"):
+    with pytest.raises(NotAnsweredError, match="malformed"):
         publication.answer("Eye", msgspec.msgpack.encode([RUN, start]) if start != 2**70 else b"\x92\xa3run\xcf")
-    with pytest.raises(BadJournal):
+    with pytest.raises(JournalError):
         piece_in(msgspec.msgpack.encode([RUN, 0, bytes(PIECE_BYTES + 1), False]))
 
 

@@ -8,7 +8,7 @@ from random import Random
 import msgspec
 import pytest
 
-from robochoc.communication.network.members import Members, NotTaken
+from robochoc.communication.network.members import Members, RegistrationRefusedError
 from robochoc.communication.network.profile import Profile, Ranges
 from robochoc.formats import PREDEFINED
 from robochoc.model.problem import Constraint, Kind, Predicate
@@ -30,7 +30,7 @@ def join(members: Members, *names: str, visit: str = "first") -> None:
 
 def refused(members: Members, name: str, profile: Profile, visit: str = "first") -> str:
     before = dict(members.robots)
-    with pytest.raises(NotTaken) as caught:
+    with pytest.raises(RegistrationRefusedError) as caught:
         members.register(name, profile, visit)
     assert members.robots == before
     return str(caught.value)
@@ -231,14 +231,14 @@ def test_a_constraint_over_what_no_neighbour_has_is_told() -> None:
 
 
 def test_who_may_only_ask_does_not_take_part() -> None:
-    with pytest.raises(NotTaken, match="enrolled to observe"):
+    with pytest.raises(RegistrationRefusedError, match="enrolled to observe"):
         Members().register("A", robot("A"), "first", admitted=False)
 
 
 def test_a_robot_that_was_away_may_come_back_in_another_life() -> None:
     members = Members()
     members.register("A", robot("A"), "first")
-    with pytest.raises(NotTaken, match="registered already"):
+    with pytest.raises(RegistrationRefusedError, match="registered already"):
         members.register("A", robot("A"), "second")
     members.robots["A"].doubtful = True
     assert members.register("A", robot("A"), "second").visit == "second"

@@ -8,7 +8,7 @@ import pytest
 
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.settings import Conditions
-from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.communication.run_result import RunResult
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Decided, Lost, Received, Refused, Registered, Sent
@@ -18,7 +18,7 @@ from robochoc.protocols.findings import NOTHING
 from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import Brief
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import TooMuch
+from robochoc.solver.encoding import TooLargeError
 from robochoc.verification.checker import cost, objections
 from tests.conformance.test_complex_teams import compiled_by_hand
 from tests.support.clocks import once
@@ -183,10 +183,13 @@ def test_when_the_time_is_over_there_is_what_was_decided_so_far() -> None:
 
 def test_a_problem_that_is_too_much_for_a_robot() -> None:
     """It says so, and the run ends with that."""
-    with LocalNetwork(CHAIN, Overwhelmed) as network, pytest.raises(TooMuch, match="this is too much for RX2"):
+    with LocalNetwork(CHAIN, Overwhelmed) as network, pytest.raises(TooLargeError, match="this is too much for RX2"):
         network.search(TIMEOUT_S)
 
 
 def test_a_robot_that_breaks() -> None:
-    with LocalNetwork(CHAIN, Broken) as network, pytest.raises(RobotsLost, match="RX2 was lost: ValueError: out of"):
+    with (
+        LocalNetwork(CHAIN, Broken) as network,
+        pytest.raises(RobotsLostError, match="RX2 was lost: ValueError: out of"),
+    ):
         network.search(TIMEOUT_S)

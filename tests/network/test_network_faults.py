@@ -23,7 +23,7 @@ from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.settings import Conditions
 from robochoc.communication.network.transport import Post
-from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.communication.run_result import RunResult
 from robochoc.journal.events import AnyEvent, Lost, Received, Sent
 from robochoc.model.outcome import Verdict
@@ -102,7 +102,7 @@ def held_team(folder: Path, conditions: Conditions = Conditions()) -> Iterator[T
             yield team
         finally:
             (folder / "go").touch()
-            with suppress(RobotsLost):
+            with suppress(RobotsLostError):
                 team.end()
     assert not network.processes
 
@@ -111,7 +111,7 @@ def test_a_robot_killed_before_the_search(tmp_path: Path) -> None:
     """It is not waited for: nobody will start it again."""
     with waiting(40), held_team(tmp_path) as team:
         team.strike("RX2", signal.SIGKILL)
-        with pytest.raises(RobotsLost, match="RX2 was lost: its process was killed by SIGKILL"):
+        with pytest.raises(RobotsLostError, match="RX2 was lost: its process was killed by SIGKILL"):
             team.end()
 
 
@@ -119,7 +119,7 @@ def test_a_robot_killed_in_the_search(tmp_path: Path) -> None:
     with held_team(tmp_path) as team:
         team.wait_for_progress()
         team.strike("RX2", signal.SIGKILL)
-        with pytest.raises(RobotsLost, match="RX2 was lost: its process was killed by SIGKILL"):
+        with pytest.raises(RobotsLostError, match="RX2 was lost: its process was killed by SIGKILL"):
             team.end()
     assert [event.robot for event in team.events if isinstance(event, Lost)] == ["RX2"]
 
@@ -146,7 +146,7 @@ def test_a_robot_that_is_stopped_for_too_long(tmp_path: Path) -> None:
     with held_team(tmp_path, Conditions(lease_ms=1000, patience_s=2)) as team:
         team.wait_for_progress()
         team.strike("RX2", signal.SIGSTOP)
-        with pytest.raises(RobotsLost, match="RX2 was lost: it has not been there for 2 s"):
+        with pytest.raises(RobotsLostError, match="RX2 was lost: it has not been there for 2 s"):
             team.end()
 
 
@@ -216,7 +216,7 @@ def test_a_link_of_one_robot_that_does_not_come_back(tmp_path: Path) -> None:
         run.start("RX3", relay.endpoint)
         run.wait_for_progress()
         relay.cut()
-        with pytest.raises(RobotsLost, match="RX3 was lost: it has not been there for 3 s"):
+        with pytest.raises(RobotsLostError, match="RX3 was lost: it has not been there for 3 s"):
             run.wait_for_result()
         run.threads["RX3"].join(GONE_WITHIN_S)
         assert run.endings["RX3"].why == "the master is gone: no link to it for 3 s"
@@ -241,7 +241,7 @@ def test_a_router_that_dies(tmp_path: Path) -> None:
     with NetworkRun(tmp_path, conditions=Conditions(patience_s=3)) as run:
         run.wait_for_progress()
         os.kill(run.router, signal.SIGKILL)
-        with pytest.raises(RobotsLost, match="the router's process has ended"):
+        with pytest.raises(RobotsLostError, match="the router's process has ended"):
             run.wait_for_result()
 
 

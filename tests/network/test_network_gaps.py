@@ -21,7 +21,7 @@ from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.router import Router
 from robochoc.communication.network.settings import LEASE_MS, Conditions
 from robochoc.communication.network.transport import Post
-from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.model.outcome import Verdict
 from tests.support.faults import wait_until
 from tests.support.held import CHAIN
@@ -100,7 +100,7 @@ def test_a_gap_between_robots_that_is_one_names_the_sender(tmp_path: Path) -> No
         with run.post("RX3") as post:
             put_with_a_gap(post, "RX2", letter(run, "RX3", "RX2", Said(0, 0, b"")))
             run.wait_for_refusal("RX3", "a letter to RX2", "lost for good")
-        with pytest.raises(RobotsLost, match=r"RX3 was lost: .*RX2 says so"):
+        with pytest.raises(RobotsLostError, match=r"RX3 was lost: .*RX2 says so"):
             run.let_go()
 
 
@@ -137,7 +137,7 @@ def test_why_a_robot_fails_reaches_other_owners_as_plain_text(tmp_path: Path) ->
         post.send(MASTER, letter(run, "RX3", MASTER, Register(profile_of(CHAIN["RX3"]), "1")))
         run.wait_until(lambda: "RX3" in run.master.members.robots, "it is not registered")
         post.send(MASTER, letter(run, "RX3", MASTER, Failed("\x1b[2J\u202e" + "x" * 1_000_000)))
-        with pytest.raises(RobotsLost) as lost:
+        with pytest.raises(RobotsLostError) as lost:
             run.wait_for_result()
     assert str(lost.value).startswith(r"RX3 was lost: \x1b[2J\u202exxx")
     assert len(str(lost.value)) < 1000

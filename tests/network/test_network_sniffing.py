@@ -21,11 +21,11 @@ from robochoc.communication.network.control_messages import Sniff, Sniffable
 from robochoc.communication.network.framing import MASTER, Letters
 from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.journal_server import ANSWERED_AT_MOST, Publication, piece_in, question
-from robochoc.communication.network.transport import CannotConnect
+from robochoc.communication.network.transport import CannotConnectError
 from robochoc.journal.blocks import BEGINNING, PREAMBLE, framed
 from robochoc.model.outcome import Verdict
-from robochoc.run.networked.address import Place
-from robochoc.run.networked.consult import NoAnswer
+from robochoc.run.networked.address import Address
+from robochoc.run.networked.consult import NoAnswerError
 from robochoc.sniffer.remote import Followed, receive
 from tests.support.clocks import waiting
 from tests.support.network_runs import NetworkRun
@@ -89,14 +89,14 @@ class Sniffing:
         host, _, port = self._run.endpoint.rpartition(":")
         try:
             self.ending = receive(
-                Place(host, int(port)),
+                Address(host, int(port)),
                 self._run.household.identity(self._name),
                 self.content.extend,
                 patience_s=PATIENCE_S,
                 stopped=self._stop.is_set,
                 granted=self.granted.set,
             )
-        except (NoAnswer, CannotConnect) as error:
+        except (NoAnswerError, CannotConnectError) as error:
             self.error = error
 
     def ended(self) -> Followed | Exception | None:

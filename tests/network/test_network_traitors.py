@@ -15,7 +15,7 @@ from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.profile import Profile, profile_of
 from robochoc.communication.network.settings import Conditions
 from robochoc.communication.network.transport import Post
-from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Kind
@@ -46,7 +46,7 @@ def test_a_robot_is_revoked_and_the_run_ends(tmp_path: Path) -> None:
     with NetworkRun(tmp_path, conditions=Conditions(patience_s=3)) as run:
         run.wait_for_progress()
         run.household.revoke("RX2")
-        with pytest.raises(RobotsLost, match="RX2 was lost: its certificate was revoked"):
+        with pytest.raises(RobotsLostError, match="RX2 was lost: its certificate was revoked"):
             run.wait_for_result()
 
 
@@ -163,5 +163,5 @@ def test_a_message_that_is_lost_for_good_ends_the_run(tmp_path: Path) -> None:
             post.send("RX3", letter(run, "RX2", "RX3", Said(0, 0, b"")))
             post.send("RX3", letter(run, "RX2", "RX3", Said(0, 0, b"")))
             run.wait_for_refusal("RX2", "letter to RX3", "letter 1 has come before")
-        with pytest.raises(RobotsLost, match="MASTER was lost: 1 messages between robots were lost for good"):
+        with pytest.raises(RobotsLostError, match="MASTER was lost: 1 messages between robots were lost for good"):
             run.let_go()

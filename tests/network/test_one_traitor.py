@@ -15,7 +15,7 @@ from robochoc.communication.network.control_messages import Account, Exchanged, 
 from robochoc.communication.network.plausibility import Declared
 from robochoc.communication.network.search_state import Tally
 from robochoc.communication.processes.processes import ProcessesRun
-from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.formats.result import read_result, result_json
 from robochoc.model.outcome import ALL_ROBOTS, Metrics, Outcome, Place, Thoroughness, Verdict
 from robochoc.model.problem import Constraint, Team
@@ -110,7 +110,7 @@ class Sly(ABT):
 
 
 def test_processes_are_held_to_the_same() -> None:
-    with ProcessesRun(CHAIN, Sly) as run, pytest.raises(RobotsLost, match="it has concluded optimal, and a robot"):
+    with ProcessesRun(CHAIN, Sly) as run, pytest.raises(RobotsLostError, match="it has concluded optimal, and a robot"):
         run.search()
 
 

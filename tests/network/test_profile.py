@@ -19,8 +19,8 @@ from robochoc.communication.network.profile import (
     LONGEST_NAME,
     MOST_NEIGHBOURS,
     MOST_VARIABLES,
-    BadProfile,
     Profile,
+    ProfileError,
     acquaintances,
     among,
     contradictions,
@@ -230,14 +230,14 @@ def test_a_silhouette_shows_what_was_told() -> None:
     ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_absurd_profiles_are_refused(profile: Profile, why: str) -> None:
-    with pytest.raises(BadProfile, match=why):
+    with pytest.raises(ProfileError, match=why):
         silhouette(profile, {})
 
 
 def test_what_is_shown_later_is_looked_at_as_well() -> None:
-    with pytest.raises(BadProfile, match="Y has 0 values"):
+    with pytest.raises(ProfileError, match="Y has 0 values"):
         silhouette(GOOD, {"Y": ()})
-    with pytest.raises(BadProfile, match="is no name"):
+    with pytest.raises(ProfileError, match="is no name"):
         silhouette(GOOD, {"": ((1, 1),)})
 
 
@@ -249,7 +249,7 @@ def test_what_is_shown_later_is_looked_at_as_well() -> None:
 def test_any_ranges_are_a_domain_or_refused(ranges: tuple[tuple[int, int], ...]) -> None:
     try:
         domain = domain_of("X", ranges)
-    except BadProfile:
+    except ProfileError:
         return
     assert list(domain) == sorted(set(domain))
     assert 0 < len(domain) <= MAX_VALUES

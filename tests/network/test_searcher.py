@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from robochoc.communication.control import Conclusion, Counters, Events, Ready
-from robochoc.communication.host import BadMessage
+from robochoc.communication.host import BadMessageError
 from robochoc.communication.network.control_messages import (
     LATEST,
     Account,
@@ -172,7 +172,7 @@ def test_what_is_no_message_is_bad() -> None:
     one = searcher(Around().surroundings())
     one.prepare()
     one.search()
-    with pytest.raises(BadMessage, match="RA sent RB what is no message"):
+    with pytest.raises(BadMessageError, match="RA sent RB what is no message"):
         one.take_in([Envelope("RA", "RB", b"\x93", 0)])
 
 
@@ -182,7 +182,7 @@ def test_what_waits_for_the_start_is_bounded_for_each_sender() -> None:
     much = bytes(100 * MIB)
     for _ in range(2):
         assert not one.hear(Envelope("RA", "RB", much, 0))
-    with pytest.raises(BadMessage, match="RA says too much before the search has begun"):
+    with pytest.raises(BadMessageError, match="RA says too much before the search has begun"):
         one.hear(Envelope("RA", "RB", much, 0))
     assert not one.hear(Envelope("RC", "RB", much, 0))
 

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from robochoc.communication.network.shared import (
     MOST_TERMS,
-    BadShared,
     PredicateRecord,
     RelationRecord,
+    SharedConstraintError,
     SharedRecord,
     known_of,
     record_of,
@@ -136,7 +136,7 @@ HOSTILE = {
 @pytest.mark.parametrize("record", HOSTILE.values(), ids=HOSTILE)
 def test_hostile_records_are_refused_at_once(record: SharedRecord) -> None:
     began = time.process_time()
-    with pytest.raises(BadShared) as caught:
+    with pytest.raises(SharedConstraintError) as caught:
         known_of(record)
     assert time.process_time() - began < 1
     assert len(str(caught.value)) < 500
@@ -146,7 +146,7 @@ def test_hostile_records_are_refused_at_once(record: SharedRecord) -> None:
 def test_any_body_is_an_expression_or_refused(body: str) -> None:
     try:
         known = known_of(predicate(body=body))
-    except BadShared:
+    except SharedConstraintError:
         return
     known.constraint.allows({"A": 1, "B": 2})
     assert sent(known) == known

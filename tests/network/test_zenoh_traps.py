@@ -17,10 +17,10 @@ from robochoc.authority.admission import Household
 from robochoc.communication.control import Failed
 from robochoc.communication.network import transport as post
 from robochoc.communication.network.access import ALL, access_control
-from robochoc.communication.network.framing import LARGEST_LETTER, MASTER, Letters, TooLarge
+from robochoc.communication.network.framing import LARGEST_LETTER, MASTER, Letters, MessageTooLargeError
 from robochoc.communication.network.inbox import Arrived, Item
 from robochoc.communication.network.local import LocalNetwork
-from robochoc.communication.network.members import Members, NotTaken
+from robochoc.communication.network.members import Members, RegistrationRefusedError
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.router import Router
 from robochoc.communication.network.settings import LEASE_MS
@@ -140,7 +140,9 @@ def test_the_largest_letter_arrives(posts: tuple[Post, Post]) -> None:
 def test_a_larger_one_is_refused_before_it_is_sent() -> None:
     assert RX_BYTES > LARGEST_LETTER
     letters = Letters("A", "run")
-    with pytest.raises(TooLarge, match=r"a message of A to MASTER has 8,388,\d+ bytes, more than 8,388,608"):
+    with pytest.raises(
+        MessageTooLargeError, match=r"a message of A to MASTER has 8,388,\d+ bytes, more than 8,388,608"
+    ):
         letters.write(MASTER, Failed("x" * LARGEST_LETTER))
     assert letters.next_number(MASTER) == 1, "what was not sent leaves no gap"
 
@@ -205,5 +207,5 @@ def test_a_profile_names_nobody_who_is_no_part_of_a_key() -> None:
     bad = type(profile)(
         profile.name, profile.kind, ("*",), (), profile.variables, {}, profile.weight, profile.dearest, ()
     )
-    with pytest.raises(NotTaken, match=r"'\*' is no name"):
+    with pytest.raises(RegistrationRefusedError, match=r"'\*' is no name"):
         Members().register(profile.name, bad, "visit")

@@ -7,7 +7,7 @@ from random import Random
 
 import pytest
 
-from robochoc.communication.host import BadSettings, settings_of
+from robochoc.communication.host import SettingsError, settings_of
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
@@ -170,7 +170,7 @@ def test_that_all_was_in_vain_is_said() -> None:
 @ALL
 @pytest.mark.parametrize("cycles", ["0", "-1", "x"])
 def test_there_is_at_least_one_cycle(protocol: type[CycleProtocol], cycles: str) -> None:
-    with pytest.raises(BadSettings, match=f"cycles is {cycles}; it must be 1 or more" if cycles != "x" else "int"):
+    with pytest.raises(SettingsError, match=f"cycles is {cycles}; it must be 1 or more" if cycles != "x" else "int"):
         settings_of(protocol, {"cycles": cycles})
 
 

@@ -24,7 +24,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.solver import filters
 from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.filters import allows
 from tests.protocols.test_pkc import SECRETS, agrees, pair_team, part
 from tests.support.agents import told
@@ -197,7 +197,7 @@ def unsaid(team: Team, name: str) -> list[tuple[str, Message]]:
 def test_a_domain_too_large_for_a_filter_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(filters, "LARGEST", 2)
     Simulation(pair_team(part("AB"), None), DisFC, Concurrent(0))
-    with pytest.raises(Unsupported, match="RA shows its neighbours 3 combinations of values"):
+    with pytest.raises(UnsupportedError, match="RA shows its neighbours 3 combinations of values"):
         Simulation(triangle(), DisFC, Concurrent(0))
 
 

@@ -16,7 +16,7 @@ from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.protocols.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
 from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import Brief
-from robochoc.solver.encoding import TooMuch, Unsupported
+from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.solver.exact import EXACT
 from tests.support.agents import told
 from tests.support.cost_problems import with_costs
@@ -27,7 +27,7 @@ from tests.support.problems import ON_ONE_MACHINE, team_of
 def test_over_the_limit_the_root_says_who_needs_how_much_before_any_table_is_made() -> None:
     robot = begun(products("ABC", "AB BC AC"), "RA", below="B", further="C")
     says = "RC needs 5,000,000,000 bytes for its tables, more than 1,073,741,824: the robots' pseudo-tree has induced"
-    with pytest.raises(TooMuch, match=re.escape(f"{says} width 7 (--set memory=BYTES raises the limit)")):
+    with pytest.raises(TooLargeError, match=re.escape(f"{says} width 7 (--set memory=BYTES raises the limit)")):
         told(robot, ("RB", dimensions({"RA": 3}, width=7, most=Need(5_000_000_000, "RC"))))
     assert robot.problem.checks == 0
 
@@ -60,7 +60,7 @@ def test_a_robot_s_arrays_never_take_more_than_it_has_told() -> None:
 
 def test_sizes_do_not_overflow() -> None:
     robot = begun(products("AB", "AB"), "RA", below="B")
-    with pytest.raises(TooMuch, match=r"RA needs more than 10\^308 bytes"):
+    with pytest.raises(TooLargeError, match=r"RA needs more than 10\^308 bytes"):
         told(robot, ("RB", dimensions({f"R{number}": 10**9 for number in range(99)})))
     robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
     sizes = {f"R{number}": 10**9 for number in range(9)}
@@ -72,7 +72,7 @@ def test_sizes_do_not_overflow() -> None:
 
 def test_costs_that_may_not_be_exact_end_the_run() -> None:
     robot = begun(products("AB", "AB"), "RA", below="B")
-    with pytest.raises(TooMuch, match=r"costs could add up to 2\^53 or more"):
+    with pytest.raises(TooLargeError, match=r"costs could add up to 2\^53 or more"):
         told(robot, ("RB", dimensions({"RA": 3}, dearest=EXACT)))
 
 
@@ -93,7 +93,7 @@ def test_a_run_over_the_limit_says_the_same_in_every_runtime(withdraw: Withdrawa
     said = []
     for runtime in ON_ONE_MACHINE:
         options = Options(protocol="dpop", runtime=runtime, settings={"memory": "100"}, withdraw=withdraw)
-        with pytest.raises(Unsupported) as refused:
+        with pytest.raises(UnsupportedError) as refused:
             solve(team, options)
         said.append(str(refused.value))
     assert said[0] == said[1]
@@ -103,7 +103,7 @@ def test_a_run_over_the_limit_says_the_same_in_every_runtime(withdraw: Withdrawa
 
 @pytest.mark.parametrize("memory", ["0", "-1", "much"])
 def test_what_is_no_number_of_bytes_is_refused(memory: str) -> None:
-    with pytest.raises(Unsupported, match=r"--set: .*memory"):
+    with pytest.raises(UnsupportedError, match=r"--set: .*memory"):
         solve(products("AB", "AB"), Options(protocol="dpop", settings={"memory": memory}))
 
 
@@ -186,5 +186,5 @@ def test_a_value_that_comes_twice_is_refused() -> None:
 
 def test_the_limit_is_the_robots_too() -> None:
     """As the run's settings reach them."""
-    with pytest.raises(TooMuch):
+    with pytest.raises(TooLargeError):
         Simulation(products("AB", "AB"), DPOP, RandomChannels(0), brief=Brief(settings={"memory": "9"})).run()

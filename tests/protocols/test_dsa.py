@@ -8,7 +8,7 @@ from random import Random
 import pytest
 
 import robochoc.protocols.dsa
-from robochoc.communication.host import BadSettings, settings_of
+from robochoc.communication.host import SettingsError, settings_of
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
@@ -135,13 +135,13 @@ def test_variant_a_gets_better_on_the_whole() -> None:
 
 @pytest.mark.parametrize("probability", ["0", "1.5", "nan", "-1"])
 def test_a_probability_is_one(probability: str) -> None:
-    with pytest.raises(BadSettings, match="it must be more than 0 and at most 1"):
+    with pytest.raises(SettingsError, match="it must be more than 0 and at most 1"):
         settings_of(DSA, {"probability": probability})
 
 
 def test_there_are_three_variants() -> None:
     assert settings_of(DSA, {"variant": "C"}) == DSASettings(variant="C")
-    with pytest.raises(BadSettings, match="variant"):
+    with pytest.raises(SettingsError, match="variant"):
         settings_of(DSA, {"variant": "D"})
 
 

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from robochoc.communication.processes.processes import ProcessesRun
-from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.journal.events import AnyEvent, Lost
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.protocol import Protocol
@@ -58,7 +58,7 @@ FIRST, SECOND, *_ = (robot.name for robot in TEAM.robots)
     ],
 )
 def test_a_robot_that_fails_is_named(protocol: type[Protocol], lost: str, why: str) -> None:
-    with pytest.raises(RobotsLost) as caught:
+    with pytest.raises(RobotsLostError) as caught:
         speaking(protocol)
     assert lost in caught.value.robots
     assert re.search(why, caught.value.robots[lost])
@@ -66,7 +66,7 @@ def test_a_robot_that_fails_is_named(protocol: type[Protocol], lost: str, why: s
 
 def test_observers_hear_who_was_lost() -> None:
     events: list[AnyEvent] = []
-    with pytest.raises(RobotsLost) as caught:
+    with pytest.raises(RobotsLostError) as caught:
         ProcessesRun(TEAM, Leaves, observer=events.append).run()
     assert {event.robot: event.why for event in events if isinstance(event, Lost)} == caught.value.robots
 

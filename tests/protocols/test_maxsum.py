@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import robochoc.protocols.maxsum
-from robochoc.communication.host import BadSettings, settings_of
+from robochoc.communication.host import SettingsError, settings_of
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
@@ -19,7 +19,7 @@ from robochoc.protocols.cycles import Domain
 from robochoc.protocols.maxsum import MaxSum, MaxSumSettings, Q, R
 from robochoc.protocols.maxsum_factor import Factor
 from robochoc.solver import cost_table
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import told, value
 from tests.support.cost_problems import DEAREST, least_cost, random_cost_team
 from tests.support.courses import any_schedule, burden_of, course_of, domains_of, played, robot_of, started
@@ -233,7 +233,7 @@ def test_tables_in_lists_and_in_numpy_say_the_same(arity: int, monkeypatch: pyte
 def test_a_table_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cost_table, "MOST_TUPLES", 3)
     robot = middle(chain())
-    with pytest.raises(Unsupported, match="has 4 entries, more than 3"):
+    with pytest.raises(UnsupportedError, match="has 4 entries, more than 3"):
         told(robot, ("RA", TWO))
 
 
@@ -248,7 +248,7 @@ def test_a_table_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -
     ],
 )
 def test_settings_that_make_no_sense_are_refused(name: str, given: str, rule: str) -> None:
-    with pytest.raises(BadSettings, match=rule):
+    with pytest.raises(SettingsError, match=rule):
         settings_of(MaxSum, {name: given})
 
 

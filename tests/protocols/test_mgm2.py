@@ -8,7 +8,7 @@ from random import Random
 import pytest
 
 import robochoc.protocols.mgm2
-from robochoc.communication.host import BadSettings, settings_of
+from robochoc.communication.host import SettingsError, settings_of
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
@@ -203,7 +203,7 @@ def test_the_cost_never_rises_and_the_end_is_a_2_optimum(batch: int) -> None:
 
 @pytest.mark.parametrize("threshold", ["-0.1", "1.1", "nan"])
 def test_the_threshold_is_a_probability(threshold: str) -> None:
-    with pytest.raises(BadSettings, match="it must be from 0 to 1"):
+    with pytest.raises(SettingsError, match="it must be from 0 to 1"):
         settings_of(MGM2, {"threshold": threshold})
 
 

@@ -23,7 +23,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import parts
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import objections
 from tests.conformance.test_complex_teams import compiled_by_hand
 from tests.support.agents import told
@@ -143,7 +143,7 @@ def test_two_parts_that_leave_nothing_together_have_no_solution() -> None:
 
 def test_who_steps_aside_cannot_be_found_with_pkc() -> None:
     team = pair_team(part("AB", (1, 1)), part("AB"))
-    with pytest.raises(Unsupported, match="PKC"):
+    with pytest.raises(UnsupportedError, match="PKC"):
         solve(team, Options(runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL))
 
 

@@ -10,7 +10,7 @@ from random import Random
 import pytest
 
 import robochoc.protocols.sfb
-from robochoc.communication.host import BadSettings, settings_of
+from robochoc.communication.host import SettingsError, settings_of
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import Received, Sent
@@ -21,7 +21,7 @@ from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.interchangeable import one_by_one
 from robochoc.protocols.sfb import LARGEST, SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
 from robochoc.solver.agent_problem import Brief
-from robochoc.solver.encoding import TooMuch
+from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact import EXACT
 from tests.support.agents import told, value
 from tests.support.cost_problems import least_cost, random_cost_team
@@ -235,7 +235,7 @@ def test_bundles_are_explored_in_the_order_in_which_they_came() -> None:
 
 @pytest.mark.parametrize("settings", [{"batch": "0"}, {"window": "0"}, {"memory": "0"}, {"batch": "many"}])
 def test_settings_that_will_not_do_are_refused(settings: dict[str, str]) -> None:
-    with pytest.raises(BadSettings):
+    with pytest.raises(SettingsError):
         settings_of(SFB, settings)
 
 
@@ -338,7 +338,7 @@ def test_what_no_robot_says_is_refused(sender: str, message: Message) -> None:
 
 def test_costs_that_floats_do_not_hold_exactly_are_refused() -> None:
     huge = EXACT
-    with pytest.raises(TooMuch, match="2\\^53"):
+    with pytest.raises(TooLargeError, match="2\\^53"):
         introduced(team({"AB": (huge, huge, huge, huge - 1)}))
 
 

@@ -18,9 +18,16 @@ from hypothesis import strategies as st
 
 from robochoc.ros.live import rosbridge
 from robochoc.ros.live.inbox import Inbox
-from robochoc.ros.live.rosbridge import Address, Malformed, RosbridgeSink, RosbridgeSource, incoming, outgoing
-from robochoc.ros.sink import SinkFailed
-from robochoc.ros.source import Heard, SourceFailed
+from robochoc.ros.live.rosbridge import (
+    Address,
+    MalformedMessageError,
+    RosbridgeSink,
+    RosbridgeSource,
+    incoming,
+    outgoing,
+)
+from robochoc.ros.sink import SinkError
+from robochoc.ros.source import Heard, SourceError
 from tests.support.clocks import waiting
 from tests.support.rosbridge_server import Manner, Server
 from tests.support.strangers import stranger
@@ -122,15 +129,15 @@ def test_a_server_that_answers_no_service_has_read_all_when_it_closes() -> None:
 def test_nobody_listens() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
-    with pytest.raises(SinkFailed, match=rf"no rosbridge listens at ws://127.0.0.1:{port} \(.*refused\); start it"):
+    with pytest.raises(SinkError, match=rf"no rosbridge listens at ws://127.0.0.1:{port} \(.*refused\); start it"):
         RosbridgeSink(f"//127.0.0.1:{port}")
-    with pytest.raises(SourceFailed, match="no rosbridge listens"):
+    with pytest.raises(SourceError, match="no rosbridge listens"):
         RosbridgeSource(f"//127.0.0.1:{port}")
 
 
 @pytest.mark.parametrize("answer", [b"", b"HTTP/1.1 404 Not Found\r\n\r\n", b"\xff" * 100_000])
 def test_what_listens_is_no_rosbridge(answer: bytes) -> None:
-    refusal = pytest.raises(SinkFailed, match="does not answer as a rosbridge does; start it")
+    refusal = pytest.raises(SinkError, match="does not answer as a rosbridge does; start it")
     with stranger(answer, hangs_up=False) as port, waiting(3), refusal:
         RosbridgeSink(f"//127.0.0.1:{port}")
 
@@ -140,17 +147,17 @@ def test_the_server_dies() -> None:
         sink = RosbridgeSink(server.place)
         for number in range(3):
             sink.publish("/a", POSE, pose(number), STAMP)
-        with pytest.raises(SinkFailed, match="has closed the connection; see its log"):
+        with pytest.raises(SinkError, match="has closed the connection; see its log"):
             sink.close()
         sink.discard()
-        with pytest.raises(SinkFailed, match="has closed the connection"):
+        with pytest.raises(SinkError, match="has closed the connection"):
             sink.publish("/a", POSE, pose(3), STAMP)
 
 
 def test_the_server_reads_nothing() -> None:
     with Server(Manner(stalls=True)) as server:
         sink = RosbridgeSink(server.place)
-        with waiting(5), pytest.raises(SinkFailed, match=r"has read nothing for 0\.6 s"):
+        with waiting(5), pytest.raises(SinkError, match=r"has read nothing for 0\.6 s"):
             publish_long(sink, 2000)
         sink.discard()
 
@@ -159,7 +166,7 @@ def test_the_server_does_not_even_read_the_end() -> None:
     with Server(Manner(stalls=True)) as server:
         sink = RosbridgeSink(server.place)
         sink.publish("/a", POSE, pose(1), STAMP)
-        with pytest.raises(SinkFailed, match="has not said that it has read all"):
+        with pytest.raises(SinkError, match="has not said that it has read all"):
             sink.close()
 
 
@@ -168,7 +175,7 @@ def test_the_server_complains() -> None:
     with Server(Manner(complains=complaint)) as server:
         sink = RosbridgeSink(server.place)
         sink.publish("/a", "moon_msgs/Rover", {}, STAMP)
-        with pytest.raises(SinkFailed, match=r"complains: Unable to import moon_msgs.msg\\x1b\[31m; see its log"):
+        with pytest.raises(SinkError, match=r"complains: Unable to import moon_msgs.msg\\x1b\[31m; see its log"):
             sink.close()
 
 
@@ -199,7 +206,7 @@ def test_garbage_is_passed_over_or_ends_it(garbage: str | bytes, capfd: pytest.C
         assert server.wait_for(lambda: "subscribe" in server.log)
         server.say("/a/blocked", BLOCKED)
         if isinstance(garbage, bytes):
-            with pytest.raises(SourceFailed, match="has closed the connection"):
+            with pytest.raises(SourceError, match="has closed the connection"):
                 source.next(5)
         else:
             heard = source.next(5)
@@ -213,7 +220,7 @@ def test_a_message_that_is_too_long_ends_it() -> None:
         source.listen({"/a/blocked": "geometry_msgs/PointStamped"})
         assert server.wait_for(lambda: "subscribe" in server.log)
         server.say("/a/blocked", {"x": "x" * (rosbridge.MOST_BYTES + 1)})
-        with waiting(5), pytest.raises(SourceFailed, match="has closed the connection"):
+        with waiting(5), pytest.raises(SourceError, match="has closed the connection"):
             source.next(30)
 
 
@@ -222,7 +229,7 @@ def test_a_server_that_dies_wakes_who_waits(server: Server) -> None:
         source.listen({"/a": "std_msgs/String"})
         assert server.wait_for(lambda: "subscribe" in server.log)
         threading.Timer(0.2, server.die).start()
-        with waiting(5), pytest.raises(SourceFailed, match="has closed the connection"):
+        with waiting(5), pytest.raises(SourceError, match="has closed the connection"):
             source.next(60)
 
 
@@ -272,7 +279,7 @@ def test_places(place: str, url: str) -> None:
     ["", "//", "//:9090", "//host:0", "//host:port", "//host:99999", "http://host:9090", "//me:pw@host", "//[x"],
 )
 def test_no_places(place: str) -> None:
-    with pytest.raises(SinkFailed, match="expected rosbridge://HOST:PORT"):
+    with pytest.raises(SinkError, match="expected rosbridge://HOST:PORT"):
         RosbridgeSink(place)
 
 
@@ -287,7 +294,7 @@ JSON = st.recursive(
 def test_whatever_comes_is_fields_or_refused(message: object) -> None:
     try:
         fields, weight = incoming(message)
-    except Malformed:
+    except MalformedMessageError:
         return
     assert isinstance(message, dict)
     assert fields.keys() == message.keys()

@@ -19,7 +19,7 @@ from rosbags.rosbag1 import Writer as BagWriter
 from robochoc.ros.recordings import recording
 from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sinks import open_source
-from robochoc.ros.source import SourceFailed
+from robochoc.ros.source import SourceError
 from tests.support.ros_recordings import (
     FILES,
     NOW,
@@ -67,7 +67,7 @@ def test_definitions_and_messages_that_are_others_are_refused(
     kind: str, encoding: str, text: bytes, message: str, content: bytes, told: str
 ) -> None:
     file = mcap_of(kind, encoding, text, message, content)
-    with pytest.raises(SourceFailed, match=told) as failed:
+    with pytest.raises(SourceError, match=told) as failed:
         read(file)
     assert str(failed.value).startswith("other.mcap: ")
     assert str(failed.value).isprintable()
@@ -81,7 +81,7 @@ def test_a_type_that_is_defined_in_many_ways_is_refused() -> None:
         for number in range(100):
             writer.register_schema(POSE, "ros2msg", OURS + b"\n# %d" % number)
         writer.finish()  # type: ignore[no-untyped-call]
-    with pytest.raises(SourceFailed, match="in more than 64 ways"):
+    with pytest.raises(SourceError, match="in more than 64 ways"):
         read("other.mcap")
 
 
@@ -91,9 +91,7 @@ def test_a_bag_whose_types_are_others_is_refused() -> None:
             "/a_1/waypoint", "geometry_msgs/msg/PoseStamped", msgdef=HOSTILE.decode(), md5sum="0" * 32
         )
         bag.write(found, NOW, b"")
-    with pytest.raises(
-        SourceFailed, match=r"other\.bag: what stands on /a_1/waypoint cannot be read: .* MD5 sum '0000"
-    ):
+    with pytest.raises(SourceError, match=r"other\.bag: what stands on /a_1/waypoint cannot be read: .* MD5 sum '0000"):
         read("other.bag")
     assert [*Path().iterdir()] == [Path("other.bag")]
 
@@ -104,7 +102,7 @@ def test_a_file_that_is_cut_anywhere_is_refused(text: str) -> None:
     cut = Path(f"cut.{text.rpartition('.')[2]}")
     for size in {*range(0, len(whole), 211), *range(len(whole) - 20, len(whole))}:
         cut.write_bytes(whole[:size])
-        with pytest.raises(SourceFailed, match=f"^{cut}: "):
+        with pytest.raises(SourceError, match=f"^{cut}: "):
             read(cut)
 
 
@@ -121,7 +119,7 @@ def test_a_file_that_is_damaged_anywhere_is_read_or_refused(text: str) -> None:
         file.write_bytes(bad)
         try:
             found = read(file)
-        except SourceFailed:
+        except SourceError:
             continue
         else:
             # A bag has no checksums; an MCAP file has one of all that its messages stand in.
@@ -180,7 +178,7 @@ def test_bombs_are_refused_and_eat_no_memory(monkeypatch: pytest.MonkeyPatch) ->
         file = Path(f"bomb.{ending}")
         file.write_bytes(content)
         tracemalloc.start()
-        with pytest.raises(SourceFailed, match=f"^{file}: "):
+        with pytest.raises(SourceError, match=f"^{file}: "):
             read(file)
         _, peak = tracemalloc.get_traced_memory()
         tracemalloc.stop()
@@ -191,11 +189,11 @@ def test_a_file_larger_than_it_says_is_refused(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("robochoc.ros.recordings.mcap_file._CHUNK_BYTES", 500)
     file = write(FILES[0], messages(200))
     monkeypatch.setattr(recording, "WAITING_AT_MOST", 1000)
-    with pytest.raises(SourceFailed, match="out of order"):
+    with pytest.raises(SourceError, match="out of order"):
         read(file)
     monkeypatch.setattr(recording, "UNPACKED_AT_MOST", 1000)
     monkeypatch.setattr(recording, "_RATIO", 0)
-    with pytest.raises(SourceFailed, match="bytes unpack to"):
+    with pytest.raises(SourceError, match="bytes unpack to"):
         read(file)
 
 
@@ -210,7 +208,7 @@ def test_a_file_larger_than_it_says_is_refused(monkeypatch: pytest.MonkeyPatch) 
 def test_files_that_are_no_recordings(content: bytes | None, told: str) -> None:
     if content is not None:
         Path("run.mcap").write_bytes(content)
-    with pytest.raises(SourceFailed, match=f"run.mcap: {told}"):
+    with pytest.raises(SourceError, match=f"run.mcap: {told}"):
         read("run.mcap")
 
 
@@ -218,10 +216,10 @@ def test_what_is_no_file_is_not_read() -> None:
     os.mkfifo("run.bag")
     Path("run.mcap").mkdir()
     for place, told in (("run.bag", "is no file"), ("rosbag:run.mcap", "is a folder"), ("mcap:", "needs the name")):
-        with pytest.raises(SourceFailed, match=told):
+        with pytest.raises(SourceError, match=told):
             open_source(place)
     Path("old.bag").write_bytes(b"#ROSBAG V1.2\n")
-    with pytest.raises(SourceFailed, match=r"another version than 2\.0"):
+    with pytest.raises(SourceError, match=r"another version than 2\.0"):
         read("old.bag")
 
 
@@ -229,13 +227,13 @@ def test_a_folder_of_ros_2_is_its_recording() -> None:
     file = write(FILES[0], messages(20))
     folder = Path("rosbag2")
     folder.mkdir()
-    with pytest.raises(SourceFailed, match="rosbag2: is a folder without an MCAP file"):
+    with pytest.raises(SourceError, match="rosbag2: is a folder without an MCAP file"):
         open_source("mcap:rosbag2")
     (folder / "metadata.yaml").touch()
     file.rename(folder / "run_0.mcap")
     check(read("mcap:rosbag2"), messages(20))
     write("mcap:rosbag2/run_1.mcap", messages(20))
-    with pytest.raises(SourceFailed, match=r"rosbag2: holds several recordings: .* mcap:rosbag2/run_0\.mcap"):
+    with pytest.raises(SourceError, match=r"rosbag2: holds several recordings: .* mcap:rosbag2/run_0\.mcap"):
         open_source("mcap:rosbag2")
 
 
@@ -244,5 +242,5 @@ def test_a_bag_whose_recording_was_not_finished_is_told() -> None:
     whole = file.read_bytes()
     place = whole.index(b"index_pos=") + len(b"index_pos=")
     file.write_bytes(whole[:place] + bytes(8) + whole[place + 8 :])
-    with pytest.raises(SourceFailed, match="rosbag reindex"):
+    with pytest.raises(SourceError, match="rosbag reindex"):
         read(file)

@@ -16,7 +16,7 @@ from robochoc.model.problem import Topic
 from robochoc.ros.publisher import Publisher
 from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sinks import open_sink
-from robochoc.ros.source import SourceFailed
+from robochoc.ros.source import SourceError
 from tests.support.clocks import working
 from tests.support.ros_recordings import FILES, TOPICS, messages, read, write
 
@@ -68,7 +68,7 @@ def test_damage_of_all_kinds_is_told_or_harmless() -> None:
             try:
                 read(file)
                 ends["read"] += 1
-            except SourceFailed as failed:
+            except SourceError as failed:
                 ends["refused" if str(failed).startswith(f"{file}: ") and str(failed).isprintable() else "mumbled"] += 1
     assert not ends["mumbled"]
     assert ends["read"] > 100

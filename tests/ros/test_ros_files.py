@@ -21,8 +21,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from robochoc.ros.recordings.mcap_file import NAMES
 from robochoc.ros.recordings.types import types_of
-from robochoc.ros.sink import SinkFailed
-from robochoc.ros.sinks import NoSuchSink, NoSuchSource, open_sink, open_source
+from robochoc.ros.sink import SinkError
+from robochoc.ros.sinks import UnknownSinkError, UnknownSourceError, open_sink, open_source
 from tests.support.ros_recordings import (
     FILES,
     NOW,
@@ -192,7 +192,7 @@ def test_files_that_cannot_be_written(text: str, monkeypatch: pytest.MonkeyPatch
         ("", "needs the name of its file"),
         ("/dev/null", "is no file"),
     ):
-        with pytest.raises(SinkFailed, match=told):
+        with pytest.raises(SinkError, match=told):
             open_sink(f"{name}:{where}")
 
     def full(*_: object) -> None:
@@ -201,7 +201,7 @@ def test_files_that_cannot_be_written(text: str, monkeypatch: pytest.MonkeyPatch
     sink = open_sink(text)
     sink.publish("/a_1/waypoint", POSE, {}, NOW)
     monkeypatch.setattr("robochoc.system.files._linked", full)
-    with pytest.raises(SinkFailed, match=f"{place}: No space left"):
+    with pytest.raises(SinkError, match=f"{place}: No space left"):
         sink.close()
     assert not [*Path().iterdir()]
 
@@ -260,11 +260,11 @@ def test_systems_without_unnamed_files(text: str, monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize("text", FILES)
 def test_what_cannot_be_published_is_told_with_its_topic(text: str) -> None:
     with open_sink(text) as sink:
-        with pytest.raises(SinkFailed, match=r": /a: .*PoseStamped: pose\.x is no field"):
+        with pytest.raises(SinkError, match=r": /a: .*PoseStamped: pose\.x is no field"):
             sink.publish("/a", POSE, {"pose": {"x": 1.0}}, NOW)
-        with pytest.raises(SinkFailed, match="/a: a recording has no time -1"):
+        with pytest.raises(SinkError, match="/a: a recording has no time -1"):
             sink.publish("/a", POSE, {}, -1)
-        with pytest.raises(SinkFailed, match=r"/a: .*no type 'my_msgs/Unheard'"):
+        with pytest.raises(SinkError, match=r"/a: .*no type 'my_msgs/Unheard'"):
             sink.advertise({"/a": "my_msgs/Unheard"})
 
 
@@ -278,9 +278,9 @@ def test_what_cannot_be_published_is_told_with_its_topic(text: str) -> None:
     ],
 )
 def test_sinks_that_there_are_not(text: str, told: str) -> None:
-    with pytest.raises(NoSuchSink, match=told):
+    with pytest.raises(UnknownSinkError, match=told):
         open_sink(text)
-    with pytest.raises(NoSuchSource, match=told.replace("sink", "source")):
+    with pytest.raises(UnknownSourceError, match=told.replace("sink", "source")):
         open_source(text)
 
 
@@ -288,6 +288,6 @@ def test_an_extra_that_is_not_installed_is_told(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.delitem(sys.modules, "robochoc.ros.recordings.mcap_file", raising=False)
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     with pytest.raises(
-        NoSuchSink, match=r"mcap needs mcap.writer, which is not installed: pip install 'robochoc\[mcap\]'"
+        UnknownSinkError, match=r"mcap needs mcap.writer, which is not installed: pip install 'robochoc\[mcap\]'"
     ):
         open_sink("mcap:run.mcap")

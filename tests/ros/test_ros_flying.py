@@ -16,7 +16,7 @@ from robochoc.model.change import changed_by
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Event, RemoveAgent, RemoveValue
 from robochoc.ros.closed_loop import Loop, drones_of
-from robochoc.ros.simulated import CannotFly, Flying, NoSuchDrone, Surroundings
+from robochoc.ros.simulated import CannotFlyError, Flying, Surroundings, UnknownDroneError
 from robochoc.run.orchestrator import Options, Runtime, solve
 from robochoc.verification.checker import objections
 from tests.support.problems import ON_ONE_MACHINE
@@ -145,10 +145,10 @@ def test_one_after_the_other_falls_out() -> None:
 
 
 def test_who_is_to_fail_has_to_be_there() -> None:
-    with pytest.raises(NoSuchDrone, match="no drone 'Wing' that could fail, but Fin, Nose"):
+    with pytest.raises(UnknownDroneError, match="no drone 'Wing' that could fail, but Fin, Nose"):
         Surroundings(failures=(("Wing", 1.0),)).check(drones_of(HANGAR))
 
 
 def test_places_nearer_than_the_distance_to_keep_are_refused() -> None:
-    with pytest.raises(CannotFly, match="5 m are to be kept"):
+    with pytest.raises(CannotFlyError, match="5 m are to be kept"):
         looped(Surroundings(distance=5.0))

@@ -11,7 +11,7 @@ from dataclasses import replace
 import pytest
 
 from robochoc.api import Problem
-from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.formats import read_team
 from robochoc.model.outcome import Epoch, Outcome, Verdict
 from robochoc.model.problem import AddAgent, Event, RemoveAgent, RemoveValue, Team
@@ -19,9 +19,9 @@ from robochoc.ros.closed_loop import Loop, drones_of
 from robochoc.ros.listening import Listening
 from robochoc.ros.reading import Reading
 from robochoc.ros.sink import Fields, Sink
-from robochoc.ros.source import Heard, Source, SourceFailed
+from robochoc.ros.source import Heard, Source, SourceError
 from robochoc.run.orchestrator import OnLoss, Options, Runtime, Withdrawal, solve
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 from tests.conformance.test_epochs import pair
 from tests.support.clocks import waiting
 from tests.support.problems import ON_ONE_MACHINE
@@ -99,7 +99,7 @@ def test_an_epoch_without_a_solution_may_be_followed_by_one_with() -> None:
     ],
 )
 def test_what_a_changing_problem_cannot_have_is_refused(options: Options, named: str) -> None:
-    with pytest.raises(Unsupported, match=f"{named} is for problems that do not change"):
+    with pytest.raises(UnsupportedError, match=f"{named} is for problems that do not change"):
         solve(pair(values=3), options, field=Says())
 
 
@@ -138,7 +138,7 @@ class Striking(Says):
 def test_a_robot_that_dies_while_the_team_waits_is_lost() -> None:
     options = Options(protocol="dynabt")
     event = Event((RemoveValue("A", 1),))
-    with pytest.raises(RobotsLost) as lost:
+    with pytest.raises(RobotsLostError) as lost:
         solve(pair(values=3), options, field=Striking(event))
     assert "RB" in lost.value.robots
     surviving = Options(protocol="dynabt", on_loss=OnLoss.WITHDRAW)
@@ -147,13 +147,13 @@ def test_a_robot_that_dies_while_the_team_waits_is_lost() -> None:
     assert (outcome.lost, outcome.assignment) == (("RB",), {"A": 2})
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt, SourceFailed("the robots cannot be heard any more")])
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SourceError("the robots cannot be heard any more")])
 def test_no_process_outlives_a_field_that_fails(error: BaseException | type[BaseException]) -> None:
     def fails(_team: Team, _epoch: Epoch, _left_s: float | None) -> Event | None:
         assert len(multiprocessing.active_children()) == 2
         raise error
 
-    with pytest.raises((KeyboardInterrupt, SourceFailed)):
+    with pytest.raises((KeyboardInterrupt, SourceError)):
         solve(pair(values=3), Options(protocol="dynabt"), field=fails)
     assert multiprocessing.active_children() == []
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from robochoc.flight.mission import Drone
 from robochoc.model.problem import Topic
-from robochoc.ros.names import LONGEST, REPORTS, NameClash, Names, ros_name
+from robochoc.ros.names import LONGEST, REPORTS, NameClashError, Names, ros_name
 
 TOKEN = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 TOPICS = st.text(min_size=1, max_size=30) | st.from_regex(
@@ -37,7 +37,7 @@ def test_names_are_legal_and_lead_back_or_are_refused(offered: list[tuple[str, s
     drones = [drone(name, topic, f"R{number}") for number, (name, topic) in enumerate(offered)]
     try:
         names = Names(drones)
-    except NameClash:
+    except NameClashError:
         return
     waypoints = [topic for number in range(len(drones)) if (topic := names.waypoint(number))]
     published = [*waypoints, *names.reports()]
@@ -91,7 +91,7 @@ def test_a_waypoint_that_is_called_like_a_report_is_no_report() -> None:
 
 
 def test_a_clash_names_topics_robots_and_the_way_out() -> None:
-    with pytest.raises(NameClash) as clash:
+    with pytest.raises(NameClashError) as clash:
         Names([drone("A", "/a.1/w", "North"), drone("B", "/a_1/w", "South")])
     told = "topic '/a.1/w' of North and topic '/a_1/w' of South would both publish on /a_1/w in ROS: rename one of them"
     assert str(clash.value) == told
@@ -99,27 +99,27 @@ def test_a_clash_names_topics_robots_and_the_way_out() -> None:
 
 def test_drones_do_not_share_a_topic() -> None:
     with pytest.raises(
-        NameClash, match=r"A \(North\) and B \(South\) both publish on '/w': give each a topic of its own"
+        NameClashError, match=r"A \(North\) and B \(South\) both publish on '/w': give each a topic of its own"
     ):
         Names([drone("A", "/w", "North"), drone("B", "/w", "South")])
 
 
 def test_a_report_does_not_run_into_a_waypoint() -> None:
-    with pytest.raises(NameClash, match=r"/a/pose in ROS"):
+    with pytest.raises(NameClashError, match=r"/a/pose in ROS"):
         Names([drone("A", "/a"), drone("B", "/b"), drone("C", "/a/pose")])
 
 
 def test_drones_without_topics_clash_by_their_names() -> None:
-    with pytest.raises(NameClash, match=r"drone 'a\.b' of .* and drone 'a b' of .* on /a_b/"):
+    with pytest.raises(NameClashError, match=r"drone 'a\.b' of .* and drone 'a b' of .* on /a_b/"):
         Names([drone("a.b", None), drone("a b", None)])
 
 
 def test_a_name_that_is_too_long_is_refused() -> None:
-    with pytest.raises(NameClash, match="too long"):
+    with pytest.raises(NameClashError, match="too long"):
         Names([drone("A", "/" + "a" * LONGEST)])
 
 
 def test_a_clash_does_not_speak_to_the_terminal() -> None:
-    with pytest.raises(NameClash) as clash:
+    with pytest.raises(NameClashError) as clash:
         Names([drone("A", "/a\x1b[2J", "North\n"), drone("B", "/a\x1b[2J", "South")])
     assert str(clash.value).isprintable()

@@ -14,8 +14,8 @@ import pytest
 
 from robochoc.ros.live import rospy_node
 from robochoc.ros.live.rospy_node import RospySink, RospySource, fields_of, filled, message_class
-from robochoc.ros.sink import SinkFailed
-from robochoc.ros.source import SourceFailed
+from robochoc.ros.sink import SinkError
+from robochoc.ros.source import SourceError
 from tests.support.clocks import waiting
 from tests.support.strangers import stranger
 
@@ -36,16 +36,16 @@ def listener(monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
 
 def test_without_rospy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rospy", None)
-    with pytest.raises(SinkFailed, match=r"rospy cannot be imported .*; source a ROS 1 workspace, or install Debian's"):
+    with pytest.raises(SinkError, match=r"rospy cannot be imported .*; source a ROS 1 workspace, or install Debian's"):
         RospySink("")
-    with pytest.raises(SourceFailed, match="rospy cannot be imported"):
+    with pytest.raises(SourceError, match="rospy cannot be imported"):
         RospySource("")
 
 
 @pytest.mark.usefixtures("_rospy")
 def test_rospy_takes_no_place() -> None:
     with pytest.raises(
-        SinkFailed, match=r"rospy takes no place, and got 'localhost:11311'; say where .* ROS_MASTER_URI"
+        SinkError, match=r"rospy takes no place, and got 'localhost:11311'; say where .* ROS_MASTER_URI"
     ):
         RospySink("localhost:11311")
 
@@ -53,13 +53,13 @@ def test_rospy_takes_no_place() -> None:
 @pytest.mark.usefixtures("_rospy")
 def test_nobody_listens(listener: socket.socket) -> None:
     listener.close()
-    with pytest.raises(SinkFailed, match=r"no ROS master answers at http://127.* \(.*refused\); start `roscore`"):
+    with pytest.raises(SinkError, match=r"no ROS master answers at http://127.* \(.*refused\); start `roscore`"):
         RospySink("")
 
 
 @pytest.mark.usefixtures("_rospy", "listener")
 def test_a_master_that_says_nothing() -> None:
-    with waiting(3), pytest.raises(SourceFailed, match=r"no ROS master answers .* \(timed out\); start `roscore`"):
+    with waiting(3), pytest.raises(SourceError, match=r"no ROS master answers .* \(timed out\); start `roscore`"):
         RospySource("")
 
 
@@ -68,7 +68,7 @@ def test_a_master_that_says_nothing() -> None:
 def test_what_listens_is_no_master(monkeypatch: pytest.MonkeyPatch, answer: bytes) -> None:
     with stranger(answer, hangs_up=True) as port:
         monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{port}")
-        with pytest.raises(SinkFailed, match=r"no ROS master answers at .*; start `roscore`, or set ROS_MASTER_URI"):
+        with pytest.raises(SinkError, match=r"no ROS master answers at .*; start `roscore`, or set ROS_MASTER_URI"):
             RospySink("")
 
 
@@ -76,7 +76,7 @@ def test_what_listens_is_no_master(monkeypatch: pytest.MonkeyPatch, answer: byte
 @pytest.mark.parametrize("uri", ["localhost:11311", "ftp://localhost", "http://", "http://[x", ""])
 def test_a_master_whose_address_is_none(monkeypatch: pytest.MonkeyPatch, uri: str) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", uri)
-    with pytest.raises(SinkFailed, match="set ROS_MASTER_URI"):
+    with pytest.raises(SinkError, match="set ROS_MASTER_URI"):
         RospySink("")
 
 
@@ -87,7 +87,7 @@ def test_a_master_that_refuses(listener: socket.socket, monkeypatch: pytest.Monk
         monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{server.server_address[1]}")
         server.register_function(lambda _: [-1, "go away", 0], "getPid")
         threading.Thread(target=server.handle_request, daemon=True).start()
-        with pytest.raises(SinkFailed, match=r"the ROS master at .* refuses, it says: .*go away.*; see its log"):
+        with pytest.raises(SinkError, match=r"the ROS master at .* refuses, it says: .*go away.*; see its log"):
             RospySink("")
 
 
@@ -136,7 +136,7 @@ def _messages(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_fields_there_and_back(kind: str) -> None:
     part = {"stamp": 1_700_000_000_123_456_789, "x": 1.5}
     fields = {"part": part, "parts": [part, {"stamp": 0, "x": 2.0}], "name": "a"}
-    assert fields_of(filled(message_class(kind, SinkFailed)(), fields)) == fields
+    assert fields_of(filled(message_class(kind, SinkError)(), fields)) == fields
     assert fields_of(Whole()) == {"part": {"stamp": 0, "x": 0.0}, "parts": [], "name": ""}
 
 
@@ -149,5 +149,5 @@ def test_a_field_that_is_none() -> None:
 @pytest.mark.usefixtures("_messages")
 @pytest.mark.parametrize("kind", ["my_msgs/Rover", "no_such_msgs/Rover", "Rover", "../os/system", "os/path", ""])
 def test_a_type_that_is_none(kind: str) -> None:
-    with pytest.raises(SinkFailed, match="rospy knows no message type"):
-        message_class(kind, SinkFailed)
+    with pytest.raises(SinkError, match="rospy knows no message type"):
+        message_class(kind, SinkError)

@@ -240,7 +240,7 @@ def test_the_team_can_always_take_it_and_what_is_blocked_is_nobodys(heard: list[
     obstacles: list[tuple[float, float, float]] = []
     for report in heard:
         there = report.drone in team
-        team = changed(team, sees.heed(team, report))  # raises `BadChange` for what it cannot take
+        team = changed(team, sees.heed(team, report))  # raises `ChangeError` for what it cannot take
         if isinstance(report, Blocked) and there:
             obstacles.append(report.place)
         elif isinstance(report, Cleared) and there:

@@ -12,7 +12,7 @@ from mcap_ros2._dynamic import generate_dynamic
 
 from robochoc.ros.names import REPORTS
 from robochoc.ros.recordings.definitions import LONGEST, same_fields
-from robochoc.ros.recordings.types import BadFields, UnknownType, Version, types_of
+from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, Version, types_of
 
 POSE = "geometry_msgs/PoseStamped"
 BATTERY = "sensor_msgs/BatteryState"
@@ -102,7 +102,7 @@ def test_the_reference_reads_what_is_written(fields: dict[str, Any]) -> None:
 )
 @pytest.mark.parametrize("version", [1, 2])
 def test_what_is_no_field_is_told_by_its_name(version: Version, kind: str, fields: Any, told: str) -> None:  # noqa: ANN401
-    with pytest.raises(BadFields) as wrong:
+    with pytest.raises(FieldsError) as wrong:
         types_of(version).encode(kind, fields)
     assert str(wrong.value).startswith(f"{kind}: {told}")
 
@@ -116,7 +116,7 @@ def test_numbers_of_numpy_are_numbers() -> None:
 
 @pytest.mark.parametrize("kind", ["my_msgs/Nothing", "PoseStamped", "", "../../etc"])
 def test_types_that_nobody_defines(kind: str) -> None:
-    with pytest.raises(UnknownType, match="its mapping can bring the definition"):
+    with pytest.raises(UnknownTypeError, match="its mapping can bring the definition"):
         types_of(2).encode(kind, {})
 
 
@@ -135,7 +135,7 @@ def test_any_bytes_are_a_message_or_are_refused(kind: str, content: bytes, versi
     types = types_of(version)
     try:
         fields = types.decode(kind, content)
-    except BadFields:
+    except FieldsError:
         return
     assert isinstance(fields, dict)
 
@@ -144,10 +144,10 @@ def test_any_bytes_are_a_message_or_are_refused(kind: str, content: bytes, versi
 def test_a_message_that_is_cut_or_lies_about_its_sizes_is_refused(size: int, place: int) -> None:
     types = types_of(2)
     whole = types.encode("std_msgs/String", {"data": "x" * 80})
-    with pytest.raises(BadFields):
+    with pytest.raises(FieldsError):
         types.decode("std_msgs/String", whole[:place])
     if size != 81:
-        with pytest.raises(BadFields):
+        with pytest.raises(FieldsError):
             types.decode("std_msgs/String", whole[:4] + (size % (1 << 32)).to_bytes(4, "little") + whole[8:])
 
 

@@ -14,10 +14,10 @@ from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose,
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Topic
 from robochoc.ros import mappings
-from robochoc.ros.mappings import NoMapping, WaypointMapping, kinds, mapping_for, short_kind
+from robochoc.ros.mappings import NoMappingError, WaypointMapping, kinds, mapping_for, short_kind
 from robochoc.ros.names import REPORTS
-from robochoc.ros.publisher import NothingToPublish, Publisher
-from robochoc.ros.recordings.types import UnknownType, types_of
+from robochoc.ros.publisher import NothingToPublishError, Publisher
+from robochoc.ros.recordings.types import UnknownTypeError, types_of
 from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.waypoint import Waypoint
 from tests.support.offered import offered
@@ -161,14 +161,14 @@ def test_what_a_battery_does_not_measure_is_not_zero() -> None:
 
 
 def test_a_team_without_topics_has_nothing_to_publish() -> None:
-    with pytest.raises(NothingToPublish, match="no drone of queens has a topic"):
+    with pytest.raises(NothingToPublishError, match="no drone of queens has a topic"):
         Publisher("queens", DRONES[2:3], [Heap()])
 
 
 @pytest.mark.parametrize("kind", ["sensor_msgs/Image", "PoseStamped", "", "a/b/c", "geometry_msgs/srv/Pose"])
 def test_a_type_that_nobody_maps_is_refused(kind: str) -> None:
     drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", kind))
-    with pytest.raises(NoMapping) as refused:
+    with pytest.raises(NoMappingError) as refused:
         Publisher("team", [drone], [Heap()])
     told = str(refused.value)
     assert all(part in told for part in ("/drone1.1/waypoint1.1", "Robot1.1", repr(kind), POSE, "robochoc.waypoints"))
@@ -209,7 +209,7 @@ def test_a_package_brings_a_type_and_its_definition(monkeypatch: pytest.MonkeyPa
 def test_a_broken_package_is_told(monkeypatch: pytest.MonkeyPatch, place: str) -> None:
     installed(monkeypatch, my_msgs__Target=place)
     drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", "my_msgs/Target"))
-    with pytest.raises(NoMapping, match=place):
+    with pytest.raises(NoMappingError, match=place):
         Publisher("team", [drone], [Heap()])
 
 
@@ -217,12 +217,12 @@ def test_a_mapping_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     installed(monkeypatch, my_msgs__Failing="test_ros_waypoints:failing")
     drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", "my_msgs/Failing"))
     publisher = Publisher("team", [drone], [Heap()])
-    with pytest.raises(NoMapping, match=r"my_msgs/Failing failed: ValueError: no \("):
+    with pytest.raises(NoMappingError, match=r"my_msgs/Failing failed: ValueError: no \("):
         publisher.decide(LANDS, NOW)
 
 
 @pytest.mark.parametrize(("name", "told"), [("LOOSE", "needs types that nobody defines"), ("WRONG", "brings is wrong")])
 def test_a_definition_that_cannot_be_used_is_told(monkeypatch: pytest.MonkeyPatch, name: str, told: str) -> None:
     installed(monkeypatch, **{f"my_msgs__{name.title()}": f"test_ros_waypoints:{name}"})
-    with pytest.raises(UnknownType, match=told):
+    with pytest.raises(UnknownTypeError, match=told):
         types_of(2).encode(f"my_msgs/{name.title()}", {})

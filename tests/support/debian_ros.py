@@ -17,7 +17,7 @@ from typing import Any, Self
 import pytest
 
 from robochoc.ros.live.rospy_node import RospySink
-from robochoc.ros.sink import SinkFailed
+from robochoc.ros.sink import SinkError
 from tests.support.program import ROOT
 
 PACKAGES = (
@@ -147,7 +147,7 @@ def publish_much() -> None:
                 if not number:
                     sys.stdout.write("began\n")
                     sys.stdout.flush()
-    except SinkFailed as failed:
+    except SinkError as failed:
         sys.stdout.write(str(failed))
 
 

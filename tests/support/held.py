@@ -14,7 +14,7 @@ from robochoc.protocols.abt import ABT, AddLink, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Settings
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.encoding import TooMuch
+from robochoc.solver.encoding import TooLargeError
 from tests.support.problems import PREDICATES, team_of
 
 PAUSE_S = 0.005
@@ -87,7 +87,7 @@ class Overwhelmed(Held):
 
     def start(self) -> None:
         if self.problem.agent == "RX2":
-            raise TooMuch("this is too much for RX2")
+            raise TooLargeError("this is too much for RX2")
 
 
 class Broken(Held):

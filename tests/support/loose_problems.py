@@ -12,7 +12,7 @@ from dataclasses import replace
 from random import Random
 
 from robochoc.formats import PREDEFINED
-from robochoc.model.orders import CannotTurn, Order, in_order
+from robochoc.model.orders import Order, OrderError, in_order
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import (
     INFINITE,
@@ -65,7 +65,7 @@ def every_order(team: Team, chance: Random) -> list[Order | tuple[str, ...] | No
     for order in (*Order, *listed):
         try:
             in_order(team, order)
-        except CannotTurn:
+        except OrderError:
             continue
         orders.append(order)
     return orders

@@ -178,8 +178,8 @@ def _opened(folder: Path | None) -> Iterator[Authority]:
 def _failures_told() -> Iterator[None]:
     """Whatever the Authority says no to becomes one line, and an exit status."""
     try:
-        from robochoc.authority.authority import BadName, UnknownName
-        from robochoc.authority.registry import BadAuthority
+        from robochoc.authority.authority import InvalidNameError, UnknownNameError
+        from robochoc.authority.registry import AuthorityError
     except ModuleNotFoundError as missing:
         if missing.name is None or missing.name.partition(".")[0] != "cryptography":
             raise
@@ -188,7 +188,7 @@ def _failures_told() -> Iterator[None]:
 
     try:
         yield
-    except (BadName, UnknownName) as error:
+    except (InvalidNameError, UnknownNameError) as error:
         raise Failure(USAGE, on_one_line(str(error))) from error
-    except BadAuthority as error:
+    except AuthorityError as error:
         raise Failure(INVALID, on_one_line(str(error))) from error

@@ -69,12 +69,12 @@ def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_js
     from robochoc.cli.reports.progress import progress_line
     from robochoc.communication.run_result import Progress
     from robochoc.formats import on_one_line, read_team
-    from robochoc.solver.compile import Compilation, Compiler, CompileTimeout
-    from robochoc.solver.domain import TooManySolutions
+    from robochoc.solver.compile import Compilation, Compiler, CompileTimeoutError
+    from robochoc.solver.domain import TooManySolutionsError
 
     began = time.monotonic()
     team = read_team(folder)
-    found: list[Compilation | TooManySolutions | CompileTimeout] = []
+    found: list[Compilation | TooManySolutionsError | CompileTimeoutError] = []
     with progress_line(team.name) as progress, Compiler(bounds, cache) as compiler:
         for number, robot in enumerate(team.robots, 1):
             if progress:
@@ -82,7 +82,7 @@ def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_js
                 progress(Progress(0, time.monotonic() - began, stage))
             try:
                 found.append(compiler.compile(robot))
-            except (TooManySolutions, CompileTimeout) as limit:
+            except (TooManySolutionsError, CompileTimeoutError) as limit:
                 found.append(limit)
     if as_json:
         click.echo(json_report(team, found, time.monotonic() - began))

@@ -12,7 +12,7 @@ from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.tokens import token_options
 
 if TYPE_CHECKING:
-    from robochoc.run.networked.address import Place
+    from robochoc.run.networked.address import Address
     from robochoc.services.descriptions import AgentDescription
 
 
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 @click.option("--sl", is_flag=True, help="Print the answer as it comes: FIPA-SL0.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object an agent.")
 def directory(
-    place: Place,
+    place: Address,
     name: str,
     token: str | None,
     identity: Path | None,

@@ -71,7 +71,7 @@ def export(
     In PATTERNS, * stands for anything and ? for one character. Messages have the numbers that the page shows.
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.sniffer.patterns import patterns_in
-    from robochoc.sniffer.selection import NothingMeant, Selection
+    from robochoc.sniffer.selection import NothingSelectedError, Selection
     from robochoc.system.files import write_atomically
 
     meant = Selection(patterns_in(robots), patterns_in(types), first, last, conversation)
@@ -80,14 +80,14 @@ def export(
     trace = _trace(read, file)
     try:
         messages = meant.of(trace)
-    except NothingMeant as nothing:
+    except NothingSelectedError as nothing:
         raise click.UsageError(_one_line(str(nothing))) from nothing
     if trace.damage:
         click.echo(_one_line(f"{file}: it is not whole, this is what can be read: {trace.damage}"), err=True)
     options = {"--robots": robots, "--types": types, "--from": first, "--conversation": conversation, "-o": output}
     try:
         pieces = _pieces(form, read, trace, meant, messages)
-    except _TooMany as many:
+    except _TooManyError as many:
         again = f"; the first of them: {_command(file, form, {**options, '--to': many.last})}" if many.last else ""
         raise Failure(USAGE, f"{many}{again}") from many
     if output is None:
@@ -107,7 +107,7 @@ def export(
 def _pieces(form: str, read: Journal, trace: Trace, meant: Selection, messages: range | list[int]) -> Iterable[bytes]:
     """The export, piece by piece."""
     from robochoc.journal.journal import lines_of
-    from robochoc.sniffer.export import TooMuchToDraw, acl_texts, drawable, mermaid, table
+    from robochoc.sniffer.export import TooMuchToDrawError, acl_texts, drawable, mermaid, table
     from robochoc.sniffer.feed import Feed
     from robochoc.sniffer.part import part_of
 
@@ -123,14 +123,14 @@ def _pieces(form: str, read: Journal, trace: Trace, meant: Selection, messages: 
             feed = Feed(trace)
             try:
                 return [mermaid(feed, messages)]
-            except TooMuchToDraw as much:
+            except TooMuchToDrawError as much:
                 why = f"{much} (choose some, by --robots, --types, --from and --to)"
-                raise _TooMany(why, drawable(feed, messages)) from much
+                raise _TooManyError(why, drawable(feed, messages)) from much
         case _:
             return [_page(read, trace, meant)]
 
 
-class _TooMany(Exception):  # noqa: N818 - named for what was found
+class _TooManyError(Exception):
     """Too many messages for the form; `last` is the last one of those that are not (None: there are none)."""
 
     def __init__(self, why: str, fitting: Sequence[int]) -> None:
@@ -168,11 +168,11 @@ def _page(read: Journal, trace: Trace, meant: Selection) -> bytes:
 
 
 def _trace(read: Journal, file: Path) -> Trace:
-    from robochoc.sniffer.trace import Trace, TraceTooLarge
+    from robochoc.sniffer.trace import Trace, TraceTooLargeError
 
     try:
         return Trace.of(read)
-    except TraceTooLarge as large:
+    except TraceTooLargeError as large:
         raise Failure(USAGE, f"{file}: {large}") from large
 
 

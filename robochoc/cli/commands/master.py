@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from robochoc.journal.events import AnyEvent
     from robochoc.journal.journal import Header, Recorder
     from robochoc.model.outcome import Outcome
-    from robochoc.run.networked.address import Place
+    from robochoc.run.networked.address import Address
     from robochoc.run.networked.lead import Led, Plan
 
 
@@ -143,7 +143,7 @@ def master(
 
 def _plan(authority: Path | None, team: Path | None, given: dict[str, Any]) -> Plan:
     from robochoc.authority.authority import default_folder
-    from robochoc.communication.filters import UnknownFilter, filter_named
+    from robochoc.communication.filters import UnknownFilterError, filter_named
     from robochoc.communication.network.settings import Conditions
     from robochoc.formats import robot_names
     from robochoc.run.networked.lead import Plan
@@ -152,7 +152,7 @@ def _plan(authority: Path | None, team: Path | None, given: dict[str, Any]) -> P
     try:
         for name in given["filters"]:
             filter_named(name)
-    except UnknownFilter as unknown:
+    except UnknownFilterError as unknown:
         raise click.UsageError(f"--filter: {unknown}") from None
     conditions = Conditions(
         filters=given.pop("filters"),
@@ -260,5 +260,5 @@ def _tell_event(event: AnyEvent) -> None:
     click.echo(on_one_line(line), err=True)
 
 
-def _address(place: Place) -> str:
+def _address(place: Address) -> str:
     return f"HOST:{place.port}" if place.anywhere else str(place)

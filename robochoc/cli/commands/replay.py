@@ -89,13 +89,13 @@ def _altered(journal: Journal) -> bool:
 def _replayed(path: Path, journal: Journal, means: Means) -> Replayed:
     from robochoc.cli.reports.progress import progress_line
     from robochoc.formats import on_one_line
-    from robochoc.replay import CannotReplay
+    from robochoc.replay import CannotReplayError
     from robochoc.replay import replay as play
 
     try:
         with progress_line(on_one_line(journal.header.team)) as progress:
             return play(journal, means, progress=progress)
-    except CannotReplay as why:
+    except CannotReplayError as why:
         status = INVALID if why.broken or _altered(journal) else USAGE
         damage = f"it was altered: {journal.damage}; " if _altered(journal) else ""
         raise Failure(status, on_one_line(f"{path}: {damage}it cannot be played again: {why}")) from why

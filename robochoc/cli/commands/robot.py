@@ -17,7 +17,7 @@ from robochoc.cli.reports.failures import LIMIT, LOST, Failure
 from robochoc.cli.reports.progress import progress_line
 
 if TYPE_CHECKING:
-    from robochoc.run.networked.address import Place
+    from robochoc.run.networked.address import Address
 
 
 @click.command()
@@ -53,7 +53,7 @@ def robot(
     context: click.Context,
     /,
     file: Path,
-    place: Place,
+    place: Address,
     *,
     token: str | None,
     identity: Path | None,

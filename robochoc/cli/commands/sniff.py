@@ -75,16 +75,16 @@ def sniff(
 def _session(journal: Path, chosen: str, folder: Path | None) -> Session:
     """The journal, opened; its first piece is read, for what is none to be told at once."""
     from robochoc.formats import on_one_line, read_team
-    from robochoc.journal.journal import BadJournal
+    from robochoc.journal.journal import JournalError
     from robochoc.sniffer.patterns import patterns_in
     from robochoc.sniffer.session import Session
-    from robochoc.sniffer.trace import TraceTooLarge
+    from robochoc.sniffer.trace import TraceTooLargeError
 
     robots = {robot.name: robot for robot in read_team(folder).robots} if folder else {}
     try:
         session = Session(journal, chosen=patterns_in(chosen), robots=robots)
         session.begin()
-    except (BadJournal, TraceTooLarge) as wrong:
+    except (JournalError, TraceTooLargeError) as wrong:
         raise Failure(INVALID, on_one_line(f"{journal}: {wrong} ({JOURNAL_STEP})")) from wrong
     except OSError as error:
         raise Failure(INVALID, on_one_line(f"{journal}: {error.strerror or error} ({JOURNAL_STEP})")) from error

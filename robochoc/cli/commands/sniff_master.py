@@ -18,7 +18,7 @@ from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure
 
 if TYPE_CHECKING:
     from robochoc.authority.identity import Identity
-    from robochoc.run.networked.address import Place
+    from robochoc.run.networked.address import Address
     from robochoc.sniffer.remote import Followed
     from robochoc.sniffer.viewer import Viewer
 
@@ -102,7 +102,7 @@ class Page:
 def sniff_master(
     page: Page,
     *,
-    place: Place,
+    place: Address,
     copy: Path | None,
     patience_s: float,
     no_page: bool,
@@ -120,7 +120,9 @@ def sniff_master(
     return 0 if ending.over else LOST
 
 
-def _proof(place: Place, patience_s: float, *, name: str | None, token: str | None, identity: Path | None) -> Identity:
+def _proof(
+    place: Address, patience_s: float, *, name: str | None, token: str | None, identity: Path | None
+) -> Identity:
     """Whose right it is. Without a name it is the identity's."""
     from robochoc.authority.identity import Identity
     from robochoc.run.networked.join import identity_of
@@ -129,23 +131,23 @@ def _proof(place: Place, patience_s: float, *, name: str | None, token: str | No
     return identity_of(who, place, identity, token, patience_s)
 
 
-def _received(place: Place, proof: Identity, patience_s: float, showing: _Showing) -> Followed:
+def _received(place: Address, proof: Identity, patience_s: float, showing: _Showing) -> Followed:
     from robochoc.sniffer.remote import receive
 
     try:
         return receive(place, proof, showing.write, patience_s=patience_s, granted=showing.begin)
-    except _NotKept as error:
+    except _NotKeptError as error:
         raise Failure(INVALID, f"{error} (free some space, or name another file)") from error
 
 
-class _NotKept(Exception):  # noqa: N818 - named for what happened
+class _NotKeptError(Exception):
     """What comes cannot be written."""
 
 
 class _Showing:
     """Where the journal goes: a file without a name, which the page's process reads, and a file of the user's."""
 
-    def __init__(self, place: Place, page: Page | None, copy: Path | None, stack: ExitStack) -> None:
+    def __init__(self, place: Address, page: Page | None, copy: Path | None, stack: ExitStack) -> None:
         self._place = place
         self._page = page
         self._copy = copy
@@ -185,13 +187,13 @@ class _Showing:
         click.echo(f"{viewer.url} shows the run at {self._place} on this machine; Ctrl-C ends it", err=True)
 
     def write(self, blocks: bytes) -> None:
-        """Take in whole blocks. Raises `_NotKept`."""
+        """Take in whole blocks. Raises `_NotKeptError`."""
         try:
             for sink in self._sinks:
                 sink(blocks)
         except OSError as error:
             what = f"{self._copy}: " if self._copy else ""
-            raise _NotKept(f"{what}what the master sends cannot be kept: {error.strerror}") from error
+            raise _NotKeptError(f"{what}what the master sends cannot be kept: {error.strerror}") from error
         self._size += len(blocks)
 
     @property

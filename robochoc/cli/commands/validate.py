@@ -11,7 +11,7 @@ from robochoc.cli.options.paths import InputPath
 from robochoc.cli.reports.failures import INVALID
 
 if TYPE_CHECKING:
-    from robochoc.formats import InvalidInput
+    from robochoc.formats import InvalidInputError
     from robochoc.model.problem import Robot
 
 
@@ -25,13 +25,13 @@ def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) 
     Four layers: XML, schema, each file's own meaning, the team as a whole. All mistakes of all files are told at
     once, of each file those of its first layer that has any. Exit status 1 if there are any.
     """
-    from robochoc.formats import InvalidInput, find_teams
+    from robochoc.formats import InvalidInputError, find_teams
 
     reports: list[dict[str, Any]] = []
     for path in paths or (Path("instances"),):
         try:
             found = [path] if path.is_file() else find_teams(path)
-        except InvalidInput as invalid:
+        except InvalidInputError as invalid:
             reports.append(_invalid(path, invalid))
         else:
             reports.extend(_report(place) for place in found)
@@ -43,7 +43,7 @@ def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) 
 
 def _report(place: Path) -> dict[str, Any]:
     """The validation of one team, or of one robot's file."""
-    from robochoc.formats import InvalidInput, encodable, read_robot, read_team
+    from robochoc.formats import InvalidInputError, encodable, read_robot, read_team
 
     try:
         if place.is_file():
@@ -52,7 +52,7 @@ def _report(place: Path) -> dict[str, Any]:
         else:
             team = read_team(place)
             robots, events = team.robots, len(team.scenario)
-    except InvalidInput as invalid:
+    except InvalidInputError as invalid:
         return _invalid(place, invalid)
     return {"path": encodable(str(place)), "valid": True, **_sizes(robots), "events": events, "errors": []}
 
@@ -67,7 +67,7 @@ def _sizes(robots: tuple[Robot, ...]) -> dict[str, int]:
     }
 
 
-def _invalid(place: Path, invalid: InvalidInput) -> dict[str, Any]:
+def _invalid(place: Path, invalid: InvalidInputError) -> dict[str, Any]:
     from robochoc.formats import encodable
 
     errors = [

@@ -34,7 +34,7 @@ class ChannelName(click.Path):
 
 
 def channel_for(channel: str | Path | None) -> ChannelModel | None:
-    """The model that was asked for. Raises `InvalidInput` where a file is none."""
+    """The model that was asked for. Raises `InvalidInputError` where a file is none."""
     if channel is None:
         return None
     from robochoc.communication.simulator.channel import CHANNELS, read_channel

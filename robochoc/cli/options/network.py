@@ -11,25 +11,25 @@ import click
 from robochoc.cli.reports.failures import INVALID, LIMIT, LOST, USAGE, Failure, failures_told
 
 if TYPE_CHECKING:
-    from robochoc.run.networked.address import Place
+    from robochoc.run.networked.address import Address
 
 _EXTRA = {"cryptography", "zenoh"}
 
 
-class PlaceType(click.ParamType["Place"]):
+class PlaceType(click.ParamType["Address"]):
     """`HOST:PORT` of a master."""
 
     name = "place"
 
-    def convert(self, value: str | Place, param: click.Parameter | None, ctx: click.Context | None) -> Place:
+    def convert(self, value: str | Address, param: click.Parameter | None, ctx: click.Context | None) -> Address:
         """The place. Fails, as wrong usage, where it is none."""
-        from robochoc.run.networked.address import BadPlace, Place
+        from robochoc.run.networked.address import Address, AddressError
 
-        if isinstance(value, Place):
+        if isinstance(value, Address):
             return value
         try:
-            return Place.parse(value)
-        except BadPlace as bad:
+            return Address.parse(value)
+        except AddressError as bad:
             self.fail(str(bad), param, ctx)
 
 
@@ -37,16 +37,16 @@ class PlaceType(click.ParamType["Place"]):
 def network_failures_told(place: object) -> Iterator[None]:
     """Whatever ends a run across machines becomes one line, and an exit status."""
     try:
-        from robochoc.authority.authority import BadName
-        from robochoc.authority.certificates import BadHost
-        from robochoc.authority.enrolment import EnrolmentFailed
-        from robochoc.authority.identity import BadIdentity
-        from robochoc.authority.registry import BadAuthority
-        from robochoc.authority.token import BadToken
-        from robochoc.communication.network.router import RouterFailed
-        from robochoc.communication.network.transport import CannotConnect
-        from robochoc.run.networked.consult import BadTemplate, NoAnswer
-        from robochoc.run.networked.lead import NotComplete
+        from robochoc.authority.authority import InvalidNameError
+        from robochoc.authority.certificates import HostNameError
+        from robochoc.authority.enrolment import EnrolmentError
+        from robochoc.authority.identity import IdentityError
+        from robochoc.authority.registry import AuthorityError
+        from robochoc.authority.token import TokenError
+        from robochoc.communication.network.router import RouterError
+        from robochoc.communication.network.transport import CannotConnectError
+        from robochoc.run.networked.consult import NoAnswerError, TemplateError
+        from robochoc.run.networked.lead import TeamIncompleteError
     except ModuleNotFoundError as missing:
         package = (missing.name or "").partition(".")[0]
         if package not in _EXTRA:
@@ -56,10 +56,10 @@ def network_failures_told(place: object) -> Iterator[None]:
     from robochoc.formats import on_one_line
 
     statuses: dict[int, tuple[type[Exception], ...]] = {
-        INVALID: (BadIdentity, BadAuthority, BadToken),
-        USAGE: (BadHost, BadName, RouterFailed, BadTemplate),
-        LIMIT: (NotComplete,),
-        LOST: (CannotConnect, EnrolmentFailed, NoAnswer),
+        INVALID: (IdentityError, AuthorityError, TokenError),
+        USAGE: (HostNameError, InvalidNameError, RouterError, TemplateError),
+        LIMIT: (TeamIncompleteError,),
+        LOST: (CannotConnectError, EnrolmentError, NoAnswerError),
     }
     with failures_told(place):
         try:

@@ -38,7 +38,7 @@ class OrderName(click.Path):
 
 
 def order_for(team: Team, order: str | Path) -> Order | tuple[str, ...] | None:
-    """The order for `team`; None: the files' own. Raises `InvalidInput` where a file does not list its robots."""
+    """The order for `team`; None: the files' own. Raises `InvalidInputError` where a file does not list its robots."""
     from robochoc.formats.order import read_order
     from robochoc.model.orders import Order
 

@@ -110,14 +110,14 @@ def teams_at(paths: Iterable[Path]) -> list[Path]:
 
     Raises `Failure`, which names every path without a team: nothing is done by half.
     """
-    from robochoc.formats import InvalidInput, find_teams
+    from robochoc.formats import InvalidInputError, find_teams
 
     folders: dict[Path, None] = {}
     wrong = []
     for path in paths:
         try:
             folders.update(dict.fromkeys(find_teams(path)))
-        except InvalidInput as invalid:
+        except InvalidInputError as invalid:
             wrong.append(str(invalid))
     if wrong:
         raise Failure(INVALID, "\n".join(wrong))

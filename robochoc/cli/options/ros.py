@@ -256,34 +256,34 @@ def check_ros(ros: Ros, settings: Mapping[str, Any]) -> None:
 @contextmanager
 def ros_failures_told() -> Iterator[None]:
     """What goes wrong with sinks, sources and names becomes one line, and `Failure`."""
-    from robochoc.ros.mappings import NoMapping
-    from robochoc.ros.names import NameClash
-    from robochoc.ros.publisher import NothingToPublish
-    from robochoc.ros.sink import SinkFailed
-    from robochoc.ros.sinks import NoSuchSink, NoSuchSource
-    from robochoc.ros.source import SourceFailed
+    from robochoc.ros.mappings import NoMappingError
+    from robochoc.ros.names import NameClashError
+    from robochoc.ros.publisher import NothingToPublishError
+    from robochoc.ros.sink import SinkError
+    from robochoc.ros.sinks import UnknownSinkError, UnknownSourceError
+    from robochoc.ros.source import SourceError
 
     try:
         yield
-    except (NoSuchSink, NoSuchSource) as wrong:
+    except (UnknownSinkError, UnknownSourceError) as wrong:
         raise Failure(USAGE, str(wrong)) from wrong
-    except (NameClash, NoMapping, NothingToPublish, SinkFailed, SourceFailed) as wrong:
+    except (NameClashError, NoMappingError, NothingToPublishError, SinkError, SourceError) as wrong:
         raise Failure(INVALID, str(wrong)) from wrong
 
 
 @contextmanager
 def flights_told() -> Iterator[None]:
     """A decision that cannot be flown becomes one line, and `Failure`."""
-    from robochoc.ros.simulated import CannotFly
+    from robochoc.ros.simulated import CannotFlyError
 
     try:
         yield
-    except CannotFly as wrong:
+    except CannotFlyError as wrong:
         raise Failure(INVALID, str(wrong)) from wrong
 
 
 def open_sinks(texts: Sequence[str], stack: ExitStack) -> list[Sink]:
-    """The sinks, which `stack` closes. Raises `SinkFailed`."""
+    """The sinks, which `stack` closes. Raises `SinkError`."""
     from robochoc.ros.sinks import open_sink
 
     return [stack.enter_context(open_sink(text)) for text in texts]
@@ -299,11 +299,11 @@ def surroundings_of(given: Mapping[str, Any], seed: int) -> Surroundings:
 @contextmanager
 def _surroundings_told() -> Iterator[None]:
     """A drone that is not there, or weather in which nothing flies, is wrong usage."""
-    from robochoc.ros.simulated import NoSuchDrone
+    from robochoc.ros.simulated import UnknownDroneError
 
     try:
         yield
-    except NoSuchDrone as wrong:
+    except UnknownDroneError as wrong:
         raise click.UsageError(f"--fail: {wrong}") from wrong
     except ValueError as wrong:
         raise click.UsageError(str(wrong)) from wrong

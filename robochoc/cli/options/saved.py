@@ -43,26 +43,26 @@ def saved_content(file: Path, next_step: str) -> bytes:
 
 def saved_journal(file: Path) -> Journal:
     """The journal in `file`. Raises `Failure`."""
-    from robochoc.journal.journal import BadJournal, read_journal
+    from robochoc.journal.journal import JournalError, read_journal
 
     content = saved_content(file, JOURNAL_STEP)
     try:
         return read_journal(content)
-    except BadJournal as wrong:
+    except JournalError as wrong:
         raise _refused(file, str(wrong), JOURNAL_STEP) from wrong
 
 
 def saved_outcome(saved: Path) -> Outcome:
     """What the file, a JSON result or a journal, tells of the end of a run. Raises `Failure`."""
-    from robochoc.formats.result import BadResult, read_result
-    from robochoc.journal.journal import BadJournal, is_journal, read_journal
+    from robochoc.formats.result import ResultError, read_result
+    from robochoc.journal.journal import JournalError, is_journal, read_journal
 
     content = saved_content(saved, _OUTCOME_STEP)
     try:
         if not is_journal(content):
             return read_result(content)
         journal = read_journal(content)
-    except (BadJournal, BadResult) as wrong:
+    except (JournalError, ResultError) as wrong:
         raise Failure(INVALID, f"{saved}: {wrong} ({_OUTCOME_STEP})") from wrong
     if journal.outcome is None:
         why = journal.damage or "the run broke off"
@@ -73,7 +73,7 @@ def saved_outcome(saved: Path) -> Outcome:
 def team_of(outcome: Outcome, saved: Path, folder: Path | None) -> Team | None:
     """The team in `folder`, or where teams of that name usually are; None, which is told, if it is not there.
 
-    Raises `InvalidInput`, and `Failure` for another team than that of `outcome`, which is from the file `saved`.
+    Raises `InvalidInputError`, and `Failure` for another team than that of `outcome`, which is from the file `saved`.
     """
     from robochoc.formats import read_team
 

@@ -15,10 +15,10 @@ from rich.table import Table
 
 from robochoc.formats import encodable, on_one_line
 from robochoc.model.problem import Kind, Team
-from robochoc.solver.compile import Compilation, CompileTimeout
-from robochoc.solver.domain import TooManySolutions
+from robochoc.solver.compile import Compilation, CompileTimeoutError
+from robochoc.solver.domain import TooManySolutionsError
 
-Found = Compilation | TooManySolutions | CompileTimeout
+Found = Compilation | TooManySolutionsError | CompileTimeoutError
 """A robot's compilation, or the limit that it reached."""
 
 NARROWEST = 100

@@ -36,11 +36,11 @@ def invalid_input_fails(command: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(command)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
-        from robochoc.formats import InvalidInput
+        from robochoc.formats import InvalidInputError
 
         try:
             return command(*args, **kwargs)
-        except InvalidInput as invalid:
+        except InvalidInputError as invalid:
             raise Failure(INVALID, str(invalid)) from invalid
 
     return guarded
@@ -68,19 +68,19 @@ def failures_told(place: object) -> Iterator[None]:
 
 def _status(error: Exception) -> int | None:
     """The exit status that stands for `error`; None for one that should not be. Imports only what may be wanted."""
-    from robochoc.communication.processes.robot_link import RobotsLost
-    from robochoc.formats import InvalidInput
-    from robochoc.run.orchestrator import Refuted
-    from robochoc.run.registry import UnknownProtocol
-    from robochoc.solver.compile import CompileFailed, CompileTimeout
-    from robochoc.solver.domain import TooManySolutions
-    from robochoc.solver.encoding import Unsupported
-    from robochoc.solver.failures import SolverLost, SolverMissing
+    from robochoc.communication.processes.robot_link import RobotsLostError
+    from robochoc.formats import InvalidInputError
+    from robochoc.run.orchestrator import RefutedError
+    from robochoc.run.registry import UnknownProtocolError
+    from robochoc.solver.compile import CompileError, CompileTimeoutError
+    from robochoc.solver.domain import TooManySolutionsError
+    from robochoc.solver.encoding import UnsupportedError
+    from robochoc.solver.failures import SolverLostError, SolverMissingError
 
     statuses: dict[int, tuple[type[Exception], ...]] = {
-        INVALID: (InvalidInput,),
-        USAGE: (UnknownProtocol, Unsupported, SolverMissing),
-        LIMIT: (TooManySolutions, CompileTimeout),
-        LOST: (RobotsLost, CompileFailed, SolverLost, Refuted),
+        INVALID: (InvalidInputError,),
+        USAGE: (UnknownProtocolError, UnsupportedError, SolverMissingError),
+        LIMIT: (TooManySolutionsError, CompileTimeoutError),
+        LOST: (RobotsLostError, CompileError, SolverLostError, RefutedError),
     }
     return next((status for status, kinds in statuses.items() if isinstance(error, kinds)), None)

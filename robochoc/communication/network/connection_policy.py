@@ -51,7 +51,7 @@ class Gate:
         self.follow()
 
     def follow(self) -> None:
-        """Let in who was enrolled since, and keep out who was revoked. Raises `RouterFailed`.
+        """Let in who was enrolled since, and keep out who was revoked. Raises `RouterError`.
 
         There are rules for those who were invited, too: nobody has a certificate in their names, and the router need
         not be opened anew when they get theirs.

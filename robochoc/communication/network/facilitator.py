@@ -9,7 +9,7 @@ from contextlib import suppress
 from robochoc.communication.network.control_messages import Ask, Told
 from robochoc.communication.network.profile import Profile
 from robochoc.services.communicative_acts import Performative
-from robochoc.services.descriptions import MAX_SERVICES, AgentDescription, Refused, ServiceDescription
+from robochoc.services.descriptions import MAX_SERVICES, AgentDescription, RequestRefusedError, ServiceDescription
 from robochoc.services.directory import Directory
 from robochoc.services.facilitator import handle, subscribe, told
 from robochoc.services.sl import df_on
@@ -18,7 +18,7 @@ ASKED_AT_MOST = 20
 """Requests that a participant may make in a second."""
 
 
-class TooOften(ValueError):  # noqa: N818 - named for what was done
+class TooManyRequestsError(ValueError):
     """Somebody asks too often."""
 
 
@@ -50,13 +50,13 @@ class DirectoryFacilitator:
         description = AgentDescription(name, services, protocols, ("robochoc",), addresses=addresses)
         try:
             self._directory.register(description, time.time(), requester=name)
-        except Refused as refused:
+        except RequestRefusedError as refused:
             return str(refused)
         return ""
 
     def leave(self, name: str) -> None:
         """The robot called `name` cannot be found any more."""
-        with suppress(Refused):
+        with suppress(RequestRefusedError):
             self._directory.deregister(self._aid(name), requester=self._aid(name))
 
     def expire(self) -> None:
@@ -64,11 +64,11 @@ class DirectoryFacilitator:
         self._directory.expire(time.time())
 
     def count(self, requester: str) -> None:
-        """`requester` asks for something, of the directory or of the master. Raises `TooOften`."""
+        """`requester` asks for something, of the directory or of the master. Raises `TooManyRequestsError`."""
         now = time.time()
         recent = [t for t in self._asked.get(requester, []) if now - t < 1]
         if len(recent) >= ASKED_AT_MOST:
-            raise TooOften(f"more than {ASKED_AT_MOST} requests a second")
+            raise TooManyRequestsError(f"more than {ASKED_AT_MOST} requests a second")
         self._asked[requester] = [*recent, now]
 
     def answer(self, requester: str, ask: Ask) -> Told:

@@ -25,7 +25,7 @@ from robochoc.communication.network.control_messages import (
     Welcome,
     Word,
 )
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 
 MASTER = "MASTER"
 """The master's name, as in Figure 3. No robot can have it."""
@@ -35,11 +35,11 @@ LARGEST_LETTER = 8 * 2**20
 _OUTSIDE = Register | Welcome | Denied | Joined | Ask | Told | Sniff | Sniffable
 
 
-class TooLarge(Unsupported):
+class MessageTooLargeError(UnsupportedError):
     """A word needs more bytes than a letter may have."""
 
 
-class Refused(ValueError):  # noqa: N818 - named for the answer
+class FrameRefusedError(ValueError):
     """A letter that is not accepted; the message says why."""
 
 
@@ -98,12 +98,12 @@ class Letters:
         return self._written.get(receiver, 0) + 1
 
     def write(self, receiver: str, word: Word) -> bytes:
-        """The next letter to `receiver`. Raises `TooLarge`."""
+        """The next letter to `receiver`. Raises `MessageTooLargeError`."""
         outside = isinstance(word, _OUTSIDE)
         letter = Letter("", 0, word) if outside else Letter(self.run, self.next_number(receiver), word)
         content = self._encode(letter)
         if len(content) > LARGEST_LETTER:
-            raise TooLarge(
+            raise MessageTooLargeError(
                 f"a message of {self.name} to {receiver} has {len(content):,} bytes, more than {LARGEST_LETTER:,}"
             )
         if not outside:
@@ -111,23 +111,23 @@ class Letters:
         return content
 
     def read(self, sender: str, content: bytes) -> Opened:
-        """What `sender` has written; it may come again until it has been `taken`. Raises `Refused`."""
+        """What `sender` has written; it may come again until it has been `taken`. Raises `FrameRefusedError`."""
         if len(content) > LARGEST_LETTER:
-            raise Refused(f"it has {len(content):,} bytes, more than {LARGEST_LETTER:,}")
+            raise FrameRefusedError(f"it has {len(content):,} bytes, more than {LARGEST_LETTER:,}")
         decoder = self._of_master if sender == MASTER else self._of_robot
         try:
             letter = decoder.decode(content)
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-            raise Refused(f"it is malformed: {error}") from None
+            raise FrameRefusedError(f"it is malformed: {error}") from None
         if isinstance(letter.word, _OUTSIDE):
             return Opened(0, letter.word)
         if not self.run or letter.run != self.run:
-            raise Refused("it is a replay: it was written in another run")
+            raise FrameRefusedError("it is a replay: it was written in another run")
         expected = self._read.get(sender, 0) + 1
         if letter.number < expected:
-            raise Refused(f"it is a replay: letter {letter.number} has come before")
+            raise FrameRefusedError(f"it is a replay: letter {letter.number} has come before")
         if letter.number > expected:
-            raise Refused(f"letter {expected} is missing before letter {letter.number}")
+            raise FrameRefusedError(f"letter {expected} is missing before letter {letter.number}")
         return Opened(letter.number, letter.word)
 
     def take(self, sender: str, number: int) -> None:

@@ -36,7 +36,7 @@ class Gaps:
         self._said.clear()
 
     def at_the_master(self, missed: Missed) -> None:
-        """Letters to the master are lost: its sender is, if it is a robot that takes part. Raises `RobotsLost`."""
+        """Letters to the master are lost: its sender is, if it is a robot that takes part. Raises `RobotsLostError`."""
         name, many = missed.sender, f"{missed.letters:,} letters"
         why = f"{many} of it were more than it may send" if missed.dropped else f"{many} of it were lost for good"
         self._refuse(name, TO_MASTER, why)
@@ -54,7 +54,7 @@ class Gaps:
     def explain_missing(self) -> bool:
         """Protocol messages are missing: those are lost of whom letters are. Return whether there is anybody.
 
-        Raises `RobotsLost`.
+        Raises `RobotsLostError`.
         """
         for name, why in self._said.items():
             self._lose(name, why, for_good=True)

@@ -17,7 +17,7 @@ import msgspec
 
 from robochoc.communication.network.control_messages import Sniff, Sniffable
 from robochoc.communication.network.master_events import Chronicle
-from robochoc.journal.entries import BadJournal
+from robochoc.journal.entries import JournalError
 
 SNIFF = "sniff"
 """What is granted or refused."""
@@ -48,7 +48,7 @@ class Piece(msgspec.Struct, frozen=True, array_like=True):
     over: bool
 
 
-class NotAnswered(Exception):  # noqa: N818 - named for what happens
+class NotAnsweredError(Exception):
     """A question that gets no answer; the message says why, for the master's observer. Empty: nobody need know."""
 
 
@@ -101,7 +101,7 @@ class Publication:
             return not self._closed and any(now - asked < PRESENT_S for asked in self._behind.values())
 
     def answer(self, name: str, content: bytes) -> bytes:
-        """The answer to the question `content` of `name`, who has the right to ask. Raises `NotAnswered`."""
+        """The answer to the question `content` of `name`, who has the right to ask. Raises `NotAnsweredError`."""
         self._count(name)
         question = _question(content)
         if question.run == self.run and question.start >= self._size and not self._over:
@@ -109,10 +109,10 @@ class Publication:
         over = self._over  # before the size is looked at: nothing is written after it
         size = self._size
         if question.start > size:
-            raise NotAnswered(f"the journal has {size:,} bytes, and byte {question.start:,} was asked for")
+            raise NotAnsweredError(f"the journal has {size:,} bytes, and byte {question.start:,} was asked for")
         with self._lock:
             if self._closed:
-                raise NotAnswered
+                raise NotAnsweredError
             content = os.pread(self._descriptor, min(PIECE_BYTES, size - question.start), question.start)
             last = over and question.start + len(content) == size
             if last:
@@ -129,7 +129,7 @@ class Publication:
                 recent.append(now)
                 self._asked[name] = recent
                 return
-        raise NotAnswered(f"more than {ANSWERED_AT_MOST} questions a second")
+        raise NotAnsweredError(f"more than {ANSWERED_AT_MOST} questions a second")
 
 
 def question(run: str, start: int) -> bytes:
@@ -138,20 +138,20 @@ def question(run: str, start: int) -> bytes:
 
 
 def piece_in(content: bytes) -> Piece:
-    """The piece in an answer. Raises `BadJournal`."""
+    """The piece in an answer. Raises `JournalError`."""
     try:
         return msgspec.msgpack.decode(content, type=Piece)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-        raise BadJournal(f"no piece of one: {error}") from None
+        raise JournalError(f"no piece of one: {error}") from None
 
 
 def _question(content: bytes) -> Question:
     if len(content) > _LARGEST_QUESTION:
-        raise NotAnswered(f"a question of {len(content):,} bytes")
+        raise NotAnsweredError(f"a question of {len(content):,} bytes")
     try:
         return msgspec.msgpack.decode(content, type=Question)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-        raise NotAnswered(f"it is malformed: {error}") from None
+        raise NotAnsweredError(f"it is malformed: {error}") from None
 
 
 class PublicationDesk:
@@ -188,7 +188,7 @@ class PublicationDesk:
         if not why and self.publication:
             try:
                 return self.publication.answer(name, content)
-            except (NotAnswered, OSError) as refused:
+            except (NotAnsweredError, OSError) as refused:
                 why = str(refused)
         if why:
             self._chronicle.refuse(name, SNIFF, why)

@@ -26,7 +26,7 @@ from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members, reach
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot_process import START_S, Given, robot_process
-from robochoc.communication.network.router import RouterFailed
+from robochoc.communication.network.router import RouterError
 from robochoc.communication.network.settings import Conditions
 from robochoc.communication.processes.robot_link import fate_of
 from robochoc.communication.resources import require_descriptors, signals_held
@@ -38,7 +38,7 @@ from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import NO_BRIEF, Brief
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 
 LOOPBACK = "127.0.0.1"
 FAREWELL_S = 1.0
@@ -108,9 +108,9 @@ class LocalNetwork(Session):
                 port = trial.getsockname()[1]
             try:
                 return make(f"{LOOPBACK}:{port}").__enter__()
-            except RouterFailed as failed:
+            except RouterError as failed:
                 if attempt == _ATTEMPTS - 1:
-                    raise Unsupported(f"the router {failed}") from failed
+                    raise UnsupportedError(f"the router {failed}") from failed
         raise AssertionError
 
     @property
@@ -129,7 +129,7 @@ class LocalNetwork(Session):
         return True
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
-        """See `Session.search`. Raises `RobotsLost` and `Unsupported`."""
+        """See `Session.search`. Raises `RobotsLostError` and `UnsupportedError`."""
         deadline = None if timeout is None else time.monotonic() + timeout
         self._launch()
         began = time.monotonic()
@@ -138,7 +138,7 @@ class LocalNetwork(Session):
             limit = patience if deadline is None else min(deadline, patience)
             if not self._master.gather(limit) and deadline != limit:
                 awaited = ", ".join(sorted(self._master.members.awaited)[:5])
-                raise Unsupported(f"robots did not register within {START_S:g} s: {awaited}")
+                raise UnsupportedError(f"robots did not register within {START_S:g} s: {awaited}")
         left = None if deadline is None else max(0.0, deadline - time.monotonic())
         return self._master.search(self._protocol.__name__, self._protocol.traits, self._brief, left, messages)
 
@@ -220,5 +220,5 @@ def _fork_server(protocol: type[Protocol]) -> ForkServerContext:
             finally:
                 del os.environ[fork_server.SCRATCH]
     except OSError as error:  # such as a temporary folder whose path is too long for a socket
-        raise Unsupported(f"robots' processes cannot be started: {error} (see TMPDIR)") from error
+        raise UnsupportedError(f"robots' processes cannot be started: {error} (see TMPDIR)") from error
     return context

@@ -42,26 +42,26 @@ from robochoc.communication.network.control_messages import (
     Word,
 )
 from robochoc.communication.network.facilitator import DirectoryFacilitator
-from robochoc.communication.network.framing import MASTER, Letters, Refused
+from robochoc.communication.network.framing import MASTER, FrameRefusedError, Letters
 from robochoc.communication.network.gaps import TO_MASTER, Gaps
 from robochoc.communication.network.inbox import Arrived, Inbox, Missed, Presence, Woken
 from robochoc.communication.network.journal_server import Publication, PublicationDesk
 from robochoc.communication.network.master_events import Chronicle
-from robochoc.communication.network.members import Member, Members, NotTaken
+from robochoc.communication.network.members import Member, Members, RegistrationRefusedError
 from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.requests import Requests
 from robochoc.communication.network.router import Refusal
 from robochoc.communication.network.search_state import Tally
 from robochoc.communication.network.settings import Conditions
 from robochoc.communication.network.transport import Post
-from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import over
 from robochoc.journal.events import Observer
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.traits import Traits
 from robochoc.solver.agent_problem import Brief
-from robochoc.solver.encoding import TooMuch, Unsupported
+from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 
 TICK_S = 0.2
@@ -108,7 +108,7 @@ class Master:
         self._gaps = Gaps(members, self.chronicle.refuse, self._lose)
 
     def __enter__(self) -> Self:
-        """Listen. Raises `RouterFailed` and `CannotConnect`."""
+        """Listen. Raises `RouterError` and `CannotConnectError`."""
         try:
             self._gate.open()
             inbox, lease_ms = Inbox(self._gate.share_of), self._conditions.lease_ms
@@ -146,7 +146,7 @@ class Master:
         self.members.closed = self.members.complete and not unseen
         stranger = next(self.members.strangers(), None) if self.members.closed else None
         if stranger:
-            raise Unsupported(stranger)
+            raise UnsupportedError(stranger)
         return self.members.closed
 
     def search(
@@ -159,7 +159,7 @@ class Master:
     ) -> RunResult:
         """Have all that are registered search by `protocol`, from the beginning, for at most `timeout` seconds.
 
-        Raises `RobotsLost`, and `Unsupported` when a robot's problem is more than its machine or the protocol can take.
+        Raises `RobotsLostError`, and `UnsupportedError` when a robot's problem is too large, or not for this protocol.
         """
         began = time.monotonic()
         self.chronicle.begin()
@@ -191,14 +191,14 @@ class Master:
         away_s = LAST_WORDS_S + self._conditions.patience_s + self._conditions.lease_ms / 1000
         self._wait_until(lambda: not tally.unchecked, time.monotonic() + away_s)
         if tally.unchecked or tally.lost:
-            raise RobotsLost(tally.lost or {MASTER: "robots have not checked their constraints in time"})
+            raise RobotsLostError(tally.lost or {MASTER: "robots have not checked their constraints in time"})
         return tally.held, tally.cost
 
     def leave(self, why: str, *, failed: bool = False, farewell_s: float = FAREWELL_S) -> None:
         """Tell all that the run is over, until they have heard it: some may have joined, or come back, just now."""
         leave, until = Leave(why, failed), time.monotonic() + farewell_s
         staying = partial(self.members.staying, FAREWELL_S, besides=self.tally.lost)
-        with suppress(RobotsLost, Unsupported):
+        with suppress(RobotsLostError, UnsupportedError):
             self._tell_all(leave)
             while staying() and not over(until):
                 self._wait_until(lambda: not staying(), time.monotonic() + AGAIN_S)
@@ -213,7 +213,7 @@ class Master:
     # The loop
 
     def _wait_until(self, done: Callable[[], bool], deadline: float | None) -> None:
-        """Serve everybody until `done()` or the deadline; raises `RobotsLost` as soon as one is lost for good."""
+        """Serve everybody until `done()` or the deadline; raises `RobotsLostError` as soon as one is lost for good."""
         while not done():
             now = time.monotonic()
             if over(deadline):
@@ -247,7 +247,7 @@ class Master:
     def _look_around(self, now: float) -> None:
         """Who is gone for too long, whose process has ended, and who may not take part any more."""
         if self._gate.broken:
-            raise RobotsLost({MASTER: "the router's process has ended"})
+            raise RobotsLostError({MASTER: "the router's process has ended"})
         while self._dead:
             self._lose(*self._dead.popitem(), for_good=True)
         away_s = self._conditions.patience_s
@@ -277,14 +277,14 @@ class Master:
             self._tell_all(Wave(counters.begin_wave()))
 
     def _collect(self, tally: Tally) -> None:
-        """Say that the search is over, and collect everybody's account. Raises `RobotsLost` when it was stuck."""
+        """Say that the search is over, and collect everybody's account. Raises `RobotsLostError` when it was stuck."""
         self._tell_all(Pause())
         self._wait_until(lambda: not tally.silent, time.monotonic() + LAST_WORDS_S)
         for name in tally.silent if tally.verdict is not None else ():
             self._lose(name, "it did not report at the end")
         doubts = self.chronicle.doubted(tally.doubts_about_counts)
         if tally.stuck:
-            raise RobotsLost({MASTER: tally.stuck + doubts})
+            raise RobotsLostError({MASTER: tally.stuck + doubts})
 
     # Letters
 
@@ -298,7 +298,7 @@ class Master:
     def _read(self, sender: str, content: bytes) -> None:
         try:
             opened = self._letters.read(sender, content)
-        except Refused as refused:
+        except FrameRefusedError as refused:
             self.chronicle.refuse(sender, TO_MASTER, str(refused))
             return
         self._letters.take(sender, opened.number)
@@ -324,7 +324,9 @@ class Master:
             case Events(told):
                 self.chronicle.told(name, told)
             case Failed(why, unsupported, elsewhere):
-                self._note_failure(name, why, (TooMuch if elsewhere else Unsupported) if unsupported else None)
+                self._note_failure(
+                    name, why, (TooLargeError if elsewhere else UnsupportedError) if unsupported else None
+                )
             case Objection(who, what, why):
                 self.chronicle.refuse(who, what, f"{why} ({name} says so)")
             case Gap():
@@ -334,7 +336,7 @@ class Master:
             case _:
                 raise AssertionError(word)  # `Letters` decodes nothing else
 
-    def _note_failure(self, name: str, why: str, refusal: type[Unsupported] | None = None) -> None:
+    def _note_failure(self, name: str, why: str, refusal: type[UnsupportedError] | None = None) -> None:
         """The robot cannot go on (if there is a `why`); a `refusal` ends the run."""
         why = on_one_line(why, LONGEST_REASON)
         if refusal:
@@ -348,7 +350,7 @@ class Master:
         known = self.members.robots.get(name)
         try:
             member = self.members.register(name, profile, visit, admitted=self._gate.is_robot(name))
-        except NotTaken as refusal:
+        except RegistrationRefusedError as refusal:
             self.chronicle.refuse(name, "register", str(refusal))
             self._tell(name, Denied(visit, str(refusal)))
             return
@@ -392,7 +394,7 @@ class Master:
         self.chronicle.lost(name, why)
         self.tally.lose(name, why)
         if not self._conditions.survive or not self.members.closed:
-            raise RobotsLost({name: why})
+            raise RobotsLostError({name: why})
 
     def _note_refusal(self, refusal: Refusal) -> None:
         """What the router tells; not of those who were enrolled a moment ago, and are let in when they try again."""

@@ -11,8 +11,8 @@ from robochoc.communication.network.access import ALL
 from robochoc.communication.network.control_messages import Task
 from robochoc.communication.network.plausibility import Declared
 from robochoc.communication.network.profile import (
-    BadProfile,
     Profile,
+    ProfileError,
     Ranges,
     acquaintances,
     contradictions,
@@ -34,7 +34,7 @@ def reach(profiles: Mapping[str, Profile], *, beyond: bool) -> dict[str, tuple[s
     return {name: tuple(sorted(profiles.keys() & others)) for name, others in met.items()}
 
 
-class NotTaken(ValueError):  # noqa: N818 - named for the answer
+class RegistrationRefusedError(ValueError):
     """A robot cannot be registered; the message says why."""
 
 
@@ -108,29 +108,36 @@ class Members:
         return {name: member.profile for name, member in self.robots.items()}
 
     def register(self, sender: str, profile: Profile, visit: str, *, admitted: bool = True) -> Member:
-        """Take `sender` in, if it is `admitted`, or find it there already in the same life. Raises `NotTaken`."""
+        """Take `sender` in, if it is `admitted`, or find it there already in the same life.
+
+        Raises `RegistrationRefusedError`.
+        """
         known = self.robots.get(sender)
         if known and known.visit == visit:
             known.gone, known.doubtful = None, False
             return known
         if not admitted:
-            raise NotTaken("it is enrolled to observe, not to take part; say: robochoc authority enrol NAME")
+            raise RegistrationRefusedError(
+                "it is enrolled to observe, not to take part; say: robochoc authority enrol NAME"
+            )
         if profile.name != sender:
-            raise NotTaken(f"its file is {profile.name[:80]!r}'s, and its certificate {sender}'s")
+            raise RegistrationRefusedError(f"its file is {profile.name[:80]!r}'s, and its certificate {sender}'s")
         if visit in self._over:
-            raise NotTaken("it was away for too long; start it anew")
+            raise RegistrationRefusedError("it was away for too long; start it anew")
         if known and (self.closed or not (known.doubtful or known.gone)):
-            raise NotTaken(f"a robot called {sender} is registered already")
+            raise RegistrationRefusedError(f"a robot called {sender} is registered already")
         if self.closed or (self.expected is not None and sender not in self.expected):
-            raise NotTaken("the team is complete without it" if self.closed else "it is not one of the team")
+            raise RegistrationRefusedError(
+                "the team is complete without it" if self.closed else "it is not one of the team"
+            )
         try:
             silhouette(profile, {})
-        except BadProfile as bad:
-            raise NotTaken(str(bad)) from None
+        except ProfileError as bad:
+            raise RegistrationRefusedError(str(bad)) from None
         others = {name: other for name, other in self.profiles.items() if name != sender}
         wrong = next(contradictions({**others, sender: profile}), None)
         if wrong:
-            raise NotTaken(wrong)
+            raise RegistrationRefusedError(wrong)
         if known:
             self._over.add(known.visit)
         self.robots[sender] = Member(profile, visit)
@@ -182,7 +189,7 @@ class Members:
         shown = {variable: variables[variable] for variable in wanted if variable in variables}
         try:
             silhouette(member.profile, {**member.also, **shown})
-        except BadProfile as bad:
+        except ProfileError as bad:
             return str(bad)
         member.asked.update(wanted)
         member.also.update(shown)

@@ -29,7 +29,7 @@ LARGEST_DEAREST = 2.0**80
 """More than the costs of any file; what it costs all robots to step aside is still a number."""
 
 
-class BadProfile(ValueError):  # noqa: N818 - named for what was found
+class ProfileError(ValueError):
     """What a robot tells of itself cannot be."""
 
 
@@ -90,37 +90,37 @@ def ranges_of(domain: Domain) -> Ranges:
 
 
 def domain_of(name: str, ranges: Ranges) -> Domain:
-    """The domain of the variable `name`. Raises `BadProfile`; nothing is made of absurd ones."""
+    """The domain of the variable `name`. Raises `ProfileError`; nothing is made of absurd ones."""
     last: int | None = None
     size = 0
     for low, high in ranges:
         if low > high or (last is not None and low <= last):
-            raise BadProfile(f"the ranges of {name} are not ascending")
+            raise ProfileError(f"the ranges of {name} are not ascending")
         last, size = high, size + high - low + 1
     if not 0 < size <= MAX_VALUES:
-        raise BadProfile(f"{name} has {size:,} values; there are 1 to {MAX_VALUES:,}")
+        raise ProfileError(f"{name} has {size:,} values; there are 1 to {MAX_VALUES:,}")
     return Domain(name, tuple(range(low, high + 1) for low, high in ranges))
 
 
 def silhouette(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
-    """The robot as others see it; `also` are variables that it has shown since. Raises `BadProfile`."""
+    """The robot as others see it; `also` are variables that it has shown since. Raises `ProfileError`."""
     looked_at = [name for names in profile.looks_at.values() for name in names]
     names = (profile.name, *profile.neighbours, *profile.variables, *looked_at, *profile.wants, *also)
     bad = next((name for name in names if not is_name(name) or len(name) > LONGEST_NAME), None)
     if bad is not None:
-        raise BadProfile(f"{bad[:LONGEST_NAME]!r} is no name")
+        raise ProfileError(f"{bad[:LONGEST_NAME]!r} is no name")
     if (
         len(profile.neighbours) > MOST_NEIGHBOURS
         or max(map(len, (profile.variables, looked_at, profile.wants))) > MOST_VARIABLES
     ):
-        raise BadProfile("it has too many neighbours or variables")
+        raise ProfileError("it has too many neighbours or variables")
     if len({profile.name, *profile.neighbours}) <= len(profile.neighbours):
-        raise BadProfile("it names itself, or a neighbour twice")
+        raise ProfileError("it names itself, or a neighbour twice")
     strangers = profile.looks_at.keys() - set(profile.children)
     if strangers:  # the master would have them show what is none of its business
-        raise BadProfile(f"it looks at variables of {min(strangers)[:LONGEST_NAME]}, which is no child of it")
+        raise ProfileError(f"it looks at variables of {min(strangers)[:LONGEST_NAME]}, which is no child of it")
     if not (0 <= profile.dearest <= LARGEST_DEAREST and 1 <= profile.weight <= LARGEST_WEIGHT):
-        raise BadProfile(f"costs of {profile.dearest:g} and a weight of {profile.weight} cannot be")
+        raise ProfileError(f"costs of {profile.dearest:g} and a weight of {profile.weight} cannot be")
     shown = {**profile.variables, **also}
     return Robot(
         name=profile.name,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from robochoc.communication.network.control_messages import Ask, Sniff, Sniffable, Told
-from robochoc.communication.network.facilitator import DirectoryFacilitator, TooOften
+from robochoc.communication.network.facilitator import DirectoryFacilitator, TooManyRequestsError
 from robochoc.communication.network.journal_server import PublicationDesk
 
 
@@ -28,7 +28,7 @@ class Requests:
         """Answer `sender`, unless it asks too often."""
         try:
             self._facilitator.count(sender)
-        except TooOften as often:
+        except TooManyRequestsError as often:
             self._refuse(sender, "ask the Directory Facilitator", str(often))
             return
         told = self._desk.welcome(sender, word) if isinstance(word, Sniff) else self._facilitator.answer(sender, word)

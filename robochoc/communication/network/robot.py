@@ -18,10 +18,10 @@ from typing import NamedTuple
 import msgspec
 
 from robochoc.authority.identity import Identity
-from robochoc.authority.keyring import BadCard, KeyCard, KeyRing, UnknownPeer
+from robochoc.authority.keyring import KeyCard, KeyCardError, KeyRing, UnknownPeerError
 from robochoc.communication.control import Failed, Pause, Wave
-from robochoc.communication.filters import FilterStack, NotGenuine, UnknownFilter, filter_named
-from robochoc.communication.host import BadMessage
+from robochoc.communication.filters import FilterStack, NotGenuineError, UnknownFilterError, filter_named
+from robochoc.communication.host import BadMessageError
 from robochoc.communication.network.control_messages import (
     Bye,
     Copies,
@@ -44,7 +44,7 @@ from robochoc.communication.network.control_messages import (
     Welcome,
     Word,
 )
-from robochoc.communication.network.framing import MASTER, Letters, Opened, Refused
+from robochoc.communication.network.framing import MASTER, FrameRefusedError, Letters, Opened
 from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
 from robochoc.communication.network.manner import AS_USUAL, Manner
 from robochoc.communication.network.profile import among, profile_of, ranges_of
@@ -55,7 +55,7 @@ from robochoc.communication.network.transport import Post
 from robochoc.model.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
-from robochoc.solver.encoding import TooMuch, Unsupported
+from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 
 IDLE_S = 0.002
@@ -66,7 +66,7 @@ REGISTER_AGAIN_S = 1.0
 AT_ONCE = 10_000
 """So many letters at most are one packet."""
 _VISIT_BYTES = 8
-_UNUSABLE = (Refused, NotGenuine, UnknownPeer, BadMessage)
+_UNUSABLE = (FrameRefusedError, NotGenuineError, UnknownPeerError, BadMessageError)
 
 
 class Ending(NamedTuple):
@@ -77,7 +77,7 @@ class Ending(NamedTuple):
     assignment: dict[str, int]
 
 
-class _Over(Exception):  # noqa: N818 - not an error: the way out of the loop
+class _RunOverError(Exception):
     def __init__(self, why: str, *, failed: bool) -> None:
         super().__init__(why)
         self.why = why
@@ -128,13 +128,13 @@ class NetworkRobot:
             self._register()
             while True:
                 self._turn(self._items())
-        except _Over as over:
+        except _RunOverError as over:
             return Ending(
                 on_one_line(over.why, LONGEST_REASON), over.failed, self._searcher.assignment if self._searcher else {}
             )
-        except Unsupported as refusal:
+        except UnsupportedError as refusal:
             why = on_one_line(str(refusal), LONGEST_REASON)
-            self._fail(Failed(why, unsupported=True, elsewhere=isinstance(refusal, TooMuch)))
+            self._fail(Failed(why, unsupported=True, elsewhere=isinstance(refusal, TooLargeError)))
             return Ending(why, failed=True, assignment={})
         except Exception as error:  # noqa: BLE001 - whatever it was, the master has to know
             where = traceback.extract_tb(error.__traceback__)[-1]
@@ -161,7 +161,9 @@ class NetworkRobot:
                 case Arrived(sender, content):
                     self._read(sender, content, packet)
                 case Missed(sender, letters) if sender == MASTER:
-                    raise Unsupported(f"{letters:,} letters of the master to {self._robot.name} were lost for good")
+                    raise UnsupportedError(
+                        f"{letters:,} letters of the master to {self._robot.name} were lost for good"
+                    )
                 case Missed(sender, letters) if self._welcome:
                     self._tell_of_gap(sender, letters)
                 case Missed() | Presence() | Woken():
@@ -197,9 +199,9 @@ class NetworkRobot:
                 self._router = router
                 self._register()
         elif now - self._connected > self._manner.patience_s:
-            raise _Over(f"the master is gone: no link to it for {self._manner.patience_s:g} s", failed=True)
+            raise _RunOverError(f"the master is gone: no link to it for {self._manner.patience_s:g} s", failed=True)
         if self._unanswered is not None and now - self._unanswered > max(self._manner.patience_s, 2 * REGISTER_AGAIN_S):
-            raise _Over(
+            raise _RunOverError(
                 f"the master does not answer {self._robot.name}: is it enrolled there, and not revoked?", failed=True
             )
 
@@ -213,7 +215,7 @@ class NetworkRobot:
             context = self._context(self._robot.name, receiver, self._letters.next_number(receiver), word)
             try:
                 word = msgspec.structs.replace(word, content=self._filters.seal(receiver, word.content, context))
-            except UnknownPeer:
+            except UnknownPeerError:
                 return  # it was revoked, and hears nothing any more
         self._post.send(receiver, self._letters.write(receiver, word))
 
@@ -227,8 +229,8 @@ class NetworkRobot:
     def _use(self, sender: str, opened: Opened, packet: list[Envelope]) -> None:
         """Take in what is for now; what is for later waits as it is, for the cards that open it have not come yet.
 
-        Raises `BadMessage`, `NotGenuine`, `Refused`, `UnknownPeer`, so that what nobody can use does not take the place
-        of another letter.
+        Raises `BadMessageError`, `NotGenuineError`, `FrameRefusedError`, `UnknownPeerError`, so that what nobody can
+        use does not take the place of another letter.
         """
         word, epoch = opened.word, self._searcher.epoch if self._searcher else 0
         if not isinstance(word, Said | Copies):
@@ -236,9 +238,9 @@ class NetworkRobot:
             self._obey(word)
         elif word.epoch > epoch:
             if word.epoch > epoch + 1:
-                raise Refused(f"it is of epoch {word.epoch}, and this is {epoch}")
+                raise FrameRefusedError(f"it is of epoch {word.epoch}, and this is {epoch}")
             if not self._kept.takes(sender, len(word.content)):
-                raise Refused(f"it is more than is kept of {sender} for epoch {word.epoch}")
+                raise FrameRefusedError(f"it is more than is kept of {sender} for epoch {word.epoch}")
             self._letters.take(sender, opened.number)
             self._ahead.append((sender, opened))
         else:
@@ -282,7 +284,7 @@ class NetworkRobot:
             case Welcome():
                 self._enter(word)
             case Denied(visit, why) if visit == self._visit:
-                raise _Over(f"the master does not take {self._robot.name}: {why}", failed=True)
+                raise _RunOverError(f"the master does not take {self._robot.name}: {why}", failed=True)
             case Show(variables):
                 domains = {variable.name: variable.domain for variable in self._robot.variables}
                 self._say(Shown({name: ranges_of(domains[name]) for name in variables if name in domains}))
@@ -291,7 +293,7 @@ class NetworkRobot:
                     self._ring.dismiss(name)
             case Leave(why, failed):
                 self._say(Bye())
-                raise _Over(why, failed=failed)
+                raise _RunOverError(why, failed=failed)
             case Denied() | Told() | Sniffable():
                 pass
             case _:
@@ -328,7 +330,7 @@ class NetworkRobot:
         if self._welcome is None:
             self._begin(welcome)
         elif welcome.run != self._welcome.run:
-            raise _Over("the master was started anew; start this robot anew as well", failed=True)
+            raise _RunOverError("the master was started anew; start this robot anew as well", failed=True)
         self._say(Joined(self._visit, self._ring.card.encode() if self._ring else b""))
 
     def _begin(self, welcome: Welcome) -> None:
@@ -338,8 +340,8 @@ class NetworkRobot:
             self._ring = KeyRing(self._identity, welcome.run)
             try:
                 self._filters = FilterStack(self._ring, [filter_named(name) for name in welcome.filters])
-            except UnknownFilter as unknown:
-                raise Unsupported(f"{self._robot.name}: {unknown}") from None
+            except UnknownFilterError as unknown:
+                raise UnsupportedError(f"{self._robot.name}: {unknown}") from None
         self._manner.stage("registered, waiting for the others")
 
     def _take_task(self, task: Task) -> None:
@@ -350,7 +352,7 @@ class NetworkRobot:
         try:
             protocol = self._protocol_named(task.protocol)
         except LookupError as unknown:
-            raise Unsupported(f"{self._robot.name}: {unknown}") from None
+            raise UnsupportedError(f"{self._robot.name}: {unknown}") from None
         told = self._welcome.observed and not self._welcome.private  # events have values in them
         observed = told or self._manner.sniffed
         around = Surroundings(self._say, self._send, self._manner.place, observed, self._welcome.private)
@@ -374,7 +376,7 @@ class NetworkRobot:
                 card = KeyCard.decode(content)
                 if card.name != self._robot.name:
                     self._ring.admit(card, time.time())
-            except BadCard as bad:
+            except KeyCardError as bad:
                 self._object(MASTER, str(bad))
 
     def _fail(self, word: Failed) -> None:
@@ -392,7 +394,7 @@ class NetworkRobot:
     def _is_leave(self, content: bytes) -> bool:
         try:
             opened = self._letters.read(MASTER, content)
-        except Refused:
+        except FrameRefusedError:
             return False
         self._letters.take(MASTER, opened.number)
         return isinstance(opened.word, Leave)

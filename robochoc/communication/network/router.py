@@ -55,7 +55,7 @@ _KEPT_SESSIONS = 10_000
 _COLOURS = re.compile(rb"\x1b\[[0-9;]*m")
 
 
-class RouterFailed(Exception):  # noqa: N818 - named for what happened
+class RouterError(Exception):
     """The router cannot listen."""
 
 
@@ -89,7 +89,7 @@ class Router:
         self._reader: threading.Thread | None = None
 
     def open(self, reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None = None) -> None:
-        """Listen, with these rules (see `access_control`) instead of those before. Raises `RouterFailed`."""
+        """Listen, with these rules (see `access_control`) instead of those before. Raises `RouterError`."""
         self.close()
         process = subprocess.Popen(  # noqa: S603 - our own module, with this interpreter
             [sys.executable, "-P", "-m", _PROCESS],  # -P: not what stands in the working directory
@@ -101,7 +101,7 @@ class Router:
         )
         self._process = process
         if process.stdin is None or process.stdout is None:
-            raise RouterFailed("it has no standard streams")
+            raise RouterError("it has no standard streams")
         process.stdin.write(f"{json.dumps(self._scratch)}\n{json.dumps(self._settings(reach, sniffers))}\n".encode())
         process.stdin.flush()
         said = self._wait_until_ready(process.stdout)
@@ -157,7 +157,7 @@ class Router:
         finally:
             watch.cancel()
         why = b"; ".join(line.strip() for line in said[-2:]).decode(errors="replace") or "it ended without a word"
-        raise RouterFailed(f"cannot listen on {self.endpoint}: {why}")
+        raise RouterError(f"cannot listen on {self.endpoint}: {why}")
 
     def _give_up(self) -> None:
         if self._process:

@@ -15,7 +15,7 @@ from itertools import islice
 import msgspec
 
 from robochoc.communication.control import Conclusion, Counters, Events, Ready
-from robochoc.communication.host import BadMessage, Host
+from robochoc.communication.host import BadMessageError, Host
 from robochoc.communication.network.control_messages import (
     LATEST,
     Account,
@@ -28,9 +28,9 @@ from robochoc.communication.network.control_messages import (
     ToMaster,
 )
 from robochoc.communication.network.plausibility import MOST_JUDGED, fault_of_findings
-from robochoc.communication.network.profile import BadProfile, domain_of
+from robochoc.communication.network.profile import ProfileError, domain_of
 from robochoc.communication.network.quotas import Kept
-from robochoc.communication.network.shared import BadShared, SharedRecord, known_of, record_of
+from robochoc.communication.network.shared import SharedConstraintError, SharedRecord, known_of, record_of
 from robochoc.communication.resources import own_memory
 from robochoc.journal.events import AnyEvent
 from robochoc.model.message import Envelope
@@ -40,7 +40,7 @@ from robochoc.protocols.findings import NOTHING, Findings
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import Brief, Part
 from robochoc.solver.compiled_team import CompiledRobot
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.explanation import Known, held
 
 EVENTS_AT_ONCE = 500
@@ -62,7 +62,7 @@ class Surroundings:
 
 
 class Searcher:
-    """The robot `own`, as it is `among` those of `task`, in its epoch. Raises `Unsupported` when it is another."""
+    """The robot `own`, as it is `among` those of `task`, in its epoch. Raises `UnsupportedError` when it is another."""
 
     def __init__(
         self,
@@ -92,7 +92,7 @@ class Searcher:
         self._told: tuple[int, int] | None = None
         self._searching = self._concluded = self._paused = False
         if task.interfaces.get(self._robot.name) != self._robot.interface:  # others would misread its values
-            raise Unsupported(f"{self._robot.name} was told what cannot be: that it shows other variables")
+            raise UnsupportedError(f"{self._robot.name} was told what cannot be: that it shows other variables")
 
     @property
     def name(self) -> str:
@@ -112,9 +112,10 @@ class Searcher:
     # Getting ready
 
     def prepare(self) -> None:
-        """Tell others which constraints they have to know; get ready once all children have told. Raises `Unsupported`.
+        """Tell others which constraints they have to know; get ready once all children have told.
 
         Only protocols whose order changes have more than the lowest robot know a constraint (`Traits.everywhere`).
+        Raises `UnsupportedError`.
         """
         owners = {name: agent for agent, names in self._task.interfaces.items() for name in names}
         self._refuse_unfit(owners)
@@ -126,24 +127,28 @@ class Searcher:
         self._get_ready()
 
     def _refuse_unfit(self, owners: Mapping[str, str]) -> None:
-        """Raise `Unsupported` for what the own file asks and the protocol cannot do: nobody else has seen the file."""
+        """Raise `UnsupportedError` where the own file asks for more than the protocol can do."""
         robot, traits = self._robot, self._protocol.traits
         refused = f", which {self._task.protocol} does not support"
         if robot.kind is Kind.DISWCSP and not traits.costs:
-            raise Unsupported(f"{robot.name} is part of a DisWCSP{refused}")
+            raise UnsupportedError(f"{robot.name} is part of a DisWCSP{refused}")
         parts = [part for child in robot.children for part in child.constraints]
         for constraint in (*robot.shared, *parts):
             if constraint.model is Model.PKC and not traits.partially_known:
-                raise Unsupported(f"{robot.name} shares a partially known constraint (PKC, {constraint.name}){refused}")
+                raise UnsupportedError(
+                    f"{robot.name} shares a partially known constraint (PKC, {constraint.name}){refused}"
+                )
             if not traits.n_ary and len({owners.get(variable) for variable in constraint.variables}) > PAIR:
-                raise Unsupported(f"{robot.name} holds a constraint over more than two robots{refused}")
+                raise UnsupportedError(f"{robot.name} holds a constraint over more than two robots{refused}")
 
     def learn(self, sender: str, content: bytes) -> None:
-        """`sender` holds the constraints in `content`, and this robot is in their scopes. Raises `Unsupported`."""
+        """`sender` holds the constraints in `content`, and this robot is in their scopes. Raises `UnsupportedError`."""
         try:
             self._copies[sender] = msgspec.msgpack.decode(content, type=tuple[SharedRecord, ...])
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as bad:
-            raise Unsupported(f"{self._robot.name} was told what cannot be: {sender}'s constraints: {bad}") from None
+            raise UnsupportedError(
+                f"{self._robot.name} was told what cannot be: {sender}'s constraints: {bad}"
+            ) from None
         self._get_ready()
 
     def _get_ready(self) -> None:
@@ -161,8 +166,8 @@ class Searcher:
         try:
             known = {sender: [self._known(sender, record) for record in told] for sender, told in self._copies.items()}
             domains = {name: domain_of(name, ranges) for name, ranges in task.domains.items()}
-        except (BadShared, BadProfile) as bad:
-            raise Unsupported(f"{self._robot.name} was told what cannot be: {bad}") from None
+        except (SharedConstraintError, ProfileError) as bad:
+            raise UnsupportedError(f"{self._robot.name} was told what cannot be: {bad}") from None
         self._learnt = {sender: [one.constraint for one in told] for sender, told in known.items()}
         copies = [one for told in known.values() for one in told]
         brief = Brief(task.seed, task.settings, task.aside)
@@ -180,7 +185,7 @@ class Searcher:
             or not variables <= self._task.domains.keys()
             or not (variables & mine and variables & theirs)
         ):
-            raise BadShared(f"{sender} holds {known.constraint.name!r} over what it cannot")
+            raise SharedConstraintError(f"{sender} holds {known.constraint.name!r} over what it cannot")
         return known
 
     # Searching
@@ -198,27 +203,28 @@ class Searcher:
         self.take_in(early)
 
     def check(self, content: bytes) -> None:
-        """Raises `BadMessage` when `content` is no message of the protocol, before anything is made of it."""
+        """Raises `BadMessageError` when `content` is no message of the protocol, before anything is made of it."""
         try:
             self._decode(content)
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-            raise BadMessage(f"it is no message of the protocol: {error}") from None
+            raise BadMessageError(f"it is no message of the protocol: {error}") from None
 
     def hear(self, envelope: Envelope) -> bool:
         """Whether `envelope` belongs into the packet that is being made up; if not, it waits, or comes too late.
 
-        Raises `BadMessage` for one of somebody who takes no part in this search, or who says too much before it begins.
+        Raises `BadMessageError` for one of somebody who takes no part in this search, or who says too much before it
+        begins.
         """
         if envelope.sender not in self._task.interfaces:
-            raise BadMessage(f"{envelope.sender} takes no part in this search")
+            raise BadMessageError(f"{envelope.sender} takes no part in this search")
         if not self._searching and not self._paused:
             if not self._kept.takes(envelope.sender, len(envelope.content)):
-                raise BadMessage(f"{envelope.sender} says too much before the search has begun")
+                raise BadMessageError(f"{envelope.sender} says too much before the search has begun")
             self._early.append(envelope)
         return self._searching
 
     def take_in(self, packet: Sequence[Envelope]) -> None:
-        """Give the protocol all messages that wait, unless the search is over. Raises `BadMessage`."""
+        """Give the protocol all messages that wait, unless the search is over. Raises `BadMessageError`."""
         if packet and self._host and self._searching:
             self._received += len(packet)
             for envelope in packet:

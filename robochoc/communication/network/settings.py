@@ -16,8 +16,8 @@ class Conditions:
 
     `filters` are the channel filters that messages go through. In a `private` run nobody tells its values. A robot may
     be away for `patience_s`; a link that is silent for `lease_ms` counts as down. With `survive`, robots that are
-    lost break the search off, and are told of in its result; otherwise `RobotsLost` is raised. `protocol` is what the
-    Directory Facilitator says that robots speak. `listen` is where the router listens (`HOST:PORT`), if that is not
+    lost break the search off, and are told of in its result; otherwise `RobotsLostError` is raised. `protocol` is what
+    the Directory Facilitator says that robots speak. `listen` is where the router listens (`HOST:PORT`), if that is not
     where it is reached: all addresses of a machine are the name of none. `scratch` is a folder of this process that the
     router removes should it outlive the process (empty: there is none).
     """

@@ -17,7 +17,7 @@ MOST_TERMS = 1000
 """In a scope, or of parameters: few enough to look names up among them."""
 
 
-class BadShared(ValueError):  # noqa: N818 - named for what was found
+class SharedConstraintError(ValueError):
     """A constraint from elsewhere that cannot be."""
 
 
@@ -59,16 +59,18 @@ def record_of(known: Known) -> SharedRecord:
 
 
 def known_of(record: SharedRecord) -> Known:
-    """The constraint in `record`. Raises `BadShared`."""
+    """The constraint in `record`. Raises `SharedConstraintError`."""
     if max(len(record.scope), len(record.parameters)) > MOST_TERMS:
-        raise BadShared(f"{shortened(record.name)!r} has more than {MOST_TERMS} terms")
+        raise SharedConstraintError(f"{shortened(record.name)!r} has more than {MOST_TERMS} terms")
     variables = [term for term in record.scope if isinstance(term, str)]
     if not variables or not all(map(is_name, variables)) or not set(record.parameters) <= set(record.scope):
-        raise BadShared(f"the scope of {shortened(record.name)!r} is none")
+        raise SharedConstraintError(f"the scope of {shortened(record.name)!r} is none")
     definition = _definition(record.definition)
     arity = definition.arity if isinstance(definition, Relation) else len(definition.parameters)
     if arity != len(record.parameters) or not record.cost >= 0:
-        raise BadShared(f"{shortened(record.name)!r} has {len(record.parameters)} arguments where {arity} are needed")
+        raise SharedConstraintError(
+            f"{shortened(record.name)!r} has {len(record.parameters)} arguments where {arity} are needed"
+        )
     return Known(
         record.key,
         Constraint(record.name, definition, record.scope, record.parameters, record.model, record.cost),
@@ -92,15 +94,15 @@ def _definition(record: RelationRecord | PredicateRecord) -> Relation | Predicat
     if isinstance(record, PredicateRecord):
         names = record.parameters
         if len(names) > MOST_TERMS or len(set(names)) < len(names):
-            raise BadShared(f"the parameters of {shortened(record.name)!r} are none")
+            raise SharedConstraintError(f"the parameters of {shortened(record.name)!r} are none")
         return Predicate(record.name, names, _body(record))
     if any(len(values) != record.arity for values in record.tuples):
-        raise BadShared(f"a tuple of {shortened(record.name)!r} has not {record.arity} values")
+        raise SharedConstraintError(f"a tuple of {shortened(record.name)!r} has not {record.arity} values")
     if len(set(record.tuples)) < len(record.tuples):
-        raise BadShared(f"a tuple of {shortened(record.name)!r} stands twice")
+        raise SharedConstraintError(f"a tuple of {shortened(record.name)!r} stands twice")
     costs = len(record.tuples) if record.semantics is Semantics.SOFT else 0
     if len(record.costs) != costs or not all(cost >= 0 for cost in (*record.costs, record.default_cost)):
-        raise BadShared(f"the costs of {shortened(record.name)!r} are none")
+        raise SharedConstraintError(f"the costs of {shortened(record.name)!r} are none")
     return Relation(record.name, record.arity, record.semantics, record.tuples, record.costs, record.default_cost)
 
 
@@ -108,4 +110,4 @@ def _body(record: PredicateRecord) -> Expression:
     try:
         return parse(record.body, record.parameters, Type.BOOLEAN)
     except ExpressionError as error:
-        raise BadShared(f"the predicate {shortened(record.name)!r}: {error}") from None
+        raise SharedConstraintError(f"the predicate {shortened(record.name)!r}: {error}") from None

@@ -43,7 +43,7 @@ DESCRIPTORS = 24
 """Open files that a session may need: threads of zenoh's have some, too."""
 
 
-class CannotConnect(Exception):  # noqa: N818 - named for what happened
+class CannotConnectError(Exception):
     """There is no master at that address, or it does not let us in."""
 
 
@@ -58,7 +58,7 @@ class Post:
     """The connection of `identity` with the router at `endpoint` (`HOST:PORT`); a context manager.
 
     It knows of the lives of those in `watch`, and gets the letters of those in `heard` (more: `hear`) into `inbox`.
-    `lease_ms` is how long a silent link counts as alive. Raises `CannotConnect` when there is no connection within
+    `lease_ms` is how long a silent link counts as alive. Raises `CannotConnectError` when there is no connection within
     `patience_s`.
     """
 
@@ -204,7 +204,7 @@ class Post:
 def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Session:
     """A session. zenoh does not hear Ctrl-C while it connects, so it is not left to that for long."""
     if endpoint.startswith("["):
-        raise CannotConnect(
+        raise CannotConnectError(
             f"{endpoint}: zenoh cannot check whose IPv6 address that is; call the master by a host name"
         )
     require_descriptors(DESCRIPTORS)
@@ -216,7 +216,7 @@ def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int)
             return zenoh.open(client_config(endpoint, identity, min(attempt_s, left), lease_ms))
         except zenoh.ZError as error:
             if time.monotonic() >= until:
-                raise CannotConnect(
+                raise CannotConnectError(
                     f"no master answers at {endpoint}, or it does not let {identity.name} in"
                 ) from error
         attempt_s = min(2 * attempt_s, _LONGEST_ATTEMPT_S)

@@ -15,7 +15,7 @@ from robochoc.communication.control import FromParent, FromRobot, QueueFrom, Que
 from robochoc.communication.processes.robot_link import Condition, RobotLink
 from robochoc.communication.processes.robot_process import Beginning, robot_process
 from robochoc.communication.resources import allow_descriptors, signals_held
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 
 StartMethod = Literal["fork", "forkserver"]
 _CONTEXTS: dict[StartMethod, type[ForkContext | ForkServerContext]] = {
@@ -114,7 +114,7 @@ class Crew:
                 try:
                     reader, writer = self._context.Pipe(duplex=False)
                 except OSError as error:
-                    raise Unsupported(
+                    raise UnsupportedError(
                         f"the system does not let {sender.name} have a queue to {name}: {error.strerror}"
                         " (raise its limits, see 'ulimit -n', or use the simulator)"
                     ) from error

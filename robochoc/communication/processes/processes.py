@@ -33,7 +33,7 @@ from robochoc.communication.control import (
     sealed,
 )
 from robochoc.communication.processes.pool import Crew, StartMethod
-from robochoc.communication.processes.robot_link import Condition, RobotLink, RobotsLost
+from robochoc.communication.processes.robot_link import Condition, RobotLink, RobotsLostError
 from robochoc.communication.processes.robot_process import Beginning
 from robochoc.communication.processes.stopped import Stopped
 from robochoc.communication.quiescence import Counts, FourCounters
@@ -46,7 +46,7 @@ from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import NO_BRIEF, Brief, Part
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import TooMuch, Unsupported
+from robochoc.solver.encoding import TooLargeError, UnsupportedError
 
 TICK_S = 0.2
 """Between two looks at the counters for those who watch the progress, and at who is dying."""
@@ -62,7 +62,7 @@ class ProcessesRun(Session):
     """One team, each robot in a process of its own; whatever happens, no process outlives `close`.
 
     `observer` is told of all events; with `progress`, somebody watches the count of messages. With `survive`, robots
-    whose processes end break the search off, and are told of in its result; otherwise `RobotsLost` is raised.
+    whose processes end break the search off, and are told of in its result; otherwise `RobotsLostError` is raised.
     A robot whose process is stopped (SIGSTOP) for `patience_s` seconds counts as lost (None: it is waited for).
     `brief` is what robots are told beside the problem.
     """
@@ -110,9 +110,9 @@ class ProcessesRun(Session):
         return self._quiet
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
-        """See `Session.search`. Raises `RobotsLost` when a robot's process ends or fails.
+        """See `Session.search`. Raises `RobotsLostError` when a robot's process ends or fails.
 
-        Raises `Unsupported` when a robot's problem is more than this version, or the system, can take. A limit on
+        Raises `UnsupportedError` when a robot's problem is more than this version, or the system, can take. A limit on
         messages is looked at as often as all robots answer.
         """
         began = time.monotonic()
@@ -127,7 +127,7 @@ class ProcessesRun(Session):
                 self._wait_until(lambda: self._verdict is not None or self._broken_off, deadline)
                 self._searching, self._quiet = False, self._counters.quiescent and not self._broken_off
             return self._finish(began, late=over(deadline))
-        except RobotsLost as lost:
+        except RobotsLostError as lost:
             for name, why in lost.robots.items():
                 self._observe(Lost(t=self._now(), robot=name, why=why))
             raise
@@ -166,7 +166,7 @@ class ProcessesRun(Session):
     # Beginning
 
     def _launch(self, deadline: float | None) -> None:
-        """Start the processes, as long as there is time. Raises `Unsupported` when the system allows fewer."""
+        """Start the processes, as long as there is time. Raises `UnsupportedError` when the system allows fewer."""
         waiting, self._waiting = self._waiting, {}
         if not waiting:
             return
@@ -183,7 +183,7 @@ class ProcessesRun(Session):
         try:
             self._crew.start(Beginning(part, self._protocol, self._number, observed))
         except OSError as error:
-            raise Unsupported(
+            raise UnsupportedError(
                 f"the system lets only {len(self._crew.robots)} of {len(part.order)} robots have a process:"
                 f" {error.strerror} (raise its limits, see 'ulimit -n' and 'ulimit -u', or use the simulator)"
             ) from error
@@ -191,7 +191,7 @@ class ProcessesRun(Session):
     # The loop
 
     def _wait_until(self, done: Callable[[], bool], deadline: float | None) -> None:
-        """Serve the robots until `done()` or the deadline; raises `RobotsLost` as soon as one is lost for good."""
+        """Serve the robots until `done()` or the deadline; raises `RobotsLostError` as soon as one is lost for good."""
         while not done():
             now = time.monotonic()
             if over(deadline):
@@ -216,7 +216,7 @@ class ProcessesRun(Session):
         silent = [robot.name for robot in found[Condition.STOPPED] if robot.report is None]
         lost = self._stopped.look(silent, now)
         if lost and not self._survive:
-            raise RobotsLost(lost)  # and they are killed, as all are
+            raise RobotsLostError(lost)  # and they are killed, as all are
         for name, why in lost.items():
             self._lose(name, why)
 
@@ -231,7 +231,7 @@ class ProcessesRun(Session):
         self._give_up(dead)
 
     def _give_up(self, dead: Collection[RobotLink]) -> None:
-        """Robots are `dead`: end the run and raise `RobotsLost`, unless the others are to go on."""
+        """Robots are `dead`: end the run and raise `RobotsLostError`, unless the others are to go on."""
         if not dead:
             return
         if not self._survive:
@@ -244,7 +244,7 @@ class ProcessesRun(Session):
             for word in robot.last_words():
                 self._hear(robot, word)
         if not self._survive:
-            raise RobotsLost(fates)
+            raise RobotsLostError(fates)
         for name, why in fates.items():
             self._lose(name, why)
 
@@ -275,16 +275,16 @@ class ProcessesRun(Session):
             case Report():
                 robot.report = word
             case Failed(why, unsupported, elsewhere):
-                refusal = TooMuch if elsewhere else Unsupported
-                raise refusal(why) if unsupported else RobotsLost({robot.name: why})
+                refusal = TooLargeError if elsewhere else UnsupportedError
+                raise refusal(why) if unsupported else RobotsLostError({robot.name: why})
             case never:
                 assert_never(never)
 
     def _conclude(self, name: str, verdict: str) -> None:
-        """Take in that the robot `name` alone can tell the verdict. Raises `RobotsLost` for one that it cannot."""
+        """Take in that the robot `name` alone can tell the verdict. Raises `RobotsLostError` for one that it cannot."""
         fault = self._protocol.traits.fault_of_conclusion(verdict)
         if fault:
-            raise RobotsLost({name: fault})
+            raise RobotsLostError({name: fault})
         self._verdict, self._witness = Verdict(verdict), name
 
     def _open_queues(self, sender: RobotLink, receivers: Sequence[str]) -> None:
@@ -293,7 +293,9 @@ class ProcessesRun(Session):
         known = [name for name in receivers if name in self._crew.robots]
         strangers = [name for name in receivers if name not in known and name not in self._lost]
         if strangers:
-            raise RobotsLost({sender.name: f"it wanted to talk to {strangers[0]!r}, which is no robot of the team"})
+            raise RobotsLostError(
+                {sender.name: f"it wanted to talk to {strangers[0]!r}, which is no robot of the team"}
+            )
         self._crew.open_queues(sender, known)
 
     def _ask_around(self, now: float) -> None:
@@ -318,7 +320,7 @@ class ProcessesRun(Session):
         silent = self._silent()
         if silent and not late and not (self._verdict is None and over(self._deadline)):
             if not self._survive:
-                raise RobotsLost(dict.fromkeys(silent, "it did not report at the end"))
+                raise RobotsLostError(dict.fromkeys(silent, "it did not report at the end"))
             for name in silent:
                 self._lose(name, "it did not report at the end")
         reports = {name: robot.report for name, robot in self._crew.robots.items() if robot.report is not None}
@@ -365,7 +367,7 @@ class ProcessesRun(Session):
     def _tell(self, robot: RobotLink, order: FromParent) -> None:
         try:
             robot.tell(order)
-        except RobotsLost as deaf:
+        except RobotsLostError as deaf:
             if not self._survive:
                 raise
             self._lose(robot.name, deaf.robots[robot.name])

@@ -19,18 +19,21 @@ LARGEST_BODY = 1 << 26
 """64 MiB: more than any message of ours, and a bound on what a lying peer can make us allocate."""
 
 
-class Corrupt(Exception):  # noqa: N818 - named for the state of the queue
+class CorruptQueueError(Exception):
     """What was read is no sequence of bodies, or one body is larger than `LARGEST_BODY`."""
 
 
 def unpack(buffer: bytearray) -> Iterator[bytes]:
-    """Take the whole bodies from the front of `buffer`, and leave an unfinished one in it. Raises `Corrupt`."""
+    """Take the whole bodies from the front of `buffer`, and leave an unfinished one in it.
+
+    Raises `CorruptQueueError`.
+    """
     start = 0
     try:
         while len(buffer) - start >= _LENGTH.size:
             (length,) = _LENGTH.unpack_from(buffer, start)
             if not 0 <= length <= LARGEST_BODY:
-                raise Corrupt(f"a body of {length} bytes")
+                raise CorruptQueueError(f"a body of {length} bytes")
             end = start + _LENGTH.size + length
             if len(buffer) < end:
                 break

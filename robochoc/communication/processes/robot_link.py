@@ -37,7 +37,7 @@ class Condition(Enum):
     DIES = auto()
 
 
-class RobotsLost(Exception):  # noqa: N818 - named for what happened
+class RobotsLostError(Exception):
     """Robots whose processes ended, or failed, before the run did: `robots` says why, by name."""
 
     def __init__(self, robots: Mapping[str, str]) -> None:
@@ -78,7 +78,7 @@ class RobotLink:
     def tell(self, order: FromParent, fds: Sequence[int] = ()) -> None:
         """Send `order`, with the ends of queues if any are given. To a robot that is gone: nothing.
 
-        Raises `RobotsLost` when the robot does not read for `_DEAF_S` seconds.
+        Raises `RobotsLostError` when the robot does not read for `_DEAF_S` seconds.
         """
         body = self._encoder.encode(order)
         frame = len(body).to_bytes(4, "big") + body
@@ -93,7 +93,7 @@ class RobotLink:
                 if error.errno not in {errno.EAGAIN, errno.ETOOMANYREFS}:
                     raise
                 if time.monotonic() > deadline:
-                    raise RobotsLost({self.name: "it does not answer"}) from error
+                    raise RobotsLostError({self.name: "it does not answer"}) from error
                 multiprocessing.connection.wait([self.process.sentinel], 0.001)
                 continue
             frame, fds = frame[sent:], ()

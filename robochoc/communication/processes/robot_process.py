@@ -51,7 +51,7 @@ from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import Part
-from robochoc.solver.encoding import TooMuch, Unsupported
+from robochoc.solver.encoding import TooLargeError, UnsupportedError
 
 IDLE_S = 0.002
 """A robot that has heard nothing for so long reports its counters. Only when to ask; never whether it is over."""
@@ -94,8 +94,8 @@ def robot_process(begin: Beginning, control: socket.socket, inherited: Sequence[
     try:
         host = Host.of(begin.protocol, begin.part)
         _RobotLoop(host, link, begin.epoch, observed=begin.observed).run()
-    except Unsupported as refusal:
-        link.say(Failed(str(refusal), unsupported=True, elsewhere=isinstance(refusal, TooMuch)))
+    except UnsupportedError as refusal:
+        link.say(Failed(str(refusal), unsupported=True, elsewhere=isinstance(refusal, TooLargeError)))
     except Exception as error:  # noqa: BLE001 - whatever it was, the parent has to know
         where = traceback.extract_tb(error.__traceback__)[-1]
         link.say(Failed(f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"))
@@ -161,7 +161,9 @@ class _ControlPipe:
             chunk, ancillary, flags = b"", [], 0
         if flags & socket.MSG_CTRUNC:
             name = multiprocessing.current_process().name
-            raise Unsupported(f"{name} needs more open files than the system allows (raise the limit, see 'ulimit -n')")
+            raise UnsupportedError(
+                f"{name} needs more open files than the system allows (raise the limit, see 'ulimit -n')"
+            )
         for _, _, data in ancillary:
             fds = array.array("i")
             fds.frombytes(data[: len(data) - len(data) % fds.itemsize])

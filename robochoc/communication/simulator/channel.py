@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from robochoc.formats.diagnostics import Diagnostic, InvalidInput, shortened, suggestion
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, shortened, suggestion
 
 LARGEST_FILE = 2**16
 """A channel's file has no more bytes."""
@@ -154,7 +154,7 @@ _PLACE = re.compile(r" - at `\$\.?(\w*)[^`]*`$")
 
 
 def read_channel(path: Path) -> ChannelModel:
-    """The model in the TOML file at `path`, named for the file unless it says otherwise. Raises `InvalidInput`."""
+    """The model in the TOML file at `path`, named for the file unless it says otherwise. Raises `InvalidInputError`."""
     text = _text(path)
     try:
         fields = tomllib.loads(text)
@@ -193,5 +193,5 @@ def _text(path: Path) -> str:
         raise _invalid(path, "is not UTF-8", "a channel's file is TOML, in UTF-8") from None
 
 
-def _invalid(path: Path, message: str, hint: str = "docs/channels.md shows all fields") -> InvalidInput:
-    return InvalidInput([Diagnostic(os.fspath(path), 0, message, hint)])
+def _invalid(path: Path, message: str, hint: str = "docs/channels.md shows all fields") -> InvalidInputError:
+    return InvalidInputError([Diagnostic(os.fspath(path), 0, message, hint)])

@@ -11,7 +11,7 @@ if it gets stuck, any other order does too. Down they go in the reverse of an or
 So a way is found if all could go up from their starts, and from their goals, one after the other. Without standing
 points they can: the way up from the topmost leads away from all others, and across one flies at a height at which
 nobody rests, a distance above all places and a distance below those who wait. With them it fails only where they, or
-drones between which nobody fits, enclose somebody: that is `NoWay`.
+drones between which nobody fits, enclose somebody: that is `NoRouteError`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from robochoc.flight.routes.spacing import Array, norms
 _Way = Callable[[Array, Array, Array], Array | None]
 
 
-class NoWay(ValueError):  # noqa: N818 - named for what was found
+class NoRouteError(ValueError):
     """No order of moves was found in which `drones` reach their goals: standing points enclose them."""
 
     def __init__(self, drones: Sequence[int]) -> None:
@@ -49,7 +49,7 @@ class Move:
 
 
 def moves_between(starts: Array, goals: Array, standing: Array, space: Space, waits: Array) -> list[Move]:
-    """The moves, one after the other, that bring all from `starts` to `goals`; raises `NoWay`.
+    """The moves, one after the other, that bring all from `starts` to `goals`; raises `NoRouteError`.
 
     `space.sky` is two distances or more above all of them. Who waits less, or hinders fewer, comes first.
     """
@@ -248,14 +248,14 @@ class _Emptied(_Sequence):
     """Everybody goes up, and then down to its goal, in the reverse of an order in which they could leave the goals."""
 
     def all_moves(self) -> list[Move]:
-        """The moves; raises `NoWay`."""
+        """The moves; raises `NoRouteError`."""
         standing = self.points[self.count :]
         left = _Emptied(self.goals, self.goals, standing, self.space, self.waits)
         left.empty()
         self.empty()
         for move in reversed(left.moves):
             if not self.to_goal(move.drone, (self.space.by_lane, self.space.over)):
-                raise NoWay([move.drone])
+                raise NoRouteError([move.drone])
         return self.moves
 
     def empty(self) -> None:
@@ -267,7 +267,7 @@ class _Emptied(_Sequence):
                     drones.remove(drone)
                     break
             else:
-                raise NoWay(sorted(drones))
+                raise NoRouteError(sorted(drones))
 
 
 def _spiral(distance: float) -> Iterator[Array]:

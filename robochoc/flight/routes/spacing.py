@@ -17,7 +17,7 @@ SLACK_M = 1e-10
 """Rounding: so much nearer than the distance is not yet too near."""
 
 
-class TooClose(ValueError):  # noqa: N818 - named for what was found
+class TooCloseError(ValueError):
     """Two that are to be at rest at the same time stand nearer than the distance that is to be kept.
 
     `first` and `second` are drones' numbers; standing points are counted on from the drones. `where` says whether
@@ -61,7 +61,7 @@ def nearest(apart: Array, later: Array) -> Array:
 
 
 def check_spacing(points: Array, standing: Array, distance: float, where: Literal["start", "goal"]) -> None:
-    """Raise `TooClose` for the nearest two of `points` and `standing`, one of `points` at least, if too near."""
+    """Raise `TooCloseError` for the nearest two of `points` and `standing`, one of `points` at least, if too near."""
     count = len(points)
     if not count:
         return
@@ -70,4 +70,4 @@ def check_spacing(points: Array, standing: Array, distance: float, where: Litera
     apart[np.tril_indices(count, m=len(everything))] = np.inf
     first, second = divmod(int(apart.argmin()), len(everything))
     if apart[first, second] < distance - SLACK_M:
-        raise TooClose(first, second, float(apart[first, second]), where)
+        raise TooCloseError(first, second, float(apart[first, second]), where)

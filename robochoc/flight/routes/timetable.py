@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.flight.routes.motion import Limits, Motion, Plan, Route
-from robochoc.flight.routes.moves import Move, NoWay, moves_between
+from robochoc.flight.routes.moves import Move, NoRouteError, moves_between
 from robochoc.flight.routes.paths import Space
-from robochoc.flight.routes.spacing import Array, Flags, TooClose, check_spacing, nearest, norms
+from robochoc.flight.routes.spacing import Array, Flags, TooCloseError, check_spacing, nearest, norms
 
-__all__ = ["Limits", "Motion", "NoWay", "Plan", "TooClose", "plan"]
+__all__ = ["Limits", "Motion", "NoRouteError", "Plan", "TooCloseError", "plan"]
 
 Steps = NDArray[np.int64]
 
@@ -60,8 +60,8 @@ def plan(
     same start and goal stays there, unless `moves.py` finds no other way. Nobody flies below `ground`, but for starts
     and goals that are there. The result is the same each time. Lengths are in metres.
 
-    Raises `TooClose` if two starts, or two goals, or one of them and a standing point, are nearer than `distance`;
-    `NoWay` where standing points enclose a start or a goal; ValueError for arguments that make no sense.
+    Raises `TooCloseError` if two starts, or two goals, or one of them and a standing point, are nearer than `distance`;
+    `NoRouteError` where standing points enclose a start or a goal; ValueError for arguments that make no sense.
     """
     starts, goals = _points(starts, "starts"), _points(goals, "goals")
     standing = np.empty((0, 3)) if standing is None else _points(standing, "standing")

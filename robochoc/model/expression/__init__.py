@@ -10,7 +10,7 @@ All arguments of an operator are evaluated, whatever the others are; only `if` c
 from robochoc.model.expression.closures import compiled
 from robochoc.model.expression.operators import ALIASES, OPERATORS, evaluate
 from robochoc.model.expression.parser import ExpressionError, parse
-from robochoc.model.expression.tree import Apply, Constant, Expression, Name, Type, Undefined, names, text
+from robochoc.model.expression.tree import Apply, Constant, Expression, Name, Type, UndefinedValueError, names, text
 
 __all__ = [
     "ALIASES",
@@ -21,7 +21,7 @@ __all__ = [
     "ExpressionError",
     "Name",
     "Type",
-    "Undefined",
+    "UndefinedValueError",
     "compiled",
     "evaluate",
     "names",

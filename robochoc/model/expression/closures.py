@@ -9,7 +9,7 @@ import math
 import operator as arithmetic
 from collections.abc import Callable, Sequence
 
-from robochoc.model.expression.tree import BOUND, Apply, Constant, Expression, Name, Undefined
+from robochoc.model.expression.tree import BOUND, Apply, Constant, Expression, Name, UndefinedValueError
 
 Closure = Callable[[Sequence[int]], int]
 
@@ -17,7 +17,7 @@ Closure = Callable[[Sequence[int]], int]
 def compiled(expression: Expression, names: Sequence[str]) -> Closure:
     """`expression` as a function of the values of `names`, in their order: what `evaluate` says, but faster.
 
-    The function raises `Undefined` where `evaluate` does. Raises `ValueError` when a name is not in `names`.
+    The function raises `UndefinedValueError` where `evaluate` does. Raises `ValueError` when a name is not in `names`.
     """
     match expression:
         case Constant(value):
@@ -33,7 +33,7 @@ def compiled(expression: Expression, names: Sequence[str]) -> Closure:
 
 def _within(value: int) -> int:
     if abs(value) > BOUND:
-        raise Undefined
+        raise UndefinedValueError
     return value
 
 
@@ -61,7 +61,7 @@ def _div(left: Closure, right: Closure) -> Closure:
     def quotient(values: Sequence[int]) -> int:
         dividend, divisor = left(values), right(values)
         if not divisor:
-            raise Undefined
+            raise UndefinedValueError
         floor, rest = divmod(dividend, divisor)
         return _within(floor + 1 if rest and floor < 0 else floor)
 
@@ -72,7 +72,7 @@ def _mod(left: Closure, right: Closure) -> Closure:
     def rest(values: Sequence[int]) -> int:
         dividend, divisor = left(values), right(values)
         if not divisor:
-            raise Undefined
+            raise UndefinedValueError
         size = abs(dividend) % abs(divisor)
         return size if dividend >= 0 else -size
 
@@ -83,11 +83,11 @@ def _pow(left: Closure, right: Closure) -> Closure:
     def power(values: Sequence[int]) -> int:
         base, exponent = left(values), right(values)
         if exponent < 0:
-            raise Undefined
+            raise UndefinedValueError
         if base in {0, 1, -1}:
             return int(base ** min(exponent, 2 - exponent % 2))
         if exponent * math.log2(abs(base)) > BOUND.bit_length():
-            raise Undefined
+            raise UndefinedValueError
         return _within(base**exponent)
 
     return power

@@ -7,19 +7,19 @@ from collections.abc import Callable, Mapping
 from functools import reduce
 from typing import NamedTuple
 
-from robochoc.model.expression.tree import BOUND, Apply, Constant, Expression, Name, Type, Undefined
+from robochoc.model.expression.tree import BOUND, Apply, Constant, Expression, Name, Type, UndefinedValueError
 
 
 def _bounded(value: int) -> int:
     if -BOUND <= value <= BOUND:
         return value
-    raise Undefined
+    raise UndefinedValueError
 
 
 def _quotient(dividend: int, divisor: int) -> int:
     """Truncated toward zero."""
     if divisor == 0:
-        raise Undefined
+        raise UndefinedValueError
     size = abs(dividend) // abs(divisor)
     return size if (dividend < 0) == (divisor < 0) else -size
 
@@ -32,9 +32,9 @@ def _remainder(dividend: int, divisor: int) -> int:
 def _power(base: int, exponent: int) -> int:
     """Checked before it is computed: a power grows faster than memory."""
     if exponent < 0:
-        raise Undefined
+        raise UndefinedValueError
     if abs(base) > 1 and exponent >= BOUND.bit_length():
-        raise Undefined
+        raise UndefinedValueError
     return int(base**exponent)
 
 
@@ -84,7 +84,7 @@ ALIASES = {"neq": "ne", "minus": "sub", "plus": "add"}
 def evaluate(expression: Expression, environment: Mapping[str, int]) -> int:
     """The value of `expression` where names have the values of `environment`; Booleans are 0 and 1.
 
-    Raises `Undefined` on a division by zero, a negative exponent, and a result beyond +-2**63.
+    Raises `UndefinedValueError` on a division by zero, a negative exponent, and a result beyond +-2**63.
     """
     match expression:
         case Constant(value):

@@ -42,7 +42,7 @@ class Apply:
 Expression = Constant | Name | Apply
 
 
-class Undefined(ArithmeticError):  # noqa: N818 - no mistake: a value that some arguments have, and others have not
+class UndefinedValueError(ArithmeticError):
     """The expression has no value here: a division by zero, a negative exponent, or a result out of bounds."""
 
 

@@ -22,8 +22,8 @@ from urllib.parse import urlsplit
 
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.ros.live.inbox import Inbox
-from robochoc.ros.sink import Fields, Sink, SinkFailed
-from robochoc.ros.source import Heard, Source, SourceFailed
+from robochoc.ros.sink import Fields, Sink, SinkError
+from robochoc.ros.source import Heard, Source, SourceError
 
 PORT = 9090
 """Where rosbridge listens, where nobody says otherwise."""
@@ -48,7 +48,7 @@ _SECONDS = range(-(2**31), 2**32)
 _START = "start it there: `roslaunch rosbridge_server rosbridge_websocket.launch`, or `ros2 launch` the .xml in ROS 2"
 
 
-class Malformed(ValueError):  # noqa: N818 - named for what happened
+class MalformedMessageError(ValueError):
     """What came is no message's fields."""
 
 
@@ -73,16 +73,16 @@ def _sent(name: str, value: object) -> object:
 def incoming(message: object) -> tuple[dict[str, Any], int]:
     """The fields of a `message` that rosbridge sent, and what they weigh in characters and fields.
 
-    Raises `Malformed`.
+    Raises `MalformedMessageError`.
     """
     if not isinstance(message, dict):
-        raise Malformed("no object")
+        raise MalformedMessageError("no object")
     return _object(message, 0)
 
 
 def _object(message: dict[str, Any], depth: int) -> tuple[dict[str, Any], int]:
     if depth > _DEEPEST:
-        raise Malformed(f"nested more than {_DEEPEST} deep")
+        raise MalformedMessageError(f"nested more than {_DEEPEST} deep")
     fields: dict[str, Any] = {}
     weight = 1
     for name, value in message.items():
@@ -97,7 +97,7 @@ def _came(value: object, depth: int) -> tuple[Any, int]:
             return _object(value, depth)
         case list():
             if depth > _DEEPEST:
-                raise Malformed(f"nested more than {_DEEPEST} deep")
+                raise MalformedMessageError(f"nested more than {_DEEPEST} deep")
             parts = [_came(one, depth + 1) for one in value]
             return [part for part, _ in parts], 1 + sum(weight for _, weight in parts)
         case str():
@@ -116,7 +116,7 @@ def _stamp(value: object) -> int:
         ):
             return seconds * _BILLION + rest
         case _:
-            raise Malformed("'stamp' is no time")
+            raise MalformedMessageError("'stamp' is no time")
 
 
 class Address(NamedTuple):
@@ -320,7 +320,7 @@ class RosbridgeSink(Sink):
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
-        self._bridge = _Bridge(place, SinkFailed)
+        self._bridge = _Bridge(place, SinkError)
         self._topics: dict[str, Any] = {}
         self._published = 0
 
@@ -348,11 +348,11 @@ class RosbridgeSink(Sink):
             self._bridge.drain()
             is_confirmed = self._bridge.confirm()
             self._check()
-        except SinkFailed:
+        except SinkError:
             self._bridge.abort()
             raise
         if not self._bridge.close() and not is_confirmed:
-            raise SinkFailed(f"the rosbridge at {self._bridge.url} has not said that it has read all; see its log")
+            raise SinkError(f"the rosbridge at {self._bridge.url} has not said that it has read all; see its log")
 
     def discard(self) -> None:
         """Hang up."""
@@ -361,7 +361,7 @@ class RosbridgeSink(Sink):
     def _check(self) -> None:
         self._bridge.check()
         if self._bridge.complaint:
-            raise SinkFailed(f"the rosbridge at {self._bridge.url} complains: {self._bridge.complaint}; see its log")
+            raise SinkError(f"the rosbridge at {self._bridge.url} complains: {self._bridge.complaint}; see its log")
 
 
 class RosbridgeSource(Source):
@@ -370,7 +370,7 @@ class RosbridgeSource(Source):
     def __init__(self, place: str) -> None:
         super().__init__(place)
         self._inbox = Inbox()
-        self._bridge = _Bridge(place, SourceFailed)
+        self._bridge = _Bridge(place, SourceError)
         self._bridge.on_over = self._inbox.wake
 
     def listen(self, topics: Mapping[str, str]) -> None:
@@ -394,6 +394,6 @@ class RosbridgeSource(Source):
     def _heard(self, topic: str, kind: str, message: object) -> None:
         try:
             fields, weight = incoming(message)
-        except Malformed:
+        except MalformedMessageError:
             return
         self._inbox.put(Heard(topic, kind, fields, time.time_ns()), weight)

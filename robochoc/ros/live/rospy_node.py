@@ -25,8 +25,8 @@ from xml.parsers.expat import ExpatError
 
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.ros.live.inbox import Inbox
-from robochoc.ros.sink import Fields, Sink, SinkFailed
-from robochoc.ros.source import Heard, Source, SourceFailed
+from robochoc.ros.sink import Fields, Sink, SinkError
+from robochoc.ros.source import Heard, Source, SourceError
 
 MASTER_S = 3.0
 """How long the master may take to answer."""
@@ -45,7 +45,7 @@ _TYPE = re.compile(r"([a-z][a-z0-9_]*)/([A-Za-z][A-Za-z0-9_]*)")
 _DEFAULT_MASTER = "http://localhost:11311"
 _CALLER = "/robochoc"
 
-Failed = type[SinkFailed] | type[SourceFailed]
+Failed = type[SinkError] | type[SourceError]
 
 
 class _Bounded(xmlrpc.client.Transport):
@@ -162,7 +162,7 @@ def filled(message: Any, fields: Fields) -> Any:  # noqa: ANN401 - messages are 
 def _element(message: Any, name: str) -> Any:  # noqa: ANN401 - messages are untyped
     """A new element of an array field."""
     kind = message._slot_types[message.__slots__.index(name)]  # noqa: SLF001 - genpy's way to say it
-    return message_class(kind.partition("[")[0], SinkFailed)()
+    return message_class(kind.partition("[")[0], SinkError)()
 
 
 def fields_of(message: Any) -> dict[str, Any]:  # noqa: ANN401 - messages are untyped
@@ -186,8 +186,8 @@ class RospySink(Sink):
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
-        self._rospy = _node(place, SinkFailed)
-        self._master = _Master(SinkFailed)
+        self._rospy = _node(place, SinkError)
+        self._master = _Master(SinkError)
         self._publishers: dict[str, Any] = {}
         self._kinds: dict[str, Any] = {}
         self._absent: dict[str, int] = {}
@@ -198,12 +198,12 @@ class RospySink(Sink):
 
     def advertise(self, topics: Mapping[str, str]) -> None:
         """Register the topics, and wait for those who have subscribed to them."""
-        new = {topic: message_class(kind, SinkFailed) for topic, kind in topics.items() if topic not in self._kinds}
+        new = {topic: message_class(kind, SinkError) for topic, kind in topics.items() if topic not in self._kinds}
         if not new:
             return
         self._master.check()
         if not _in_time(partial(self._register, new)):
-            raise SinkFailed(f"the ROS master at {self._master.uri} has not registered our topics; see its log")
+            raise SinkError(f"the ROS master at {self._master.uri} has not registered our topics; see its log")
         self._gather(new)
 
     def _register(self, topics: Mapping[str, Any]) -> None:
@@ -219,7 +219,7 @@ class RospySink(Sink):
         try:
             message = filled(self._kinds[topic](), fields)
         except (ValueError, TypeError, AttributeError) as error:
-            raise SinkFailed(f"{topic} cannot be published as {kind}: {error}") from error
+            raise SinkError(f"{topic} cannot be published as {kind}: {error}") from error
         self._hand_over(partial(self._publishers[topic].publish, message))
 
     def close(self) -> None:
@@ -227,7 +227,7 @@ class RospySink(Sink):
         try:
             self._gather(self._publishers)
             self._drain()
-        except SinkFailed:
+        except SinkError:
             self.discard()
             raise
         if any(publisher.get_num_connections() for publisher in self._publishers.values()):
@@ -255,7 +255,7 @@ class RospySink(Sink):
             self._check()
             self._waiting.put(publish, timeout=STUCK_S)
         except queue.Full:
-            raise SinkFailed(self._stuck()) from None
+            raise SinkError(self._stuck()) from None
 
     def _drain(self) -> None:
         """Wait until nothing waits."""
@@ -263,7 +263,7 @@ class RospySink(Sink):
         while left:
             self._check()
             if time.monotonic() - since > STUCK_S:
-                raise SinkFailed(self._stuck())
+                raise SinkError(self._stuck())
             time.sleep(0.005)
             now = self._waiting.unfinished_tasks
             left, since = now, (time.monotonic() if now < left else since)
@@ -271,7 +271,7 @@ class RospySink(Sink):
 
     def _check(self) -> None:
         if self._problem:
-            raise SinkFailed(f"rospy cannot publish any more ({self._problem}); start again")
+            raise SinkError(f"rospy cannot publish any more ({self._problem}); start again")
 
     def _stuck(self) -> str:
         return f"a subscriber has read nothing for {STUCK_S:g} s; see `rostopic info` for who it is, and end it"
@@ -303,18 +303,18 @@ class RospySource(Source):
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
-        self._rospy = _node(place, SourceFailed)
-        self._master = _Master(SourceFailed)
+        self._rospy = _node(place, SourceError)
+        self._master = _Master(SourceError)
         self._asked = time.monotonic()
         self._inbox = Inbox()
         self._subscribers: list[Any] = []
 
     def listen(self, topics: Mapping[str, str]) -> None:
         """Subscribe."""
-        kinds = {topic: (kind, message_class(kind, SourceFailed)) for topic, kind in topics.items()}
+        kinds = {topic: (kind, message_class(kind, SourceError)) for topic, kind in topics.items()}
         self._master.check()
         if not _in_time(partial(self._subscribe, kinds)):
-            raise SourceFailed(
+            raise SourceError(
                 f"the ROS master at {self._master.uri} has not registered us as a subscriber; see its log"
             )
 

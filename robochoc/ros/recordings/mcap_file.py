@@ -25,10 +25,18 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.mappings import short_kind
 from robochoc.ros.recordings.recorder import Recorder
-from robochoc.ros.recordings.recording import BLOCK_AT_MOST, Block, Channel, Damaged, Recording, as_it_is, from_lz4
+from robochoc.ros.recordings.recording import (
+    BLOCK_AT_MOST,
+    Block,
+    Channel,
+    Recording,
+    RecordingDamagedError,
+    as_it_is,
+    from_lz4,
+)
 from robochoc.ros.recordings.types import Version, types_of
-from robochoc.ros.sink import Fields, SinkFailed
-from robochoc.ros.source import SourceFailed
+from robochoc.ros.sink import Fields, SinkError
+from robochoc.ros.source import SourceError
 
 NAMES = "robochoc:names"
 """The metadata record that says what topics are called in the team's files."""
@@ -83,7 +91,7 @@ class McapSink(Recorder):
 
     def _channel(self, topic: str, kind: str) -> int:
         if len(self._channels) == _CHANNELS_AT_MOST:
-            raise SinkFailed(f"{self.place}: an MCAP file has at most {_CHANNELS_AT_MOST} topics")
+            raise SinkError(f"{self.place}: an MCAP file has at most {_CHANNELS_AT_MOST} topics")
         short = short_kind(kind)
         if short not in self._schemas:
             text = types_of(2).definition(short).text
@@ -122,7 +130,7 @@ class McapSource(Recording):
         self._faults: dict[tuple[str, str, bytes], str] = {}
         source = self._input
         if source.size < len(MCAP0_MAGIC) or source.take(len(MCAP0_MAGIC), "its beginning") != MCAP0_MAGIC:
-            raise Damaged("is no MCAP file")
+            raise RecordingDamagedError("is no MCAP file")
         opcode = 0
         while opcode != Opcode.DATA_END:
             begin, before = source.at, source.sum
@@ -136,7 +144,7 @@ class McapSource(Recording):
                 case Opcode.DATA_END:
                     (expected,) = _read("<I", source.take(size, "a record"))
                     if expected not in {0, before}:
-                        raise Damaged("it is damaged: its checksum is another one")
+                        raise RecordingDamagedError("it is damaged: its checksum is another one")
                 case _:
                     source.skip(size, "a record")
         self._check_end()
@@ -146,7 +154,7 @@ class McapSource(Recording):
         size = _RECORD.size + _FOOTER_SIZE + len(MCAP0_MAGIC)
         tail = self._input.part(max(0, self._input.size - size), size)
         if not tail.startswith(_RECORD.pack(Opcode.FOOTER, _FOOTER_SIZE)) or not tail.endswith(MCAP0_MAGIC):
-            raise Damaged("it has no footer: it was not written to its end")
+            raise RecordingDamagedError("it has no footer: it was not written to its end")
 
     def _chunk(self, begin: int, content: bytes) -> Iterator[Block]:
         _, _, size, expected, length = _read(_CHUNK.format, content)
@@ -154,10 +162,10 @@ class McapSource(Recording):
         packing = content[_CHUNK.size : _CHUNK.size + length].decode("ascii", "replace")
         (packed,) = _read(_SIZE.format, content[_CHUNK.size + length :])
         if place + packed != len(content):
-            raise Damaged(f"the chunk at byte {begin} has another size than it says")
+            raise RecordingDamagedError(f"the chunk at byte {begin} has another size than it says")
         body = self._body(content[place:], packing, size)
         if expected and zlib.crc32(body) != expected:
-            raise Damaged(f"the chunk at byte {begin} is damaged: its checksum is another one")
+            raise RecordingDamagedError(f"the chunk at byte {begin} is damaged: its checksum is another one")
         yield from self._block(body, begin + _RECORD.size + place, packed, packing)
 
     def _block(self, body: bytes, at: int, size: int, packing: str) -> Iterator[Block]:
@@ -171,16 +179,18 @@ class McapSource(Recording):
             opcode, size = _read(_RECORD.format, body[at : at + _RECORD.size])
             at += _RECORD.size
             if size > len(body) - at:
-                raise Damaged("a record does not end where its chunk does")
+                raise RecordingDamagedError("a record does not end where its chunk does")
             if opcode == Opcode.MESSAGE:
                 number, _, time, _ = _read(_MESSAGE.format, body[at : at + min(size, _MESSAGE.size)])
                 channel = self._channels.get(number)
                 if channel is not None:
                     if channel.fault:
-                        raise Damaged(f"what stands on {channel.topic} cannot be read: {channel.fault}")
+                        raise RecordingDamagedError(f"what stands on {channel.topic} cannot be read: {channel.fault}")
                     yield channel, time, body[at + _MESSAGE.size : at + size]
                 elif number not in self._channels:
-                    raise Damaged(f"a message belongs to channel {number}, which is not described before it")
+                    raise RecordingDamagedError(
+                        f"a message belongs to channel {number}, which is not described before it"
+                    )
             elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
                 self._describe(opcode, body[at : at + size])
             at += size
@@ -197,7 +207,7 @@ class McapSource(Recording):
                 _keep(self._channels, channel.id, self._heard(channel))
         except (McapError, struct.error, ValueError) as error:
             what = "schema" if opcode == Opcode.SCHEMA else "channel"
-            raise Damaged(f"a {what} cannot be read: {type(error).__name__} {error}") from error
+            raise RecordingDamagedError(f"a {what} cannot be read: {type(error).__name__} {error}") from error
 
     def _known(self, schema: Schema) -> _Known | None:
         kind = short_kind(schema.name)
@@ -206,7 +216,7 @@ class McapSource(Recording):
         defined = kind, schema.encoding, schema.data
         if defined not in self._faults:
             if len(self._faults) == _DEFINITIONS_AT_MOST:
-                raise Damaged(f"it defines what is listened to in more than {_DEFINITIONS_AT_MOST} ways")
+                raise RecordingDamagedError(f"it defines what is listened to in more than {_DEFINITIONS_AT_MOST} ways")
             self._faults[defined] = _fault(*defined)
         return _Known(kind, schema.encoding, self._faults[defined])
 
@@ -222,15 +232,15 @@ class McapSource(Recording):
 
 
 def _inside(place: str) -> str:
-    """The recording in the folder `place`, or `place`. Raises `SourceFailed`."""
+    """The recording in the folder `place`, or `place`. Raises `SourceError`."""
     if not place or not Path(place).is_dir():
         return place
     files = sorted(Path(place).glob("*.mcap"))
     if not files:
         hint = "`ros2 bag convert` makes one of what ROS 2 has recorded otherwise"
-        raise SourceFailed(on_one_line(f"{place}: is a folder without an MCAP file: {hint}"))
+        raise SourceError(on_one_line(f"{place}: is a folder without an MCAP file: {hint}"))
     if len(files) > 1:
-        raise SourceFailed(on_one_line(f"{place}: holds several recordings: name one, such as mcap:{files[0]}"))
+        raise SourceError(on_one_line(f"{place}: holds several recordings: name one, such as mcap:{files[0]}"))
     return str(files[0])
 
 
@@ -246,7 +256,7 @@ def _fault(kind: str, encoding: str, text: bytes) -> str:
 
 def _keep(table: dict[int, T], number: int, described: T) -> None:
     if table.setdefault(number, described) != described:
-        raise Damaged(f"a schema or channel {number} is described twice, and not the same way")
+        raise RecordingDamagedError(f"a schema or channel {number} is described twice, and not the same way")
 
 
 def _read(layout: str, content: bytes) -> tuple[int, ...]:
@@ -254,4 +264,4 @@ def _read(layout: str, content: bytes) -> tuple[int, ...]:
     try:
         return struct.unpack_from(layout, content)
     except struct.error:
-        raise Damaged("a record is shorter than its kind allows") from None
+        raise RecordingDamagedError("a record is shorter than its kind allows") from None

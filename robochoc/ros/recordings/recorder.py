@@ -10,8 +10,8 @@ from types import MappingProxyType
 from typing import ClassVar
 
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.recordings.types import BadFields, UnknownType, Version, types_of
-from robochoc.ros.sink import Fields, Sink, SinkFailed
+from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, Version, types_of
+from robochoc.ros.sink import Fields, Sink, SinkError
 from robochoc.system.files import Unfinished
 
 _END_OF_TIME = (1 << 32) * 10**9
@@ -30,7 +30,7 @@ class Recorder(Sink):
     def __init__(self, place: str) -> None:
         super().__init__(place)
         if not place:
-            raise SinkFailed(f"a recording needs the name of its file, as in {self.ending}")
+            raise SinkError(f"a recording needs the name of its file, as in {self.ending}")
         self.original: Mapping[str, str] = MappingProxyType({})
         self._open = False
         with self.told():
@@ -39,7 +39,7 @@ class Recorder(Sink):
 
     @abstractmethod
     def write(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
-        """Append a message. Raises `BadFields`, `UnknownType` and `OSError`."""
+        """Append a message. Raises `FieldsError`, `UnknownTypeError` and `OSError`."""
 
     @abstractmethod
     def finish(self) -> None:
@@ -58,7 +58,7 @@ class Recorder(Sink):
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
         """Append a message, received when it is published."""
         if not 0 <= at_ns < _END_OF_TIME:
-            raise SinkFailed(on_one_line(f"{self.place}: {topic}: a recording has no time {at_ns}"))
+            raise SinkError(on_one_line(f"{self.place}: {topic}: a recording has no time {at_ns}"))
         with self.told(topic):
             self.write(topic, kind, fields, at_ns)
 
@@ -84,10 +84,10 @@ class Recorder(Sink):
         where = f"{self.place}: {topic}" if topic else self.place
         try:
             yield
-        except (BadFields, UnknownType) as error:
-            raise SinkFailed(on_one_line(f"{where}: {error}")) from error
+        except (FieldsError, UnknownTypeError) as error:
+            raise SinkError(on_one_line(f"{where}: {error}")) from error
         except OSError as error:
             why = error.strerror or str(error)
             missing = isinstance(error, FileNotFoundError) and not Path(self.place).absolute().parent.exists()
             hint = ": its folder does not exist, make it first" if missing else ""
-            raise SinkFailed(on_one_line(f"{self.place}: {why}{hint}")) from error
+            raise SinkError(on_one_line(f"{self.place}: {why}{hint}")) from error

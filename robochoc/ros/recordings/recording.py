@@ -20,8 +20,8 @@ import lz4.frame  # type: ignore[import-untyped]
 
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.mappings import short_kind
-from robochoc.ros.recordings.types import BadFields, UnknownType, Version, types_of
-from robochoc.ros.source import Heard, Source, SourceFailed
+from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, Version, types_of
+from robochoc.ros.source import Heard, Source, SourceError
 
 BLOCK_AT_MOST = 1 << 26
 """Bytes of a record, and of what a chunk unpacks to. Recorders make chunks of some megabytes."""
@@ -39,7 +39,7 @@ Unpack = Callable[[bytes, int], bytes]
 """Unpacks all that is given, or so many bytes if there are more. May raise anything."""
 
 
-class Damaged(Exception):  # noqa: N818 - named for what was found
+class RecordingDamagedError(Exception):
     """The recording is not what it should be: what is wrong."""
 
 
@@ -72,11 +72,11 @@ class Entry(NamedTuple):
 
 
 class Input:
-    """A file that is read from its beginning to its end. Raises `Damaged` and `OSError`."""
+    """A file that is read from its beginning to its end. Raises `RecordingDamagedError` and `OSError`."""
 
     def __init__(self, path: Path) -> None:
         if not stat.S_ISREG(path.stat().st_mode):
-            raise Damaged("is a folder" if path.is_dir() else "is no file")
+            raise RecordingDamagedError("is a folder" if path.is_dir() else "is no file")
         self._stream: BinaryIO = path.open("rb")
         self.size = os.fstat(self._stream.fileno()).st_size
         self.at = 0
@@ -91,7 +91,9 @@ class Input:
         """The next `size` bytes."""
         self._check(size, what)
         if size > BLOCK_AT_MOST:
-            raise Damaged(f"{what} of {size} bytes before byte {self.at}: more than {BLOCK_AT_MOST} are not read")
+            raise RecordingDamagedError(
+                f"{what} of {size} bytes before byte {self.at}: more than {BLOCK_AT_MOST} are not read"
+            )
         content = self._stream.read(size)
         self.at += len(content)
         self.sum = zlib.crc32(content, self.sum)
@@ -116,7 +118,9 @@ class Input:
 
     def _check(self, size: int, what: str) -> None:
         if size > self.size - self.at:
-            raise Damaged(f"it ends in the middle of {what}, at byte {self.size}: it was not written to its end")
+            raise RecordingDamagedError(
+                f"it ends in the middle of {what}, at byte {self.size}: it was not written to its end"
+            )
 
 
 _MOST_OTHERS = 1_000
@@ -134,7 +138,7 @@ class Recording(Source):
     def __init__(self, place: str) -> None:
         super().__init__(place)
         if not place:
-            raise SourceFailed("a recording needs the name of its file, as in mcap:run.mcap or rosbag:run.bag")
+            raise SourceError("a recording needs the name of its file, as in mcap:run.mcap or rosbag:run.bag")
         with self._told():
             self._input = Input(Path(place))
         self._kinds: Mapping[str, str] = {}
@@ -160,8 +164,8 @@ class Recording(Source):
             kind = self._kinds[channel.topic]
             try:
                 fields = types_of(channel.version).decode(kind, entry.content)
-            except BadFields as error:
-                raise Damaged(f"a message on {channel.topic} cannot be read: {error}") from error
+            except FieldsError as error:
+                raise RecordingDamagedError(f"a message on {channel.topic} cannot be read: {error}") from error
             return Heard(channel.topic, kind, fields, entry.at_ns)
 
     def close(self) -> None:
@@ -171,11 +175,14 @@ class Recording(Source):
 
     @abstractmethod
     def _blocks(self) -> Iterable[Block]:
-        """Read all of the file, and find what holds messages that are wanted. Raises `Damaged`."""
+        """Read all of the file, and find what holds messages that are wanted. Raises `RecordingDamagedError`."""
 
     @abstractmethod
     def _messages(self, body: bytes) -> Iterator[tuple[Channel, int, bytes]]:
-        """The messages of a block that are wanted: channel, time in nanoseconds, and content. Raises `Damaged`."""
+        """The messages of a block that are wanted: channel, time in nanoseconds, and content.
+
+        Raises `RecordingDamagedError`.
+        """
 
     def _wanted(self, topic: str, kind: str) -> bool:
         """Whether somebody listens to messages of that type on that topic."""
@@ -188,7 +195,9 @@ class Recording(Source):
         """What a chunk holds, which should be `size` bytes."""
         self._unpacked += size
         if self._unpacked > max(UNPACKED_AT_MOST, _RATIO * self._input.size):
-            raise Damaged(f"its {self._input.size} bytes unpack to {self._unpacked} and more, which are not read")
+            raise RecordingDamagedError(
+                f"its {self._input.size} bytes unpack to {self._unpacked} and more, which are not read"
+            )
         return unpacked(packed, packing, size, self.packings)
 
     def _in_order(self, blocks: Iterable[Block]) -> Iterator[Entry]:
@@ -205,7 +214,9 @@ class Recording(Source):
                 heapq.heappush(waiting, Entry(at_ns, block.at, place, channel, content))
                 size += _ENTRY + len(content)
                 if size > WAITING_AT_MOST:
-                    raise Damaged(f"its messages are out of order: at chunk {number}, too many wait for their turn")
+                    raise RecordingDamagedError(
+                        f"its messages are out of order: at chunk {number}, too many wait for their turn"
+                    )
         while waiting:
             yield heapq.heappop(waiting)
 
@@ -214,24 +225,31 @@ class Recording(Source):
         """Whatever is wrong with the file is told with its name."""
         try:
             yield
-        except (Damaged, UnknownType) as error:
-            raise SourceFailed(on_one_line(f"{self.place}: {error}")) from error
+        except (RecordingDamagedError, UnknownTypeError) as error:
+            raise SourceError(on_one_line(f"{self.place}: {error}")) from error
         except OSError as error:
-            raise SourceFailed(on_one_line(f"{self.place}: {error.strerror or error}")) from error
+            raise SourceError(on_one_line(f"{self.place}: {error.strerror or error}")) from error
 
 
 def unpacked(packed: bytes, packing: str, size: int, packings: Mapping[str, Unpack]) -> bytes:
-    """The `size` bytes that `packed` holds; never more are unpacked than these and one. Raises `Damaged`."""
+    """The `size` bytes that `packed` holds; never more are unpacked than these and one.
+
+    Raises `RecordingDamagedError`.
+    """
     if size > BLOCK_AT_MOST:
-        raise Damaged(f"a chunk says that it unpacks to {size} bytes; more than {BLOCK_AT_MOST} are not read")
+        raise RecordingDamagedError(
+            f"a chunk says that it unpacks to {size} bytes; more than {BLOCK_AT_MOST} are not read"
+        )
     if packing not in packings:
-        raise Damaged(f"a chunk is packed by {packing[:40]!r}; known are {', '.join(filter(None, packings))}")
+        raise RecordingDamagedError(
+            f"a chunk is packed by {packing[:40]!r}; known are {', '.join(filter(None, packings))}"
+        )
     try:
         body = packings[packing](packed, size + 1)
     except Exception as error:  # whatever the library raises: RuntimeError, OSError, its own
-        raise Damaged(f"a chunk cannot be unpacked ({packing}): {error}") from error
+        raise RecordingDamagedError(f"a chunk cannot be unpacked ({packing}): {error}") from error
     if len(body) != size:
-        raise Damaged(f"a chunk does not unpack to the {size} bytes that it says")
+        raise RecordingDamagedError(f"a chunk does not unpack to the {size} bytes that it says")
     return body
 
 

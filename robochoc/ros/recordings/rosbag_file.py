@@ -19,7 +19,7 @@ from rosbags.rosbag1 import Writer
 
 from robochoc.ros.mappings import short_kind
 from robochoc.ros.recordings.recorder import Recorder
-from robochoc.ros.recordings.recording import Block, Channel, Damaged, Recording, as_it_is, from_lz4
+from robochoc.ros.recordings.recording import Block, Channel, Recording, RecordingDamagedError, as_it_is, from_lz4
 from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sink import Fields
 
@@ -101,7 +101,7 @@ class _Record(NamedTuple):
         content = self.header.get(name, b"")
         layout = _LAYOUTS[name]
         if len(content) != struct.calcsize(layout):
-            raise Damaged(f"a record has no right {name.decode()!r} in its header")
+            raise RecordingDamagedError(f"a record has no right {name.decode()!r} in its header")
         first, *more = struct.unpack(layout, content)
         return int(first) * 10**9 + int(more[0]) if more else int(first)
 
@@ -125,7 +125,7 @@ class RosbagSource(Recording):
         magic = source.take(min(source.size, len(_MAGIC)), "its beginning")
         if magic != _MAGIC:
             known = magic.startswith(b"#ROSBAG V")
-            raise Damaged("is a bag of another version than 2.0" if known else "is no bag of ROS 1")
+            raise RecordingDamagedError("is a bag of another version than 2.0" if known else "is no bag of ROS 1")
         expected = self._first()
         found = {_CHUNK: 0, _CHUNK_INFO: 0, _CONNECTION: 0}
         while source.at < source.size:
@@ -137,18 +137,20 @@ class RosbagSource(Recording):
             else:
                 source.skip(size, "a record")
         if any(found[kind] != number for kind, number in expected.items()):
-            raise Damaged("it has less in its index than it says: it was not written to its end")
+            raise RecordingDamagedError("it has less in its index than it says: it was not written to its end")
 
     def _first(self) -> dict[int, int]:
         """How many records of some kinds the bag says that it has."""
         record, size = self._header()
         if record.kind != _BAG:
-            raise Damaged("it does not begin with a bag's header")
+            raise RecordingDamagedError("it does not begin with a bag's header")
         self._input.skip(size, "its beginning")
         if not record.number(b"index_pos"):
-            raise Damaged("it has no index, so its recording was not finished: `rosbag reindex` mends that")
+            raise RecordingDamagedError(
+                "it has no index, so its recording was not finished: `rosbag reindex` mends that"
+            )
         if record.text(b"encryptor"):
-            raise Damaged("it is encrypted")
+            raise RecordingDamagedError("it is encrypted")
         chunks = record.number(b"chunk_count")
         return {_CHUNK: chunks, _CHUNK_INFO: chunks, _CONNECTION: record.number(b"conn_count")}
 
@@ -157,7 +159,7 @@ class RosbagSource(Recording):
         source = self._input
         size = self._size()
         if size > _HEADER_AT_MOST:
-            raise Damaged(f"a record before byte {source.at} has a header of {size} bytes")
+            raise RecordingDamagedError(f"a record before byte {source.at} has a header of {size} bytes")
         header = _fields(source.take(size, "a record"))
         return _Record(header, 0, 0), self._size()
 
@@ -178,15 +180,17 @@ class RosbagSource(Recording):
             if kind == _CONNECTION:
                 number, described = record.number(b"conn"), self._heard(record, body)
                 if self._channels.setdefault(number, described) != described:
-                    raise Damaged(f"connection {number} is described twice, and not the same way")
+                    raise RecordingDamagedError(f"connection {number} is described twice, and not the same way")
             elif kind == _MESSAGE:
                 number = record.number(b"conn")
                 if number not in self._channels:
-                    raise Damaged(f"a message belongs to connection {number}, which is not described before it")
+                    raise RecordingDamagedError(
+                        f"a message belongs to connection {number}, which is not described before it"
+                    )
                 channel = self._channels[number]
                 if channel is not None:
                     if channel.fault:
-                        raise Damaged(f"what stands on {channel.topic} cannot be read: {channel.fault}")
+                        raise RecordingDamagedError(f"what stands on {channel.topic} cannot be read: {channel.fault}")
                     yield channel, record.number(b"time"), body[record.begin : record.end]
 
     def _heard(self, record: _Record, body: bytes) -> Channel | None:
@@ -217,7 +221,7 @@ def _span(body: bytes, at: int) -> tuple[int, int]:
     begin = at + _SIZE.size
     end = begin + int.from_bytes(body[at:begin], "little")
     if end > len(body) or begin > len(body):
-        raise Damaged("a record does not end where its chunk does")
+        raise RecordingDamagedError("a record does not end where its chunk does")
     return begin, end
 
 
@@ -228,6 +232,6 @@ def _fields(content: bytes) -> dict[bytes, bytes]:
         begin, at = _span(content, at)
         name, equals, value = content[begin:at].partition(b"=")
         if not equals:
-            raise Damaged("a record's header has a field without a value")
+            raise RecordingDamagedError("a record's header has a field without a value")
         found[name] = value
     return found

@@ -43,11 +43,11 @@ _DAMAGE = (SerdeError, struct.error, ValueError, IndexError, OverflowError)
 Make = Callable[[Any], Any]
 
 
-class UnknownType(LookupError):  # noqa: N818 - named for what was asked for
+class UnknownTypeError(LookupError):
     """Nobody has a definition of that ROS type, or the one that a package brings cannot be used."""
 
 
-class BadFields(ValueError):  # noqa: N818 - named for what was found
+class FieldsError(ValueError):
     """Fields that are not those of the type, or bytes that are no message of it: which, and why."""
 
 
@@ -66,7 +66,7 @@ class _Kind(NamedTuple):
     empty: Any
 
 
-class _Wrong(Exception):  # noqa: N818 - on its way to `BadFields`
+class _DefinitionError(Exception):
     """What is wrong with the value of a field; `path` is to the field, the last name first."""
 
     def __init__(self, why: str, *path: str) -> None:
@@ -85,7 +85,7 @@ class Types:
         self._definitions: dict[str, Definition] = {}
 
     def definition(self, kind: str) -> Definition:
-        """The definition of `kind` as recordings hold it. Raises `UnknownType`."""
+        """The definition of `kind` as recordings hold it. Raises `UnknownTypeError`."""
         name = self._name(kind)
         if name not in self._definitions:
             text, md5 = self._store.generate_msgdef(name, ros_version=self.version)
@@ -93,29 +93,32 @@ class Types:
         return self._definitions[name]
 
     def is_the_same(self, kind: str, text: str) -> bool:
-        """Whether `text`, which may be anything, defines the fields that `kind` has. Raises `UnknownType`."""
+        """Whether `text`, which may be anything, defines the fields that `kind` has. Raises `UnknownTypeError`."""
         return same_fields(short_kind(kind), text, self.definition(kind).text)
 
     def encode(self, kind: str, fields: Fields) -> bytes:
-        """A message's bytes: CDR in ROS 2, and as ROS 1 has it in ROS 1. Raises `UnknownType` and `BadFields`."""
+        """A message's bytes: CDR in ROS 2, and as ROS 1 has it in ROS 1.
+
+        Raises `UnknownTypeError` and `FieldsError`.
+        """
         name = self._name(kind)
         try:
             message = self._made(kind, name).make(fields)
-        except _Wrong as wrong:
+        except _DefinitionError as wrong:
             where = ".".join(reversed(wrong.path)) or "it"
-            raise BadFields(f"{short_kind(kind)}: {where} {wrong}") from None
+            raise FieldsError(f"{short_kind(kind)}: {where} {wrong}") from None
         store = self._store
         return bytes(store.serialize_ros1(message, name) if self.version == 1 else store.serialize_cdr(message, name))
 
     def decode(self, kind: str, content: bytes) -> dict[str, Any]:
-        """The fields of a message, whose bytes may be anything. Raises `UnknownType` and `BadFields`."""
+        """The fields of a message, whose bytes may be anything. Raises `UnknownTypeError` and `FieldsError`."""
         name = self._name(kind)
         made = self._made(kind, name)
         read = self._store.deserialize_ros1 if self.version == 1 else self._store.deserialize_cdr
         try:
             return cast("dict[str, Any]", made.fields(read(content, name)))
         except _DAMAGE as error:
-            raise BadFields(f"{len(content)} bytes are no {short_kind(kind)}: {error}") from error
+            raise FieldsError(f"{len(content)} bytes are no {short_kind(kind)}: {error}") from error
 
     def _name(self, kind: str) -> str:
         """As the library calls it: `geometry_msgs/msg/PoseStamped`. What a package brings is learned first."""
@@ -125,12 +128,12 @@ class Types:
             text = definition_of(kind)
             if not text:
                 told = f"ROS {self.version} has no type {kind!r} that is known here"
-                raise UnknownType(f"{told}; its mapping can bring the definition (docs/ros.md)")
+                raise UnknownTypeError(f"{told}; its mapping can bring the definition (docs/ros.md)")
             try:
                 new = get_types_from_msg(text, name)
                 self._store.register({each: what for each, what in new.items() if each not in self._store.fielddefs})
             except TypesysError as error:
-                raise UnknownType(f"the definition of {kind!r} that a package brings is wrong: {error}") from error
+                raise UnknownTypeError(f"the definition of {kind!r} that a package brings is wrong: {error}") from error
         return name
 
     def _made(self, kind: str, name: str) -> _Kind:
@@ -138,7 +141,9 @@ class Types:
             try:
                 self._known[kind] = self._kind(name)
             except (KeyError, RecursionError) as error:
-                raise UnknownType(f"the definition of {kind!r} needs types that nobody defines: {error}") from error
+                raise UnknownTypeError(
+                    f"the definition of {kind!r} needs types that nobody defines: {error}"
+                ) from error
         return self._known[kind]
 
     def _kind(self, name: str) -> _Kind:
@@ -154,7 +159,7 @@ class Types:
         def make(value: object) -> object:
             whole = _whole(value)
             if not low <= whole // _SECOND < 1 << 31:
-                raise _Wrong(f"must be a time in nanoseconds that ROS {self.version} has, is {value!r}")
+                raise _DefinitionError(f"must be a time in nanoseconds that ROS {self.version} has, is {value!r}")
             return made(whole // _SECOND, whole % _SECOND)
 
         def given(time: Any) -> int:  # noqa: ANN401 - rosbags' own type, which reads seconds as ROS 2 has them
@@ -175,15 +180,17 @@ class Types:
 
         def make(value: object) -> object:
             if not isinstance(value, Mapping):
-                raise _Wrong(f"must be fields by their names, is {value!r}")
+                raise _DefinitionError(f"must be fields by their names, is {value!r}")
             if not value.keys() <= names:
                 unknown = next(iter(value.keys() - names))
-                raise _Wrong(f"is no field of {short_kind(name)}, which has {', '.join(sorted(names))}", str(unknown))
+                raise _DefinitionError(
+                    f"is no field of {short_kind(name)}, which has {', '.join(sorted(names))}", str(unknown)
+                )
             values = []
             for field, part in parts:
                 try:
                     values.append(part.make(value[field]) if field in value else part.empty)
-                except _Wrong as wrong:
+                except _DefinitionError as wrong:
                     wrong.path.append(field)
                     raise
             return made(*values)
@@ -205,10 +212,12 @@ class Types:
 
         def make(values: object) -> object:
             if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
-                raise _Wrong(f"must be a list, is {values!r}")
+                raise _DefinitionError(f"must be a list, is {values!r}")
             found = [*values]
             if len(found) != fixed if fixed is not None else number and len(found) > number:
-                raise _Wrong(f"must have {'' if fixed is not None else 'at most '}{number} values, has {len(found)}")
+                raise _DefinitionError(
+                    f"must have {'' if fixed is not None else 'at most '}{number} values, has {len(found)}"
+                )
             return listed([item.make(value) for value in found])
 
         def listed(values: list[Any]) -> object:
@@ -245,7 +254,7 @@ def _scalar(kind: str, limit: int) -> _Kind:
     def make(value: object) -> int:
         whole = _whole(value)
         if not low <= whole <= high:
-            raise _Wrong(f"must be a whole number from {low} to {high}, is {value!r}")
+            raise _DefinitionError(f"must be a whole number from {low} to {high}, is {value!r}")
         return whole
 
     return _Kind(make, as_it_is, 0)
@@ -254,17 +263,17 @@ def _scalar(kind: str, limit: int) -> _Kind:
 def _text(value: object, limit: int) -> str:
     if not isinstance(value, str) or "\0" in value or (limit and len(value) > limit):
         most = f" of at most {limit} characters" if limit else ""
-        raise _Wrong(f"must be text{most} without a NUL, is {value!r}")
+        raise _DefinitionError(f"must be text{most} without a NUL, is {value!r}")
     try:
         value.encode()
     except UnicodeEncodeError:
-        raise _Wrong(f"must be text that UTF-8 can hold, is {value!r}") from None
+        raise _DefinitionError(f"must be text that UTF-8 can hold, is {value!r}") from None
     return value
 
 
 def _truth(value: object) -> bool:
     if not isinstance(value, bool | np.bool_):
-        raise _Wrong(f"must be true or false, is {value!r}")
+        raise _DefinitionError(f"must be true or false, is {value!r}")
     return bool(value)
 
 
@@ -274,13 +283,13 @@ def _number(value: object) -> float:
     if not isinstance(value, bool) and isinstance(value, Real):
         with suppress(OverflowError):
             return float(value)
-    raise _Wrong(f"must be a number, is {value!r}")
+    raise _DefinitionError(f"must be a number, is {value!r}")
 
 
 def _single(value: object) -> float:
     number = _number(value)
     if _LARGEST_SINGLE <= abs(number) < math.inf:
-        raise _Wrong(f"must be a number of single precision, is {value!r}")
+        raise _DefinitionError(f"must be a number of single precision, is {value!r}")
     return number
 
 
@@ -288,4 +297,4 @@ def _whole(value: object) -> int:
     if not isinstance(value, bool):
         with suppress(TypeError):
             return operator.index(value)  # type: ignore[arg-type]  # that is the question
-    raise _Wrong(f"must be a whole number, is {value!r}")
+    raise _DefinitionError(f"must be a whole number, is {value!r}")

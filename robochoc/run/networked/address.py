@@ -14,26 +14,26 @@ _BRACKETED = re.compile(r"\[([^]]*)](?::(.+))?")
 _HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]*[A-Za-z0-9])?")
 
 
-class BadPlace(ValueError):  # noqa: N818 - named for what was given
+class AddressError(ValueError):
     """That is no address of a master."""
 
 
-class Place(NamedTuple):
+class Address(NamedTuple):
     """A host name or address, and a port. The master's enrolment service listens one port higher."""
 
     host: str
     port: int = DEFAULT_PORT
 
     @classmethod
-    def parse(cls, text: str) -> Place:
-        """The place that `HOST`, `HOST:PORT` or `[IPv6]:PORT` names. Raises `BadPlace`."""
+    def parse(cls, text: str) -> Address:
+        """The place that `HOST`, `HOST:PORT` or `[IPv6]:PORT` names. Raises `AddressError`."""
         host, port = text, ""
         if found := _BRACKETED.fullmatch(text):
             host, port = found[1], found[2] or ""
         elif text.count(":") <= 1:
             host, _, port = text.partition(":")
         if not _is_host(host) or (port and not (port.isdecimal() and 0 < int(port) <= _LARGEST_PORT)):
-            raise BadPlace(f"{text!r} is no HOST:PORT, such as 192.168.1.14:{DEFAULT_PORT}")
+            raise AddressError(f"{text!r} is no HOST:PORT, such as 192.168.1.14:{DEFAULT_PORT}")
         return cls(host, int(port) if port else DEFAULT_PORT)
 
     @property

@@ -9,10 +9,10 @@ from queue import Empty
 
 from robochoc.authority.identity import Identity
 from robochoc.communication.network.control_messages import Ask, Told
-from robochoc.communication.network.framing import MASTER, Letters, Refused
+from robochoc.communication.network.framing import MASTER, FrameRefusedError, Letters
 from robochoc.communication.network.inbox import Arrived
-from robochoc.communication.network.transport import CannotConnect, Post
-from robochoc.run.networked.address import Place
+from robochoc.communication.network.transport import CannotConnectError, Post
+from robochoc.run.networked.address import Address
 from robochoc.services.communicative_acts import Performative
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
 from robochoc.services.sl import Function, descriptions_in, df_on, request, searched_in
@@ -24,16 +24,16 @@ _NUMBER_BITS = 32
 SLOTS = ("name", "protocol", "variable", "topic", "ontology", "language")
 
 
-class NoAnswer(Exception):  # noqa: N818 - named for what happened
+class NoAnswerError(Exception):
     """The directory refuses, or says nothing."""
 
 
-class BadTemplate(ValueError):  # noqa: N818 - named for what was given
+class TemplateError(ValueError):
     """That is nothing to search for."""
 
 
 def template_of(slots: Sequence[str]) -> AgentDescription:
-    """The template that `slot=value` words describe: all of them have to match. Raises `BadTemplate`.
+    """The template that `slot=value` words describe: all of them have to match. Raises `TemplateError`.
 
     Names may go without their platform, which may call itself otherwise than whoever asks does.
     """
@@ -41,10 +41,10 @@ def template_of(slots: Sequence[str]) -> AgentDescription:
     for word in slots:
         slot, equals, value = word.partition("=")
         if not equals or slot not in given or not value:
-            raise BadTemplate(f"{word!r} is no SLOT=VALUE; slots are {', '.join(SLOTS)}")
+            raise TemplateError(f"{word!r} is no SLOT=VALUE; slots are {', '.join(SLOTS)}")
         given[slot].append(value)
     if len(given["name"]) > 1:
-        raise BadTemplate("an agent has one name")
+        raise TemplateError("an agent has one name")
     services = [ServiceDescription(name=one, type=kind) for kind in ("variable", "topic") for one in given[kind]]
     name = given["name"][0] if given["name"] else ""
     return AgentDescription(
@@ -56,27 +56,27 @@ def template_of(slots: Sequence[str]) -> AgentDescription:
     )
 
 
-def platform_at(place: Place) -> str:
+def platform_at(place: Address) -> str:
     """The name of the platform whose master is at `place`, as agents' names end."""
     return f"{place}/robochoc"
 
 
-def search_words(place: Place, slots: Sequence[str], at_most: int | None = None) -> str:
-    """The search as the directory is asked: an action in SL0. Raises `BadTemplate`."""
+def search_words(place: Address, slots: Sequence[str], at_most: int | None = None) -> str:
+    """The search as the directory is asked: an action in SL0. Raises `TemplateError`."""
     platform = platform_at(place)
     return request(df_on(platform), Function.SEARCH, template_of(slots), at_most)
 
 
-def consult(place: Place, identity: Identity, words: str, patience_s: float = 10.0) -> str:
-    """What the directory answers to `words`, in SL0. Raises `CannotConnect` and `NoAnswer`."""
+def consult(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> str:
+    """What the directory answers to `words`, in SL0. Raises `CannotConnectError` and `NoAnswerError`."""
     with Post(str(place), identity, watch=(), patience_s=patience_s) as post:
         return _Asking(place, identity, post).asked(words, Performative.INFORM)
 
 
-def watch(place: Place, identity: Identity, words: str, patience_s: float = 10.0) -> Iterator[str]:
+def watch(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> Iterator[str]:
     """What the directory tells whoever subscribes to what `words` search for, now and whenever it changes, in SL0.
 
-    It ends with `NoAnswer` when the master is gone for `patience_s`. Raises `CannotConnect` as well.
+    It ends with `NoAnswerError` when the master is gone for `patience_s`. Raises `CannotConnectError` as well.
     """
     with Post(str(place), identity, watch=(), patience_s=patience_s) as post:
         asking = _Asking(place, identity, post)
@@ -88,13 +88,13 @@ def watch(place: Place, identity: Identity, words: str, patience_s: float = 10.0
                 yield told.content
             if told or post.router:
                 heard = time.monotonic()
-    raise NoAnswer(f"the master at {place} is gone")
+    raise NoAnswerError(f"the master at {place} is gone")
 
 
 class _Asking:
     """One who asks; answers to others' questions, and to earlier ones, are none."""
 
-    def __init__(self, place: Place, identity: Identity, post: Post) -> None:
+    def __init__(self, place: Address, identity: Identity, post: Post) -> None:
         self._place = place
         self._name = identity.name
         self._post = post
@@ -103,7 +103,7 @@ class _Asking:
         self._early: list[Told] = []
 
     def asked(self, words: str, wanted: Performative, *, subscribe: bool = False) -> str:
-        """Ask until there is an answer; its content. Raises `NoAnswer`."""
+        """Ask until there is an answer; its content. Raises `NoAnswerError`."""
         until, asked = time.monotonic() + ANSWER_S, 0.0
         while time.monotonic() < until:
             if time.monotonic() - asked > ASK_AGAIN_S:
@@ -115,11 +115,13 @@ class _Asking:
             if told.performative == wanted:
                 return told.content
             if told.performative != Performative.INFORM:
-                raise NoAnswer(
+                raise NoAnswerError(
                     on_one_line(f"the directory answers {told.performative}: {told.content}", LONGEST_REASON)
                 )
             self._early.append(told)
-        raise NoAnswer(f"the master at {self._place} does not answer {self._name}; is it enrolled with its Authority?")
+        raise NoAnswerError(
+            f"the master at {self._place} does not answer {self._name}; is it enrolled with its Authority?"
+        )
 
     def told(self) -> Told | None:
         """The next INFORM; None: for a moment there was none."""
@@ -150,9 +152,9 @@ def about(answer: str) -> str:
 def _told(letters: Letters, item: Arrived) -> Told | None:
     try:
         word = letters.read(item.sender, item.content).word
-    except Refused:
+    except FrameRefusedError:
         return None
     return word if isinstance(word, Told) else None
 
 
-__all__ = ["BadTemplate", "CannotConnect", "NoAnswer", "about", "consult", "found", "search_words", "watch"]
+__all__ = ["CannotConnectError", "NoAnswerError", "TemplateError", "about", "consult", "found", "search_words", "watch"]

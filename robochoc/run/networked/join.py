@@ -7,14 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from robochoc.authority.authority import check_name
-from robochoc.authority.enrolment import EnrolmentFailed, NobodyThere, enrol, renew
-from robochoc.authority.identity import BadIdentity, Identity, default_folder
+from robochoc.authority.enrolment import EnrolmentError, NobodyThereError, enrol, renew
+from robochoc.authority.identity import Identity, IdentityError, default_folder
 from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.transport import Post
 from robochoc.formats import check_robot
 from robochoc.model.problem import Robot
-from robochoc.run.networked.address import Place
+from robochoc.run.networked.address import Address
 from robochoc.run.registry import spoken
 from robochoc.solver.compile import Compiler
 from robochoc.solver.compiled_team import CompiledRobot
@@ -25,12 +25,12 @@ _TRY_AGAIN_S = 0.5
 
 
 def identity_of(
-    name: str, place: Place, folder: Path | None = None, token: str | None = None, patience_s: float = PATIENCE_S
+    name: str, place: Address, folder: Path | None = None, token: str | None = None, patience_s: float = PATIENCE_S
 ) -> Identity:
     """The identity of `name` in `folder`: enrolled now, if there is a `token`; renewed, if half of its life is over.
 
-    With a token it waits for a master that does not listen yet, for at most `patience_s` seconds. Raises `BadName`,
-    `BadIdentity`, `BadToken`, `NotTrusted`, `EnrolmentFailed`, `OSError`.
+    With a token it waits for a master that does not listen yet, for at most `patience_s` seconds. Raises
+    `InvalidNameError`, `IdentityError`, `TokenError`, `NotTrusted`, `EnrolmentError`, `OSError`.
     """
     check_name(name)
     folder = folder or default_folder(name)
@@ -38,30 +38,30 @@ def identity_of(
         return _enrolled(name, place, folder, token, patience_s)
     identity = Identity.load(folder)
     if identity.name != name:
-        raise BadIdentity(f"{folder} is the identity of {identity.name}, not of {name}; say --identity")
+        raise IdentityError(f"{folder} is the identity of {identity.name}, not of {name}; say --identity")
     if not identity.is_due():
         return identity
     try:
         return renew(identity, place.host, place.enrolment_port)
-    except EnrolmentFailed:
+    except EnrolmentError:
         return identity  # it is good for a while yet
 
 
-def _enrolled(name: str, place: Place, folder: Path, token: str, patience_s: float) -> Identity:
+def _enrolled(name: str, place: Address, folder: Path, token: str, patience_s: float) -> Identity:
     until = time.monotonic() + patience_s
     while True:
         try:
             return enrol(place.host, place.enrolment_port, token, folder, name, max(patience_s, _TRY_AGAIN_S))
-        except NobodyThere:
+        except NobodyThereError:
             if time.monotonic() + _TRY_AGAIN_S > until:
                 raise
             time.sleep(_TRY_AGAIN_S)
 
 
-def join(robot: Robot, place: Place, identity: Identity, manner: Manner, compiler: Compiler) -> Ending:
+def join(robot: Robot, place: Address, identity: Identity, manner: Manner, compiler: Compiler) -> Ending:
     """Be `robot` in one run of the master at `place`. `compiler` compiles its domain.
 
-    Raises `InvalidInput` for a robot that is not valid by itself, `CannotConnect`, and what compiling raises.
+    Raises `InvalidInputError` for a robot that is not valid by itself, `CannotConnectError`, and what compiling raises.
     """
     check_robot(robot)
     manner.stage("compiling")

@@ -17,13 +17,13 @@ from msgspec import UNSET
 from robochoc.authority.authority import Authority
 from robochoc.authority.enrolment_server import EnrolmentServer
 from robochoc.authority.identity import Identity
-from robochoc.communication.host import BadSettings, settings_of
+from robochoc.communication.host import SettingsError, settings_of
 from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
-from robochoc.communication.network.router import RouterFailed
+from robochoc.communication.network.router import RouterError
 from robochoc.communication.network.settings import Conditions
-from robochoc.communication.processes.robot_link import RobotsLost
+from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.journal.events import Began, Observer
 from robochoc.model.outcome import ALL_ROBOTS, Outcome, Verdict
@@ -31,14 +31,14 @@ from robochoc.model.problem import Domain, Kind, Team, Variable
 from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import FIRST_FIT, MINIMISES, SATISFIES, suits
 from robochoc.run.incumbent import bound_of, joined, tree_of
-from robochoc.run.networked.address import LOOPBACK, Place
+from robochoc.run.networked.address import LOOPBACK, Address
 from robochoc.run.options import Withdrawal
 from robochoc.run.registry import spoken
 from robochoc.solver.agent_problem import Brief
-from robochoc.solver.encoding import Unsupported
-from robochoc.verification.checker import Refuted
+from robochoc.solver.encoding import UnsupportedError
+from robochoc.verification.checker import RefutedError
 
-HERE = Place(LOOPBACK)
+HERE = Address(LOOPBACK)
 """Anything but loopback must be asked for."""
 _TOLD = 5
 """So many who are awaited are named."""
@@ -55,7 +55,7 @@ class Plan:
     """
 
     authority: Path
-    place: Place = HERE
+    place: Address = HERE
     hosts: tuple[str, ...] = ()
     name: str = "team"
     names: tuple[str, ...] | None = None
@@ -70,7 +70,7 @@ class Plan:
     conditions: Conditions = Conditions()
 
 
-class NotComplete(Exception):  # noqa: N818 - a limit that was reached
+class TeamIncompleteError(Exception):
     """The team was not complete in time."""
 
 
@@ -95,8 +95,8 @@ def lead(
 
     Who has the right to sniff may have what is written to `publication`, while the run lasts and until a moment after
     `concluded` was called with its outcome (None: it broke off), which writes the last of it.
-    Raises `BadAuthority`, `BadHost`, `RouterFailed`, `NotComplete`, `RobotsLost`, `Unsupported`, `UnknownProtocol`,
-    `Refuted`.
+    Raises `AuthorityError`, `HostNameError`, `RouterError`, `TeamIncompleteError`, `RobotsLostError`,
+    `UnsupportedError`, `UnknownProtocolError`, `RefutedError`.
     """
     _check_settings_early(plan)
     authority = Authority.open(plan.authority)
@@ -104,7 +104,7 @@ def lead(
     called = [host for host in hosts if ":" not in host]
     if not called:
         why = "every address and the name of none" if plan.place.anywhere else "an address that zenoh checks no name of"
-        raise Unsupported(f"{plan.place} is {why}; say how robots call it: --host NAME")
+        raise UnsupportedError(f"{plan.place} is {why}; say how robots call it: --host NAME")
     endpoint = str(plan.place._replace(host=called[0]))
     identity = authority.master_identity(hosts)
     conditions = replace(plan.conditions, protocol=plan.protocol or "", listen=str(plan.place))
@@ -121,15 +121,15 @@ def lead(
 
 
 @contextmanager
-def _enrolling(authority: Authority, identity: Identity, place: Place) -> Iterator[None]:
-    """Redeem tokens. Raises `RouterFailed`."""
+def _enrolling(authority: Authority, identity: Identity, place: Address) -> Iterator[None]:
+    """Redeem tokens. Raises `RouterError`."""
     with ExitStack() as stack:
         try:
             stack.enter_context(EnrolmentServer(authority, identity, place.host, place.enrolment_port))
         except OSError as error:
             where = place._replace(port=place.enrolment_port)
             why = error.strerror or error
-            raise RouterFailed(f"cannot listen on {where}, where tokens are redeemed: {why}") from error
+            raise RouterError(f"cannot listen on {where}, where tokens are redeemed: {why}") from error
         yield
 
 
@@ -152,7 +152,7 @@ class _Lead:
         try:
             outcome = self._solved()
         except BaseException as error:
-            failure = isinstance(error, RobotsLost | Unsupported | Refuted | NotComplete)
+            failure = isinstance(error, RobotsLostError | UnsupportedError | RefutedError | TeamIncompleteError)
             self._concluded(None)
             self._master.leave(f"the run was broken off: {error if failure else 'the master has stopped'}", failed=True)
             raise
@@ -165,7 +165,7 @@ class _Lead:
         if not self._master.gather(None if plan.gather_s is None else time.monotonic() + plan.gather_s):
             awaited = sorted(members.awaited)
             names = _listed(awaited) or "more robots"
-            raise NotComplete(f"the team is not complete after {plan.gather_s:g} s; awaited: {names}")
+            raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; awaited: {names}")
         self._deadline = None if plan.timeout is None else time.monotonic() + plan.timeout
         kind = self._team().kind
         protocol = plan.protocol or suits(kind)
@@ -184,7 +184,7 @@ class _Lead:
         return self._answered(self._search(second, traits, self._brief(aside=fewest)), traits, aside=True)
 
     def _search(self, protocol: str, traits: Traits, brief: Brief) -> RunResult:
-        """Search until robots stop getting lost; without `survive` the first loss raises `RobotsLost`."""
+        """Search until robots stop getting lost; without `survive` the first loss raises `RobotsLostError`."""
         plan, master = self._plan, self._master
         while True:
             left = None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
@@ -197,10 +197,10 @@ class _Lead:
             self._lost |= result.lost
             master.members.remove(result.lost)
             if not master.members.robots:
-                raise RobotsLost(self._lost)
+                raise RobotsLostError(self._lost)
 
     def _answered(self, result: RunResult, traits: Traits, *, aside: bool) -> Outcome:
-        """What `result` comes to, once every robot has checked its own constraints. Raises `Refuted`."""
+        """What `result` comes to, once every robot has checked its own constraints. Raises `RefutedError`."""
         outcome = replace(
             self._outcome,
             verdict=result.verdict,
@@ -234,21 +234,21 @@ class _Lead:
         if proven:
             against = "; ".join(self._master.tally.objections) or f"{_listed(out)} has no value"
             who = f"{result.witness} says that" if result.witness else "all fell quiet, so that"
-            raise Refuted(f"{who} {outcome.protocol} has a solution for {outcome.team}, but {against}")
+            raise RefutedError(f"{who} {outcome.protocol} has a solution for {outcome.team}, but {against}")
         reason = outcome.reason or f"{outcome.protocol} has come to its end, and what it came by breaks a constraint"
         return claimed(replace(outcome, verdict=Verdict.UNKNOWN, reason=reason))
 
     def _told(self, reported: Mapping[str, dict[str, int]]) -> dict[str, dict[str, int]]:
-        """Return what was `reported`. Raises `RobotsLost` for who has values, and does not tell them."""
+        """Return what was `reported`. Raises `RobotsLostError` for who has values, and does not tell them."""
         for name, assigned in self._master.tally.assigned.items():
             if assigned and not reported[name]:
-                raise RobotsLost({name: "it has reported that it has values, and none of them"})
+                raise RobotsLostError({name: "it has reported that it has values, and none of them"})
         return dict(reported)
 
     def _refute(self, *doubts: str) -> None:
-        """Raise `Refuted` if there are `doubts`: of two robots one lies, and nobody can tell which."""
+        """Raise `RefutedError` if there are `doubts`: of two robots one lies, and nobody can tell which."""
         if doubts:
-            raise Refuted(f"{self._outcome.team} has no answer that can be believed: {'; '.join(doubts)}")
+            raise RefutedError(f"{self._outcome.team} has no answer that can be believed: {'; '.join(doubts)}")
 
     def _seen(self) -> Team:
         """The team as the outcome shows it: with variables that only their robots knew before."""
@@ -319,15 +319,15 @@ def _check_settings_early(plan: Plan) -> None:
         return
     try:
         _check_settings(SATISFIES, plan.settings)
-    except Unsupported:
+    except UnsupportedError:
         _check_settings(MINIMISES, plan.settings)
 
 
 def _check_settings(protocol: str, settings: Mapping[str, str]) -> None:
     try:
         settings_of(spoken(protocol), settings)
-    except BadSettings as wrong:
-        raise Unsupported(f"--set: {wrong} (protocol {protocol})") from None
+    except SettingsError as wrong:
+        raise UnsupportedError(f"--set: {wrong} (protocol {protocol})") from None
 
 
 def _in_words(outcome: Outcome) -> str:

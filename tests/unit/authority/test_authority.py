@@ -14,11 +14,17 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.authority.authority import IN_FORCE_AT_MOST, Authority, BadName, NotGranted, UnknownName
+from robochoc.authority.authority import (
+    IN_FORCE_AT_MOST,
+    Authority,
+    InvalidNameError,
+    NotGrantedError,
+    UnknownNameError,
+)
 from robochoc.authority.certificates import (
     MASTER,
-    BadCertificate,
-    BadHost,
+    CertificateError,
+    HostNameError,
     check_issued,
     moment,
     new_key,
@@ -28,7 +34,7 @@ from robochoc.authority.certificates import (
     signing_request,
 )
 from robochoc.authority.events import Granted, Refused
-from robochoc.authority.identity import BadIdentity, Identity
+from robochoc.authority.identity import Identity, IdentityError
 from robochoc.authority.registry import Right, Role, State
 from tests.support.authorities import HOUR, START, Clock, Seen, identity_of
 
@@ -93,19 +99,19 @@ def test_a_robot_cannot_issue_certificates(authority: Authority, tmp_path: Path)
         .not_valid_after(moment(START + HOUR))
         .sign(robot.key, hashes.SHA256())
     )
-    with pytest.raises(BadCertificate, match="has not issued"):
+    with pytest.raises(CertificateError, match="has not issued"):
         check_issued(forged, authority.certificate, moment(START))
 
 
 def test_the_ca_itself_is_nobodys_certificate(authority: Authority) -> None:
-    with pytest.raises(BadCertificate, match="would not have issued"):
+    with pytest.raises(CertificateError, match="would not have issued"):
         check_issued(authority.certificate, authority.certificate, moment(START))
 
 
 def test_a_token_works_once(authority: Authority, seen: Seen) -> None:
     token = authority.enrol("A")
     authority.redeem(token.secret, signing_request(new_key(), "A"))
-    with pytest.raises(NotGranted, match="used already"):
+    with pytest.raises(NotGrantedError, match="used already"):
         authority.redeem(token.secret, signing_request(new_key(), "A"), "here:1")
     why = "the token has been used already"
     assert seen.refusals == [Refused(t=START, who="A", what="redeem a token", why=why, origin="here:1")]
@@ -114,7 +120,7 @@ def test_a_token_works_once(authority: Authority, seen: Seen) -> None:
 def test_a_token_expires(authority: Authority, clock: Clock, seen: Seen) -> None:
     token = authority.enrol("A", ttl=timedelta(hours=2))
     clock.now += 2 * HOUR
-    with pytest.raises(NotGranted, match="expired"):
+    with pytest.raises(NotGrantedError, match="expired"):
         authority.redeem(token.secret, signing_request(new_key(), "A"))
     assert state_of(authority, "A") is State.EXPIRED
     assert len(seen.refusals) == 1
@@ -122,7 +128,7 @@ def test_a_token_expires(authority: Authority, clock: Clock, seen: Seen) -> None
 
 def test_a_newer_token_replaces_the_older_one(authority: Authority) -> None:
     older, newer = authority.enrol("A"), authority.enrol("A")
-    with pytest.raises(NotGranted, match="unknown"):
+    with pytest.raises(NotGrantedError, match="unknown"):
         authority.redeem(older.secret, signing_request(new_key(), "A"))
     authority.redeem(newer.secret, signing_request(new_key(), "A"))
 
@@ -131,7 +137,7 @@ def test_a_token_is_for_its_own_name_only_and_is_not_spent_by_the_attempt(author
     token = authority.enrol("A")
     authority.enrol("B")
     for other in ("B", "Stranger", MASTER, "a"):
-        with pytest.raises(NotGranted, match="not for this name"):
+        with pytest.raises(NotGrantedError, match="not for this name"):
             authority.redeem(token.secret, signing_request(new_key(), other))
     assert [refusal.who for refusal in seen.refusals] == ["B", "Stranger", MASTER, "a"]
     authority.redeem(token.secret, signing_request(new_key(), "A"))
@@ -155,7 +161,7 @@ def test_bad_requests_are_refused_and_the_token_lives_on(authority: Authority, s
     nameless = request_with(new_key())
     bad = [b"", b"\0\xff", good[:100], unsigned, weak, other_curve, several, nameless, pem(authority.certificate)]
     for request in bad:
-        with pytest.raises(NotGranted):
+        with pytest.raises(NotGrantedError):
             authority.redeem(token.secret, request)
     assert len(seen.refusals) == len(bad)
     authority.redeem(token.secret, good)
@@ -165,7 +171,7 @@ def test_bad_requests_are_refused_and_the_token_lives_on(authority: Authority, s
 def test_no_bytes_make_reading_a_request_fail_otherwise(content: bytes) -> None:
     wrapped = b"-----BEGIN CERTIFICATE REQUEST-----\n" + content + b"\n-----END CERTIFICATE REQUEST-----\n"
     for request in (content, wrapped):
-        with pytest.raises(BadCertificate):
+        with pytest.raises(CertificateError):
             read_request(request)
 
 
@@ -178,10 +184,10 @@ def test_renewal(authority: Authority, tmp_path: Path, clock: Clock, seen: Seen)
     assert new.not_valid_after_utc == moment(clock.now + 24 * HOUR)
     assert not authority.is_revoked(robot.certificate.serial_number)
     assert not authority.is_revoked(new.serial_number)
-    with pytest.raises(NotGranted, match="another name"):
+    with pytest.raises(NotGrantedError, match="another name"):
         authority.renew(signing_request(robot.key, "B"), robot.certificate)
     clock.now = START + 25 * HOUR
-    with pytest.raises(NotGranted, match="not now"):
+    with pytest.raises(NotGrantedError, match="not now"):
         authority.renew(signing_request(robot.key, "A"), robot.certificate)
     assert len(seen.refusals) == 2
 
@@ -192,7 +198,7 @@ def test_renewal_by_another_authoritys_certificate_is_refused(
     authority.enrol("A")
     other = Authority.create(tmp_path / "other", clock=clock)
     stranger = identity_of(other, "A", tmp_path / "stranger")
-    with pytest.raises(NotGranted, match="has not issued"):
+    with pytest.raises(NotGrantedError, match="has not issued"):
         authority.renew(signing_request(stranger.key, "A"), stranger.certificate)
 
 
@@ -200,7 +206,7 @@ def test_who_renews_without_end_is_stopped(authority: Authority, tmp_path: Path,
     robot = identity_of(authority, "A", tmp_path / "a")
     for _ in range(IN_FORCE_AT_MOST - 1):
         authority.renew(signing_request(robot.key, "A"), robot.certificate)
-    with pytest.raises(NotGranted, match="no more may be"):
+    with pytest.raises(NotGrantedError, match="no more may be"):
         authority.renew(signing_request(robot.key, "A"), robot.certificate)
     clock.now += 25 * HOUR
     authority.redeem(authority.enrol("A").secret, signing_request(new_key(), "A"))
@@ -211,7 +217,7 @@ def test_who_renews_without_end_is_stopped(authority: Authority, tmp_path: Path,
 
 def test_the_masters_certificate_is_not_renewed_from_afar(authority: Authority) -> None:
     master = authority.master_identity(["localhost"])
-    with pytest.raises(NotGranted, match="not from afar"):
+    with pytest.raises(NotGrantedError, match="not from afar"):
         authority.renew(signing_request(master.key, MASTER), master.certificate)
 
 
@@ -224,7 +230,7 @@ def test_revocation_takes_effect_at_once_also_in_another_process(authority: Auth
         assert each.is_revoked("A")
         assert each.is_revoked(robot.certificate.serial_number)
         assert each.names() == ()
-        with pytest.raises(NotGranted, match="revoked"):
+        with pytest.raises(NotGrantedError, match="revoked"):
             each.renew(signing_request(robot.key, "A"), robot.certificate)
     assert state_of(authority, "A") is State.REVOKED
 
@@ -232,7 +238,7 @@ def test_revocation_takes_effect_at_once_also_in_another_process(authority: Auth
 def test_revocation_takes_an_unused_token_as_well(authority: Authority) -> None:
     token = authority.enrol("A")
     authority.revoke("A")
-    with pytest.raises(NotGranted, match="unknown"):
+    with pytest.raises(NotGrantedError, match="unknown"):
         authority.redeem(token.secret, signing_request(new_key(), "A"))
 
 
@@ -273,7 +279,7 @@ def test_a_name_has_one_key(authority: Authority, tmp_path: Path) -> None:
     second = identity_of(authority, "A", tmp_path / "second")
     assert authority.is_revoked(first.certificate.serial_number)
     assert not authority.is_revoked(second.certificate.serial_number)
-    with pytest.raises(NotGranted, match="revoked"):
+    with pytest.raises(NotGrantedError, match="revoked"):
         authority.renew(signing_request(first.key, "A"), first.certificate)
 
 
@@ -281,13 +287,13 @@ def test_what_is_unknown_is_denied(authority: Authority) -> None:
     assert authority.is_revoked("Stranger")
     assert authority.is_revoked(42)
     authority.enrol("Robot1")
-    with pytest.raises(UnknownName, match="did you mean 'Robot1'"):
+    with pytest.raises(UnknownNameError, match="did you mean 'Robot1'"):
         authority.revoke("Robt1")
 
 
 @pytest.mark.parametrize("name", ["", "1A", "A/B", "A*", "$SYS", "A B", "A\n", "é", MASTER, "Master", "A" * 65])
 def test_names_that_no_robot_can_have(authority: Authority, name: str) -> None:
-    with pytest.raises(BadName):
+    with pytest.raises(InvalidNameError):
         authority.enrol_all(["Good", name])
     assert authority.members() == (), "all or none"
 
@@ -297,9 +303,9 @@ def test_the_longest_name_can_be_certified(authority: Authority, tmp_path: Path)
 
 
 def test_the_master_role_and_name_belong_together(authority: Authority) -> None:
-    with pytest.raises(BadName, match="needs no token"):
+    with pytest.raises(InvalidNameError, match="needs no token"):
         authority.enrol("A", Role.MASTER)
-    with pytest.raises(BadName, match="new Authority"):
+    with pytest.raises(InvalidNameError, match="new Authority"):
         authority.revoke(MASTER)
     authority.master_identity(["localhost"])
     assert authority.names(Role.MASTER) == (MASTER,)
@@ -307,7 +313,7 @@ def test_the_master_role_and_name_belong_together(authority: Authority) -> None:
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "", "a" * 300, "a..b"])  # noqa: S104 - that is refused
 def test_hosts_that_no_certificate_can_name(authority: Authority, host: str) -> None:
-    with pytest.raises(BadHost):
+    with pytest.raises(HostNameError):
         authority.master_identity([host])
     assert authority.members() == ()
 
@@ -315,7 +321,7 @@ def test_hosts_that_no_certificate_can_name(authority: Authority, host: str) -> 
 def test_the_clocks_of_two_machines_may_differ_by_five_minutes(authority: Authority, tmp_path: Path) -> None:
     robot = identity_of(authority, "A", tmp_path / "a")
     assert Identity.load(robot.folder, START - 299).name == "A"
-    with pytest.raises(BadIdentity):
+    with pytest.raises(IdentityError):
         Identity.load(robot.folder, START - 301)
 
 

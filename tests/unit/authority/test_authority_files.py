@@ -14,16 +14,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.authority.authority import Authority, NotGranted
+from robochoc.authority.authority import Authority, NotGrantedError
 from robochoc.authority.certificates import (
     fingerprint,
     key_pem,
     new_key,
     signing_request,
 )
-from robochoc.authority.identity import BadIdentity, Identity, save
-from robochoc.authority.registry import BadAuthority
-from robochoc.authority.token import BadToken, Token
+from robochoc.authority.identity import Identity, IdentityError, save
+from robochoc.authority.registry import AuthorityError
+from robochoc.authority.token import Token, TokenError
 from robochoc.system import files
 from tests.support.authorities import HOUR, START, Clock, Seen, identity_of
 from tests.support.program import ROOT
@@ -87,35 +87,35 @@ def test_a_folder_that_serves_another_purpose_is_left_alone(tmp_path: Path) -> N
 
 
 def test_there_is_one_authority_in_a_folder(authority: Authority) -> None:
-    with pytest.raises(BadAuthority, match="already"):
+    with pytest.raises(AuthorityError, match="already"):
         Authority.create(authority.folder)
     assert Authority.open(authority.folder, clock=authority.clock).certificate == authority.certificate
 
 
 def test_what_is_wrong_with_an_authority_is_said(authority: Authority, tmp_path: Path, clock: Clock) -> None:
     key = authority.folder / "ca.key"
-    with pytest.raises(BadAuthority, match="robochoc authority init"):
+    with pytest.raises(AuthorityError, match="robochoc authority init"):
         Authority.open(tmp_path / "nowhere")
     key.chmod(0o644)
-    with pytest.raises(BadAuthority, match="chmod 600"):
+    with pytest.raises(AuthorityError, match="chmod 600"):
         Authority.open(authority.folder, clock=clock)
     key.chmod(0o600)
     clock.now += timedelta(days=3651).total_seconds()
-    with pytest.raises(BadAuthority, match="expired"):
+    with pytest.raises(AuthorityError, match="expired"):
         Authority.open(authority.folder, clock=clock)
     clock.now = START
     key.write_bytes(key_pem(new_key()))
-    with pytest.raises(BadAuthority, match="not the key"):
+    with pytest.raises(AuthorityError, match="not the key"):
         Authority.open(authority.folder, clock=clock)
     key.write_bytes(b"rubbish")
-    with pytest.raises(BadAuthority, match="damaged"):
+    with pytest.raises(AuthorityError, match="damaged"):
         Authority.open(authority.folder, clock=clock)
 
 
 @pytest.mark.parametrize("content", [b"", b"[]", b'{"members":{},"version":2}', b'{"members":{"A":1}}', b"\xff"])
 def test_a_registry_that_is_none_is_not_overwritten(authority: Authority, content: bytes) -> None:
     (authority.folder / "registry.json").write_bytes(content)
-    with pytest.raises(BadAuthority, match="registry"):
+    with pytest.raises(AuthorityError, match="registry"):
         authority.enrol("A")
     assert (authority.folder / "registry.json").read_bytes() == content
 
@@ -162,7 +162,7 @@ def test_only_one_of_many_redeems_a_token(tmp_path: Path) -> None:
     def redeem(_number: int) -> bool:
         try:
             authority.redeem(token.secret, signing_request(new_key(), "A"))
-        except NotGranted:
+        except NotGrantedError:
             return False
         return True
 
@@ -181,13 +181,13 @@ def test_tokens_survive_being_copied_by_people(authority: Authority) -> None:
 
 @given(st.text(string.printable, max_size=120))
 def test_no_text_makes_reading_a_token_fail_otherwise(text: str) -> None:
-    with pytest.raises(BadToken, match="copy all"):
+    with pytest.raises(TokenError, match="copy all"):
         Token.parse(text)
 
 
 @given(st.integers(0, 83))
 def test_a_part_of_a_token_is_none(length: int) -> None:
-    with pytest.raises(BadToken):
+    with pytest.raises(TokenError):
         Token.parse(str(Token(bytes(20), bytes(32)))[:length])
 
 
@@ -207,7 +207,7 @@ def test_an_identity_that_cannot_be_used_says_why(authority: Authority, tmp_path
     folder = tmp_path / "a"
 
     def fault(now: float = START) -> str:
-        with pytest.raises(BadIdentity) as raised:
+        with pytest.raises(IdentityError) as raised:
             Identity.load(folder, now)
         return str(raised.value)
 

@@ -16,18 +16,18 @@ import msgspec
 import pytest
 
 from robochoc.authority.certificates import new_key, read_certificate, signing_request
-from robochoc.authority.enrolment import EnrolmentFailed, NotTrusted, enrol, renew
+from robochoc.authority.enrolment import EnrolmentError, NotTrustedError, enrol, renew
 from robochoc.authority.enrolment_server import EnrolmentServer
 from robochoc.authority.frames import (
     Answer,
-    BadFrame,
     Certified,
     Denied,
+    FrameError,
     Introduction,
     Renew,
 )
 from robochoc.authority.identity import Identity, save
-from robochoc.authority.token import BadToken, Token
+from robochoc.authority.token import Token, TokenError
 from tests.support.authorities import HOUR
 from tests.support.clocks import waiting
 from tests.support.desks import SOON_S, Desk, answered, drip, framed, trusting
@@ -63,7 +63,7 @@ def test_a_whole_team_enrols_at_once(desk: Desk, tmp_path: Path) -> None:
 def test_a_token_used_twice(desk: Desk, tmp_path: Path) -> None:
     token = desk.authority.enrol("A")
     robot = enrol(*desk.place, token, tmp_path / "a", "A")
-    with pytest.raises(EnrolmentFailed, match="used already"):
+    with pytest.raises(EnrolmentError, match="used already"):
         enrol(*desk.place, token, tmp_path / "a", "A")
     assert desk.refusal() == "the token has been used already"
     assert Identity.load(tmp_path / "a").certificate == robot.certificate, "who is refused keeps what it had"
@@ -73,19 +73,19 @@ def test_a_token_used_twice(desk: Desk, tmp_path: Path) -> None:
 def test_a_token_that_has_expired(desk: Desk, tmp_path: Path) -> None:
     token = desk.authority.enrol("A", ttl=timedelta(seconds=30))
     desk.clock.now += 31
-    with pytest.raises(EnrolmentFailed, match="expired"):
+    with pytest.raises(EnrolmentError, match="expired"):
         enrol(*desk.place, token, tmp_path / "a", "A")
 
 
 def test_a_token_of_another_name(desk: Desk, tmp_path: Path) -> None:
     token = desk.authority.enrol("A")
-    with pytest.raises(EnrolmentFailed, match="not for this name"):
+    with pytest.raises(EnrolmentError, match="not for this name"):
         enrol(*desk.place, token, tmp_path / "b", "B")
     assert not (tmp_path / "b" / "key.pem").exists()
 
 
 def test_half_a_token_goes_nowhere(tmp_path: Path) -> None:
-    with pytest.raises(BadToken, match="copy all"):
+    with pytest.raises(TokenError, match="copy all"):
         enrol("127.0.0.1", 1, "abc", tmp_path / "a", "A")
 
 
@@ -93,7 +93,7 @@ def test_a_machine_in_the_middle_does_not_see_the_token(desk: Desk, tmp_path: Pa
     """It has an Authority of its own, and answers in the place of the right one."""
     other = Desk(tmp_path / "middle")
     token = desk.authority.enrol("A")
-    with other.server, pytest.raises(NotTrusted, match="not shown"):
+    with other.server, pytest.raises(NotTrustedError, match="not shown"):
         enrol(*other.place, token, tmp_path / "a", "A")
     assert other.seen.events == []
     assert enrol(*desk.place, token, tmp_path / "a", "A").name == "A", "the token is as good as new"
@@ -107,7 +107,7 @@ def test_a_machine_in_the_middle_that_shows_the_right_certificate_does_not_see_t
     token = desk.authority.enrol("A")
     other.authority.certificate = desk.authority.certificate
     with other.server:
-        with pytest.raises(NotTrusted, match="not the master"):
+        with pytest.raises(NotTrustedError, match="not the master"):
             enrol(*other.place, token, tmp_path / "a", "A")
         assert "TLS failed" in other.refusal()
 
@@ -115,14 +115,14 @@ def test_a_machine_in_the_middle_that_shows_the_right_certificate_does_not_see_t
 def test_a_robot_cannot_pose_as_the_master(desk: Desk, tmp_path: Path) -> None:
     thief = enrol(*desk.place, desk.authority.enrol("Thief"), tmp_path / "thief", "Thief")
     token = desk.authority.enrol("A")
-    with EnrolmentServer(desk.authority, thief) as posing, pytest.raises(NotTrusted, match="not the master"):
+    with EnrolmentServer(desk.authority, thief) as posing, pytest.raises(NotTrustedError, match="not the master"):
         enrol(*posing.address, token, tmp_path / "a", "A")
 
 
 def test_nobody_there(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
-    with pytest.raises(EnrolmentFailed, match="robochoc master"):
+    with pytest.raises(EnrolmentError, match="robochoc master"):
         enrol("127.0.0.1", port, Token.new(bytes(32)), tmp_path / "a", "A")
 
 
@@ -145,7 +145,7 @@ def test_a_service_that_takes_for_ever_is_left(behaviour: Callable[[socket.socke
     with socket.create_server(("127.0.0.1", 0)) as listener:
         server = threading.Thread(target=serve)
         server.start()
-        with waiting(SOON_S), pytest.raises(EnrolmentFailed):
+        with waiting(SOON_S), pytest.raises(EnrolmentError):
             enrol("127.0.0.1", listener.getsockname()[1], Token.new(bytes(32)), tmp_path / "a", "A", patience_s=0.3)
         server.join()
 
@@ -153,7 +153,7 @@ def test_a_service_that_takes_for_ever_is_left(behaviour: Callable[[socket.socke
 def test_renewal_by_a_revoked_robot(desk: Desk, tmp_path: Path) -> None:
     robot = enrol(*desk.place, desk.authority.enrol("A"), tmp_path / "a", "A")
     desk.authority.revoke("A")
-    with pytest.raises(EnrolmentFailed, match="revoked"):
+    with pytest.raises(EnrolmentError, match="revoked"):
         renew(robot, *desk.place)
     assert desk.refusal() == "the certificate has been revoked"
     assert Identity.load(tmp_path / "a").certificate == robot.certificate
@@ -180,12 +180,12 @@ def test_renewal_with_a_certificate_of_another_authority(desk: Desk, tmp_path: P
     other = Desk(tmp_path / "other")
     with other.server:
         stranger = enrol(*other.place, other.authority.enrol("A"), tmp_path / "a", "A")
-    with pytest.raises(NotTrusted):
+    with pytest.raises(NotTrustedError):
         renew(stranger, *desk.place)
     assert "TLS failed" in desk.refusal()
     context = trusting(desk)  # this one does not mind whom it talks to
     context.load_cert_chain(stranger.certificate_file, stranger.key_file)
-    with pytest.raises((OSError, BadFrame)):
+    with pytest.raises((OSError, FrameError)):
         answered(desk, framed(msgspec.msgpack.encode(Renew(signing_request(stranger.key, "A")))), context)
     assert "TLS failed" in desk.refusal(2)
 
@@ -202,7 +202,7 @@ def test_renewal_with_an_expired_certificate(tmp_path: Path) -> None:
     expired = Identity(folder, "A", key, certificate, old.authority.certificate)
     old.clock.now = 0
     with old.server:
-        with pytest.raises(EnrolmentFailed):
+        with pytest.raises(EnrolmentError):
             renew(expired, *old.place)
         assert old.refusal() == "TLS failed: certificate has expired"
 
@@ -211,7 +211,7 @@ def test_the_masters_certificate_is_renewed_while_it_serves(desk: Desk, tmp_path
     token = desk.authority.enrol("A")
     serial = Identity.load(desk.master.folder).certificate.serial_number
     desk.clock.now += 13 * HOUR
-    with pytest.raises(NotTrusted):  # made for a time that has not come here yet
+    with pytest.raises(NotTrustedError):  # made for a time that has not come here yet
         enrol(*desk.place, token, tmp_path / "a", "A")
     new = Identity.load(desk.master.folder, time.time() + desk.clock.now)
     assert new.certificate.serial_number != serial
@@ -223,7 +223,7 @@ def test_a_lost_authority_is_said_and_the_service_goes_on(desk: Desk, tmp_path: 
     registry = desk.authority.folder / "registry.json"
     content = registry.read_bytes()
     registry.write_bytes(b"rubbish")
-    with pytest.raises(EnrolmentFailed, match="at the moment"):
+    with pytest.raises(EnrolmentError, match="at the moment"):
         enrol(*desk.place, token, tmp_path / "a", "A")
     assert "registry" in desk.refusal()
     registry.write_bytes(content)
@@ -242,7 +242,7 @@ def test_a_lying_service_is_not_believed(tmp_path: Path, answer: Answer) -> None
         return answer
 
     desk.server._answer = lie  # type: ignore[assignment, method-assign]  # noqa: SLF001 - a service that lies
-    with desk.server, pytest.raises(NotTrusted):
+    with desk.server, pytest.raises(NotTrustedError):
         enrol(*desk.place, Token.new(bytes(32)), tmp_path / "a", "A")
 
 
@@ -265,6 +265,6 @@ def test_a_certificate_that_is_not_ours_is_not_taken(desk: Desk, tmp_path: Path,
                 return Introduction(b"")
 
     desk.server._answer = lie  # type: ignore[assignment, method-assign]  # noqa: SLF001 - a service that lies
-    with pytest.raises(EnrolmentFailed, match=r"another|not good"):
+    with pytest.raises(EnrolmentError, match=r"another|not good"):
         renew(robot, *desk.place)
     assert Identity.load(tmp_path / "a").certificate == robot.certificate

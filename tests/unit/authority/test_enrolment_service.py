@@ -19,9 +19,9 @@ from robochoc.authority.enrolment import enrol
 from robochoc.authority.enrolment_server import EnrolmentServer
 from robochoc.authority.frames import (
     LARGEST_BYTES,
-    BadFrame,
     Denied,
     Exchange,
+    FrameError,
     Introduce,
     Redeem,
     Renew,
@@ -67,7 +67,7 @@ def test_malformed_requests(desk: Desk, content: bytes) -> None:
 def test_no_bytes_make_decoding_fail_otherwise(content: bytes) -> None:
     try:
         question = decode_question(content)
-    except BadFrame:
+    except FrameError:
         return
     assert isinstance(question, Introduce | Redeem | Renew)
 
@@ -82,7 +82,7 @@ def test_an_unknown_token(desk: Desk) -> None:
 def test_plain_tcp_and_old_tls_are_refused(desk: Desk) -> None:
     with socket.create_connection(desk.place, SOON_S) as plain:
         plain.sendall(framed(msgspec.msgpack.encode(Introduce())) * 10)
-        with pytest.raises((OSError, BadFrame)):
+        with pytest.raises((OSError, FrameError)):
             Exchange(plain, SOON_S).answer()
     assert "TLS failed" in desk.refusal()
     context = trusting(desk)

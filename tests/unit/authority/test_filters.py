@@ -19,13 +19,13 @@ from hypothesis import strategies as st
 
 from robochoc.authority.authority import Authority
 from robochoc.authority.identity import Identity
-from robochoc.authority.keyring import BadCard, KeyCard, KeyRing, UnknownPeer, bound
+from robochoc.authority.keyring import KeyCard, KeyCardError, KeyRing, UnknownPeerError, bound
 from robochoc.communication import filters
 from robochoc.communication.filters import (
     ChannelFilter,
     FilterStack,
-    NotGenuine,
-    UnknownFilter,
+    NotGenuineError,
+    UnknownFilterError,
     filter_named,
     filter_offers,
 )
@@ -89,7 +89,7 @@ def test_any_flipped_bit_is_refused(
     sealed = bytearray(FilterStack(three["A"], stack).seal("B", content, CONTEXT))
     bit = place % (8 * len(sealed))
     sealed[bit // 8] ^= 1 << bit % 8
-    with pytest.raises(NotGenuine):
+    with pytest.raises(NotGenuineError):
         FilterStack(three["B"], stack).open("A", bytes(sealed), CONTEXT)
 
 
@@ -100,7 +100,7 @@ def test_every_bit_of_one_message(three: dict[str, KeyRing], stack: Sequence[typ
     for bit in range(8 * len(sealed)):
         changed = bytearray(sealed)
         changed[bit // 8] ^= 1 << bit % 8
-        with pytest.raises(NotGenuine):
+        with pytest.raises(NotGenuineError):
             opening.open("A", bytes(changed), CONTEXT)
 
 
@@ -109,7 +109,7 @@ def test_every_bit_of_one_message(three: dict[str, KeyRing], stack: Sequence[typ
 def test_what_nobody_sealed_is_refused(
     three: dict[str, KeyRing], stack: Sequence[type[ChannelFilter]], content: bytes
 ) -> None:
-    with pytest.raises(NotGenuine):
+    with pytest.raises(NotGenuineError):
         FilterStack(three["B"], stack).open("A", content, CONTEXT)
 
 
@@ -118,7 +118,7 @@ def test_a_part_of_a_message_is_refused(three: dict[str, KeyRing], stack: Sequen
     sealed = FilterStack(three["A"], stack).seal("B", b"Ok(3)", CONTEXT)
     opening = FilterStack(three["B"], stack)
     for part in (*(sealed[:size] for size in range(len(sealed))), sealed + b"\0", sealed[1:], sealed * 2):
-        with pytest.raises(NotGenuine):
+        with pytest.raises(NotGenuineError):
             opening.open("A", part, CONTEXT)
 
 
@@ -136,10 +136,10 @@ def test_sender_receiver_and_context_are_bound(
         (at_b, "A", b""),
         (at_b, "Stranger", CONTEXT),
     ):
-        with pytest.raises(NotGenuine):
+        with pytest.raises(NotGenuineError):
             opening.open(sender, sealed, context)
     later = rings(identities, "8")["B"]
-    with pytest.raises(NotGenuine):
+    with pytest.raises(NotGenuineError):
         FilterStack(later, stack).open("A", sealed, CONTEXT)
     assert at_b.open("A", sealed, CONTEXT) == b"Ok(3)"
 
@@ -149,7 +149,7 @@ def test_the_same_keys_in_another_run_would_not_open_either(identities: dict[str
     made = rings(identities)
     sealed = Sealed(made["A"]).seal("B", b"Ok(3)", CONTEXT)
     made["B"].run = "8"
-    with pytest.raises(NotGenuine):
+    with pytest.raises(NotGenuineError):
         Sealed(made["B"]).open("A", sealed, CONTEXT)
 
 
@@ -203,10 +203,10 @@ def test_without_a_card_nothing_is_sealed_and_nothing_opens(identities: dict[str
     sealed = FilterStack(made["A"], [Signed, Sealed]).seal("B", b"Ok(3)", CONTEXT)
     made["A"].dismiss("B")
     made["B"].dismiss("A")
-    with pytest.raises(UnknownPeer, match="no key card of B"):
+    with pytest.raises(UnknownPeerError, match="no key card of B"):
         Sealed(made["A"]).seal("B", b"Ok(3)", CONTEXT)
     for stack in ([Signed], [Sealed], [Signed, Sealed]):
-        with pytest.raises(NotGenuine, match="no key card of A"):
+        with pytest.raises(NotGenuineError, match="no key card of A"):
             FilterStack(made["B"], stack).open("A", sealed, CONTEXT)
 
 
@@ -219,7 +219,7 @@ def test_a_robot_that_comes_back_has_a_new_card(identities: dict[str, Identity])
     back.admit(made["B"].card, START)
     made["B"].admit(back.card, START)
     assert opening.open("A", FilterStack(back, [Signed, Sealed]).seal("B", b"new", CONTEXT), CONTEXT) == b"new"
-    with pytest.raises(NotGenuine):
+    with pytest.raises(NotGenuineError):
         opening.open("A", old, CONTEXT)
 
 
@@ -232,7 +232,7 @@ def test_cards_that_prove_nothing(identities: dict[str, Identity], tmp_path: Pat
     own = ring.card
 
     def refused(bad: KeyCard, why: str, now: float = START) -> None:
-        with pytest.raises(BadCard, match=why):
+        with pytest.raises(KeyCardError, match=why):
             ring.admit(bad, now)
 
     refused(stranger, "has not issued")
@@ -251,7 +251,7 @@ def test_cards_that_prove_nothing(identities: dict[str, Identity], tmp_path: Pat
     refused(resigned(changed(card, signing=b"short"), a), "32 bytes")
     refused(resigned(changed(card, sealing=bytes(33)), a), "32 bytes")
     refused(resigned(changed(card, sealing=bytes(32)), a), "is no key")  # the point 0: of small order
-    with pytest.raises(UnknownPeer):
+    with pytest.raises(UnknownPeerError):
         ring.card_of("A")
     ring.admit(card, START)
     assert ring.card_of("A") == card
@@ -259,13 +259,13 @@ def test_cards_that_prove_nothing(identities: dict[str, Identity], tmp_path: Pat
 
 @given(st.binary(max_size=200))
 def test_no_bytes_make_decoding_a_card_fail_otherwise(content: bytes) -> None:
-    with pytest.raises(BadCard):
+    with pytest.raises(KeyCardError):
         KeyCard.decode(content)
 
 
 def test_a_card_is_small(identities: dict[str, Identity]) -> None:
     assert len(KeyRing(identities["A"], "7").card.encode()) < 1200
-    with pytest.raises(BadCard, match="at most"):
+    with pytest.raises(KeyCardError, match="at most"):
         KeyCard.decode(bytes(9000))
 
 
@@ -298,13 +298,13 @@ def test_filters_seal_in_their_order_and_open_in_reverse(three: dict[str, KeyRin
     sealed = FilterStack(three["A"], [Backwards, Signed]).seal("B", b"Ok(3)", CONTEXT)
     assert sealed.endswith(b")3(kO")
     assert FilterStack(three["B"], [Backwards, Signed]).open("A", sealed, CONTEXT) == b"Ok(3)"
-    with pytest.raises(NotGenuine):
+    with pytest.raises(NotGenuineError):
         FilterStack(three["B"], [Signed, Backwards]).open("A", sealed, CONTEXT)
     assert FilterStack(three["A"], []).seal("B", b"Ok(3)", CONTEXT) == b"Ok(3)"
 
 
 def test_a_filter_that_fails_has_not_opened(three: dict[str, KeyRing]) -> None:
-    with pytest.raises(NotGenuine, match="Backwards failed: IndexError"):
+    with pytest.raises(NotGenuineError, match="Backwards failed: IndexError"):
         FilterStack(three["B"], [Backwards]).open("A", b"", CONTEXT)
 
 
@@ -315,7 +315,7 @@ def test_the_filter_in_the_docs_works(three: dict[str, KeyRing], tmp_path: Path)
     sealing, opening = (FilterStack(three[name], [packed, Sealed]) for name in "AB")
     assert opening.open("A", sealing.seal("B", b"Ok(3)" * 100, CONTEXT), CONTEXT) == b"Ok(3)" * 100
     for bad in (sealing.seal("B", bytes(2_000_000), CONTEXT), Sealed(three["A"]).seal("B", b"not packed", CONTEXT)):
-        with pytest.raises(NotGenuine):
+        with pytest.raises(NotGenuineError):
             opening.open("A", bad, CONTEXT)
 
 
@@ -324,7 +324,7 @@ def test_the_package_offers_the_two(monkeypatch: pytest.MonkeyPatch) -> None:
     offered(monkeypatch, filters.GROUP, **ours)
     assert [(offer.name, offer.filter) for offer in filter_offers()] == [("sealed", Sealed), ("signed", Signed)]
     assert filter_named("sealed") is Sealed
-    with pytest.raises(UnknownFilter, match="only: sealed, signed; did you mean 'signed'"):
+    with pytest.raises(UnknownFilterError, match="only: sealed, signed; did you mean 'signed'"):
         filter_named("Sigend")
 
 
@@ -345,7 +345,7 @@ def test_what_others_offer_may_be_broken(monkeypatch: pytest.MonkeyPatch) -> Non
         "function": "is no subclass of ChannelFilter",
         "twice": "several packages",
     }.items():
-        with pytest.raises(UnknownFilter, match=why):
+        with pytest.raises(UnknownFilterError, match=why):
             filter_named(name)
     broken = {offer.name for offer in filter_offers() if offer.broken}
     assert broken == {"half", "gone", "function", "twice"}

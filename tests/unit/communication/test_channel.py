@@ -24,7 +24,7 @@ from robochoc.model.message import Envelope
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.run.orchestrator import Options, Runtime, ScheduleName, Withdrawal, solve
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 from tests.support.problems import random_team, solutions, teams
 from tests.support.program import ROOT
 
@@ -329,7 +329,7 @@ def test_the_result_is_read_back() -> None:
     ids=["processes", "delay", "random"],
 )
 def test_a_channel_is_not_ignored(options: Options) -> None:
-    with pytest.raises(Unsupported, match="--channel"):
+    with pytest.raises(UnsupportedError, match="--channel"):
         solve(queens3d(2), options)
 
 

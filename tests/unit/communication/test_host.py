@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from robochoc.communication.host import BadMessage, Host
+from robochoc.communication.host import BadMessageError, Host
 from robochoc.journal.events import AnyEvent, Concluded, Decided, Received, Sent, Settled
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
@@ -95,7 +95,7 @@ def test_messages_and_bytes_are_counted_by_type() -> None:
 
 @pytest.mark.parametrize("content", [b"", b"\x00", encode(Placed((1,))), encode(Ok((1,)))[:-1], b"\x92\xa2Ok\x91\xa1x"])
 def test_what_is_no_message_of_the_protocol_is_refused(content: bytes) -> None:
-    with pytest.raises(BadMessage, match="RA sent RB what is no message"):
+    with pytest.raises(BadMessageError, match="RA sent RB what is no message"):
         host("RB").handle([Envelope("RA", "RB", content, 0)])
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.communication.processes.queues import LARGEST_BODY, Corrupt, QueueReader, QueueWriter, unpack
+from robochoc.communication.processes.queues import LARGEST_BODY, CorruptQueueError, QueueReader, QueueWriter, unpack
 
 
 @pytest.fixture
@@ -98,5 +98,5 @@ def test_writing_to_nobody_is_no_error() -> None:
 @pytest.mark.parametrize("length", [-1, LARGEST_BODY + 1, 2**31 - 1])
 def test_an_absurd_length_is_refused_before_anything_is_allocated(length: int) -> None:
     buffer = bytearray(length.to_bytes(4, "big", signed=True) + b"x")
-    with pytest.raises(Corrupt):
+    with pytest.raises(CorruptQueueError):
         list(unpack(buffer))

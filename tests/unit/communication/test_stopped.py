@@ -13,7 +13,7 @@ from threading import Thread
 import pytest
 
 from robochoc.communication.processes.processes import ProcessesRun
-from robochoc.communication.processes.robot_link import Condition, RobotsLost
+from robochoc.communication.processes.robot_link import Condition, RobotsLostError
 from robochoc.communication.processes.stopped import TOLD_S, Stopped
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
@@ -79,7 +79,7 @@ WHY = re.compile(r"its process had been stopped \(SIGSTOP\) for \d+ s")
 def test_a_stopped_robot_is_lost_when_patience_is_over() -> None:
     lost: list[AnyEvent] = []
     with ProcessesRun(TEAM, StopsItself, patience_s=0.3, observer=lost.append) as session:
-        with pytest.raises(RobotsLost) as refused:
+        with pytest.raises(RobotsLostError) as refused:
             session.search()
         pids = [robot.process.pid for robot in session._crew.robots.values()]  # noqa: SLF001 - nothing else knows them
     assert [*refused.value.robots] == [FIRST]

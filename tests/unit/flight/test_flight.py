@@ -17,7 +17,7 @@ from robochoc.flight.quadrotor.airframe import GRAVITY
 from robochoc.flight.quadrotor.bounds import check_length
 from robochoc.flight.quadrotor.simulation import DT, Simulation
 from robochoc.flight.reports import Blocked, OutOfOrder
-from robochoc.flight.routes.timetable import NoWay, TooClose
+from robochoc.flight.routes.timetable import NoRouteError, TooCloseError
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Outcome, Verdict
 
@@ -337,10 +337,10 @@ def test_who_is_wanted_along_the_ground_keeps_away_from_who_is_above() -> None:
 def test_refusals_of_the_plan_name_drones() -> None:
     flight = Flight(["a", "b"], PAIR, Conditions())
     everybody = np.arange(2)
-    assert flight._told(TooClose(1, 2, 0.1234, "goal"), everybody) == (  # noqa: SLF001 - places are checked before
+    assert flight._told(TooCloseError(1, 2, 0.1234, "goal"), everybody) == (  # noqa: SLF001 - places are checked before
         "b and something that is in the way are to end only 0.123 m from each other"
     )
-    assert flight._told(NoWay([0, 1]), everybody).startswith("there is no way for a, b: ")  # noqa: SLF001
+    assert flight._told(NoRouteError([0, 1]), everybody).startswith("there is no way for a, b: ")  # noqa: SLF001
 
 
 def test_what_is_too_much_is_refused_before_it_takes_minutes() -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from robochoc.flight.routes.paths import Space
 from robochoc.flight.routes.spacing import Array, gaps, norms
-from robochoc.flight.routes.timetable import Limits, Motion, NoWay, Plan, TooClose, plan
+from robochoc.flight.routes.timetable import Limits, Motion, NoRouteError, Plan, TooCloseError, plan
 
 HZ = 100
 LIMITS = Limits()
@@ -180,11 +180,11 @@ def test_what_would_make_no_distance_possible_is_refused() -> None:
     places = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)])
     goals = places + np.array((0.0, 0.0, 2.0))
     goals[2] = (1.0, 0.0, 2.3)
-    with pytest.raises(TooClose, match=r"goals of drones 1 and 2 are only 0\.3 m apart") as found:
+    with pytest.raises(TooCloseError, match=r"goals of drones 1 and 2 are only 0\.3 m apart") as found:
         plan(places, goals, distance=0.5)
     assert (found.value.first, found.value.second, found.value.where) == (1, 2, "goal")
     assert found.value.distance_m == pytest.approx(0.3)
-    with pytest.raises(TooClose) as found:
+    with pytest.raises(TooCloseError) as found:
         plan(places, places, distance=0.5, standing=np.array([(0.0, 9.0, 0.0), (2.0, 0.4, 0.0)]))
     assert (found.value.first, found.value.second, found.value.where) == (2, 4, "start")
     assert plan(places, places, distance=1.0).duration_s == 0
@@ -194,7 +194,7 @@ def test_who_is_walled_in_finds_no_way() -> None:
     walls = np.array([side for side in product((-1, 0, 1), repeat=3) if any(side)], float)
     walls = walls / norms(walls)[:, None] * 0.6 + np.array((0, 0, 5))
     starts = np.array([(0.0, 0.0, 5.0), (5.0, 5.0, 5.0)])
-    with pytest.raises(NoWay, match="no way was found for drones 0") as found:
+    with pytest.raises(NoRouteError, match="no way was found for drones 0") as found:
         plan(starts, starts + 4, distance=0.5, standing=walls)
     assert found.value.drones == (0,)
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from robochoc.formats import InvalidInput, find_teams, read_robot, read_team
+from robochoc.formats import InvalidInputError, find_teams, read_robot, read_team
 from robochoc.model.problem import Robot, Team
 from tests.support.broken import CASES
 from tests.support.broken_case import TEAM, Broken, write_files
@@ -28,7 +28,7 @@ def read_all(path: Path) -> list[Team]:
 def test_broken_input(case: Broken, tmp_path: Path) -> None:
     case.write(tmp_path)
     expected = case.expected(tmp_path)
-    with working(2), pytest.raises(InvalidInput) as caught:
+    with working(2), pytest.raises(InvalidInputError) as caught:
         read_all(tmp_path / case.target)
     told = str(caught.value).splitlines()
     assert len(told) == len(expected), caught.value
@@ -57,17 +57,17 @@ def test_the_team_of_the_cases_is_not_broken(tmp_path: Path) -> None:
 def test_unreadable_files_and_folders(tmp_path: Path) -> None:
     write_files(tmp_path, TEAM)
     (tmp_path / "Robot1.xml").chmod(0)
-    with pytest.raises(InvalidInput, match="Permission denied"):
+    with pytest.raises(InvalidInputError, match="Permission denied"):
         read_team(tmp_path)
     (tmp_path / "locked").mkdir(mode=0)
-    with pytest.raises(InvalidInput, match="Permission denied"):
+    with pytest.raises(InvalidInputError, match="Permission denied"):
         find_teams(tmp_path / "locked")
 
 
 def test_mistakes_come_in_the_order_of_files_and_lines(tmp_path: Path) -> None:
     for name in ("Robot10", "Robot9"):
         write_files(tmp_path, {f"{name}.xml": TEAM["Robot2.xml"].replace("1..4", "4..1").replace("|2 2|", "|2|")})
-    with pytest.raises(InvalidInput) as caught:
+    with pytest.raises(InvalidInputError) as caught:
         read_team(tmp_path)
     places = [(Path(one.file).name, one.line) for one in caught.value.diagnostics]
     assert places == [("Robot9.xml", 5), ("Robot9.xml", 11), ("Robot10.xml", 5), ("Robot10.xml", 11)]
@@ -81,7 +81,7 @@ def test_a_hundred_thousand_mistakes_are_not_all_told(tmp_path: Path) -> None:
         .replace("</constraints>\n  <agents_n", row * 100_000 + "</constraints><agents_n")
     )
     write_files(tmp_path, {"Robot1.xml": content})
-    with working(10), pytest.raises(InvalidInput) as caught:
+    with working(10), pytest.raises(InvalidInputError) as caught:
         read_robot(tmp_path / "Robot1.xml")
     assert len(caught.value.diagnostics) == 101
     assert "more mistakes" in str(caught.value.diagnostics[-1])
@@ -90,7 +90,7 @@ def test_a_hundred_thousand_mistakes_are_not_all_told(tmp_path: Path) -> None:
 def test_a_million_mistakes_against_the_schema_do_not_take_hours(tmp_path: Path) -> None:
     content = '<instance><presentation type="DisCSP"/><domains>' + "<domain/>\n" * 10**6 + "</domains></instance>"
     write_files(tmp_path, {"Robot1.xml": content})
-    with working(10), pytest.raises(InvalidInput) as caught:
+    with working(10), pytest.raises(InvalidInputError) as caught:
         read_robot(tmp_path / "Robot1.xml")
     assert [one.line for one in caught.value.diagnostics] == list(range(1, 102))
 
@@ -118,7 +118,7 @@ def test_a_copy_over_more_tuples_than_can_be_counted(tmp_path: Path) -> None:
             <expression><functional>{text}</functional></expression></predicate></predicates>
             <agents_neighbours>{agents.format(shared)}</agents_neighbours></instance>"""
     write_files(tmp_path, files)
-    with pytest.raises(InvalidInput, match="leave the copy out"):
+    with pytest.raises(InvalidInputError, match="leave the copy out"):
         read_team(tmp_path)
 
 
@@ -169,8 +169,8 @@ VALUES = st.one_of(
 def read_it(folder: Path) -> None:
     for read in (lambda: read_robot(folder / "Robot2.xml"), lambda: read_team(folder)):
         try:
-            found: Robot | Team | InvalidInput = read()
-        except InvalidInput as invalid:
+            found: Robot | Team | InvalidInputError = read()
+        except InvalidInputError as invalid:
             found = invalid
         assert isinstance(found, Robot | Team) or len(str(found).splitlines()) == len(found.diagnostics) > 0
 

@@ -17,7 +17,7 @@ from lxml import etree
 from robochoc.formats import (
     PREDEFINED,
     Diagnostic,
-    InvalidInput,
+    InvalidInputError,
     find_teams,
     read_robot,
     read_team,
@@ -379,6 +379,6 @@ def test_a_killed_writer_leaves_no_half_file(tmp_path: Path) -> None:
 
 def test_one_mistake_of_two_files_is_told_once(tmp_path: Path) -> None:
     write_files(tmp_path, {**TEAM, "Robot2.xml": TEAM["Robot2.xml"].replace("</instance>", "")})
-    with pytest.raises(InvalidInput) as caught:
+    with pytest.raises(InvalidInputError) as caught:
         read_team(tmp_path)
     assert len(caught.value.diagnostics) == 1

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.formats import InvalidInput, find_teams, read_robot, read_team
+from robochoc.formats import InvalidInputError, find_teams, read_robot, read_team
 from robochoc.model.change import changed, changed_by
 from robochoc.model.problem import (
     AddAgent,
@@ -156,12 +156,12 @@ def test_a_link_out_of_the_folder_is_not_followed(tmp_path: Path) -> None:
     write_files(tmp_path / "squad", {**TEAM, "scenario.xml": scenario(ADD_9)})
     (tmp_path / "squad" / "late").mkdir()
     (tmp_path / "squad" / LATE).symlink_to(tmp_path / "Robot9.xml")
-    with pytest.raises(InvalidInput, match="outside the team's folder"):
+    with pytest.raises(InvalidInputError, match="outside the team's folder"):
         read_team(tmp_path / "squad")
 
 
 def test_a_hundred_mistakes_are_told_and_no_more(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput) as caught:
+    with pytest.raises(InvalidInputError) as caught:
         team_with(tmp_path, scenario(*['<remove_agent name="Robot_3"/>'] * 1000))
     assert len(caught.value.diagnostics) == 101
     assert "more mistakes" in str(caught.value.diagnostics[-1])
@@ -170,7 +170,7 @@ def test_a_hundred_mistakes_are_told_and_no_more(tmp_path: Path) -> None:
 def test_mistakes_of_an_added_file_are_told_once_however_often_it_comes(tmp_path: Path) -> None:
     broken = ROBOT_9.replace('"V9" domain="D1"', '"V9" domain="D2"')
     write_files(tmp_path, {**TEAM, "scenario.xml": scenario(ADD_9, ADD_9), LATE: broken})
-    with pytest.raises(InvalidInput, match="unknown domain") as caught:
+    with pytest.raises(InvalidInputError, match="unknown domain") as caught:
         read_team(tmp_path)
     assert len(caught.value.diagnostics) == 1
 

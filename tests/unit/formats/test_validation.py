@@ -16,7 +16,7 @@ import robochoc
 from robochoc.formats import (
     PREDEFINED,
     Diagnostic,
-    InvalidInput,
+    InvalidInputError,
     check_robot,
     check_team,
     read_team,
@@ -67,13 +67,13 @@ def team(tmp_path_factory: pytest.TempPathFactory) -> Team:
     return read_team(folder)
 
 
-def refused(team: Team) -> InvalidInput:
-    with pytest.raises(InvalidInput) as caught:
+def refused(team: Team) -> InvalidInputError:
+    with pytest.raises(InvalidInputError) as caught:
         check_team(team)
     return caught.value
 
 
-def told(invalid: InvalidInput) -> list[str]:
+def told(invalid: InvalidInputError) -> list[str]:
     """The messages; places in expressions depend on how they are written."""
     return sorted(one.message.partition(", at character")[0] for one in invalid.diagnostics)
 
@@ -85,7 +85,7 @@ def told(invalid: InvalidInput) -> list[str]:
 def test_the_messages_are_those_for_files(name: str, team: Team, tmp_path: Path) -> None:
     case = FILE_CASES[name]
     case.write(tmp_path)
-    with pytest.raises(InvalidInput) as of_files:
+    with pytest.raises(InvalidInputError) as of_files:
         read_team(tmp_path)
     of_objects = refused(AS_IN_FILES[name](team))
     assert told(of_objects) == told(of_files.value)
@@ -129,7 +129,7 @@ def test_two_thousand_mistakes_are_not_all_told(team: Team) -> None:
 
 def test_a_robot_alone(team: Team) -> None:
     check_robot(team["Robot3"])
-    with pytest.raises(InvalidInput, match=r"robot Robot1: weight=.0. in"):
+    with pytest.raises(InvalidInputError, match=r"robot Robot1: weight=.0. in"):
         check_robot(OF_OBJECTS["a weight of 0"].breakage(team)["Robot1"])
 
 
@@ -148,7 +148,7 @@ def test_costs_in_a_discsp_are_not_called_a_solution() -> None:
     assert solve(costly(), replace(HERE, protocol="sfb")).cost == 11
     wrong = replace(costly(), robots=tuple(replace(one, kind=Kind.DISCSP) for one in costly().robots))
     for attempt in (lambda: solve(wrong, HERE), lambda: robochoc.Problem(wrong)):
-        with pytest.raises(InvalidInput, match="a soft relation in a DisCSP"):
+        with pytest.raises(InvalidInputError, match="a soft relation in a DisCSP"):
             attempt()
 
 
@@ -157,9 +157,9 @@ def test_parents_that_are_left_out_are_missed() -> None:
     team = team_of({"A": range(1, 3), "B": range(1, 3)}, [Constraint("C", PREDEFINED["ne"], ("A", "B"), ("A", "B"))])
     assert solve(team, HERE).verified
     first, second = team.robots
-    with pytest.raises(InvalidInput, match="'RB' does not list 'RA' as its parent"):
+    with pytest.raises(InvalidInputError, match="'RB' does not list 'RA' as its parent"):
         solve(replace(team, robots=(first, replace(second, parents=()))), HERE)
-    with pytest.raises(InvalidInput, match="the child 'RB' is not in the team"):
+    with pytest.raises(InvalidInputError, match="the child 'RB' is not in the team"):
         solve(replace(team, robots=(first,)), HERE)
 
 
@@ -167,7 +167,7 @@ def test_parents_that_are_left_out_are_missed() -> None:
 def test_nothing_is_solved_or_told_of_an_invalid_team(protocol: str, team: Team) -> None:
     events: list[object] = []
     broken = AS_IN_FILES["a DisWCSP among DisCSPs"](team)
-    with pytest.raises(InvalidInput, match="the robot is a DisWCSP"):
+    with pytest.raises(InvalidInputError, match="the robot is a DisWCSP"):
         solve(broken, replace(HERE, protocol=protocol), observer=events.append)
     assert events == []
 
@@ -200,7 +200,7 @@ def test_what_a_field_says_is_held_against_the_rules(change: Change, message: st
     team = team_of({"A": range(1, 3), "B": range(1, 3)}, [])
     newcomer = AddAgent(Robot("RC", (Variable("C", Domain("D", (range(2),))),)))
     event = Event((newcomer, change))
-    with pytest.raises(InvalidInput, match=message):
+    with pytest.raises(InvalidInputError, match=message):
         solve(team, replace(HERE, protocol="dynabt"), field=lambda *_: event)
 
 
@@ -228,7 +228,7 @@ def test_a_team_that_was_read_is_not_looked_at_again(team: Team, monkeypatch: py
 
 def test_what_is_made_of_a_valid_team_is_not_valid_by_that(team: Team) -> None:
     check_team(team)
-    with pytest.raises(InvalidInput):
+    with pytest.raises(InvalidInputError):
         check_team(replace(team, robots=team.robots[1:]))
     invalid = AS_IN_FILES["a cost in a DisCSP"](team)
     for _ in range(2):
@@ -291,7 +291,7 @@ def test_what_is_valid_is_written_and_read_back(tmp_path_factory: pytest.TempPat
 
 @pytest.mark.parametrize("name", breakages())
 def test_nothing_is_written_of_what_is_not_valid(name: str, team: Team, tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput):
+    with pytest.raises(InvalidInputError):
         write_team(breakages()[name](team), tmp_path / "team")
     assert list(tmp_path.iterdir()) == []
 
@@ -304,7 +304,7 @@ def test_what_files_cannot_say_is_not_written(team: Team, tmp_path: Path, monkey
     large = team_of({"A": range(2), "B": range(2)}, [Constraint("C", big, ("A", "B", 1), ("A", "B", 1))])
     for unwritable, why in ((showing, "shows 'V3'"), (dynamic, "scenario"), (large, "larger than 2 MiB")):
         check_team(unwritable)
-        with pytest.raises(InvalidInput, match=why):
+        with pytest.raises(InvalidInputError, match=why):
             write_team(unwritable, tmp_path / "team")
         assert list(tmp_path.iterdir()) == []
 
@@ -332,14 +332,14 @@ def test_valid_here_is_valid_there(tmp_path_factory: pytest.TempPathFactory, see
     write_files(folder, files_of(team))
     try:
         again = read_team(folder)
-    except InvalidInput as invalid:
+    except InvalidInputError as invalid:
         of_files = told(invalid)
     else:
         of_files = []
         assert same(again, team)
     try:
         check_team(team)
-    except InvalidInput as invalid:
+    except InvalidInputError as invalid:
         of_objects = told(invalid)
     else:
         of_objects = []

@@ -10,12 +10,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from robochoc.journal.events import AnyEvent, Began, Event
-from robochoc.journal.journal import BadJournal, read_journal
+from robochoc.journal.journal import JournalError, read_journal
 from robochoc.sniffer import following
 from robochoc.sniffer.cache import Cache
 from robochoc.sniffer.following import Following, by_time
 from robochoc.sniffer.trace import Trace
-from robochoc.sniffer.window import NoFile, Window
+from robochoc.sniffer.window import NoFileError, Window
 from tests.support.sniffed import header, journal_of, told
 
 EVENTS, OUTCOME = told()
@@ -92,7 +92,7 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
     folder = os.open(tmp_path, os.O_RDONLY)
     try:
         for descriptor in (reading, folder):
-            with pytest.raises(NoFile):
+            with pytest.raises(NoFileError):
                 Window(descriptor)
     finally:
         for descriptor in (reading, writing, folder):
@@ -106,7 +106,7 @@ def test_no_bytes_do_harm(tmp_path: Path, content: bytes) -> None:
     try:
         while follows.advance():
             pass
-    except BadJournal:
+    except JournalError:
         return
     assert follows.trace is None or follows.trace.over
 

@@ -10,9 +10,9 @@ import pytest
 
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Given
-from robochoc.journal.given import BadGiven, TeamReader, TeamWriter, brief_of, void_of
+from robochoc.journal.given import GivenProblemError, TeamReader, TeamWriter, brief_of, void_of
 from robochoc.model.change import without
-from robochoc.model.orders import CannotTurn, Order, in_order
+from robochoc.model.orders import Order, OrderError, in_order
 from robochoc.model.problem import Constraint, Domain, Kind, Relation, Robot, Semantics, Team, Variable
 from robochoc.solver.agent_problem import Brief
 from robochoc.solver.explanation import void
@@ -66,7 +66,7 @@ def through(given: Given) -> Given:
 def arranged(team: Team, chance: Random) -> Team:
     try:
         return in_order(team, chance.choice((Order.GIVEN, Order.MIN_WIDTH, Order.MAX_DEGREE)))
-    except CannotTurn:
+    except OrderError:
         return team
 
 
@@ -110,7 +110,7 @@ def test_a_team_that_cannot_be_written_is_told_so() -> None:
     given = TeamWriter().given(team)
     assert given.why == "RB cannot be written: the cost 5.0 of C is no integer"
     assert given.robots == {}
-    with pytest.raises(BadGiven, match=r"could not be written: RB cannot be written: the cost 5\.0"):
+    with pytest.raises(GivenProblemError, match=r"could not be written: RB cannot be written: the cost 5\.0"):
         TeamReader().team(given)
 
 
@@ -135,12 +135,12 @@ def test_one_that_can_be_written_after_it_is_told_whole() -> None:
 )
 def test_what_strangers_say_is_held_against_what_can_be(change: dict[str, object], says: str) -> None:
     given = msgspec.structs.replace(TeamWriter().given(queens3d(2)), **change)
-    with pytest.raises(BadGiven, match=says):
+    with pytest.raises(GivenProblemError, match=says):
         TeamReader().team(given)
 
 
 def test_two_robots_may_not_own_one_variable() -> None:
     given = TeamWriter().given(queens3d(2))
     files = {**given.robots, "Robot1.2": given.robots["Robot1.1"]}
-    with pytest.raises(BadGiven):
+    with pytest.raises(GivenProblemError):
         TeamReader().team(msgspec.structs.replace(given, robots=files))

@@ -20,9 +20,9 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.journal.blocks import LARGEST_BLOCK
 from robochoc.journal.events import AnyEvent, Began, Decided, Given, Heard, Improved, Received, Refused, Sent, Settled
 from robochoc.journal.journal import (
-    BadJournal,
     Follower,
     Header,
+    JournalError,
     JournalFile,
     Line,
     Recorder,
@@ -366,5 +366,5 @@ def test_a_runs_journal_is_small_and_has_everything(runtime: Runtime) -> None:
     "content", [b"", b"\x89", b"PK\x03\x04", b'{"event":"Began","protocol":"x","t":0}\n', b"[" * 10**6]
 )
 def test_what_is_no_journal_is_refused(content: bytes) -> None:
-    with pytest.raises(BadJournal):
+    with pytest.raises(JournalError):
         read_journal(content)

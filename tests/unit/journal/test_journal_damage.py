@@ -18,10 +18,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robochoc.journal.blocks import BEGINNING, LARGEST_BLOCK, PREAMBLE, framed
-from robochoc.journal.columns import BadBlock, columns_of, entries_of
+from robochoc.journal.columns import BlockError, columns_of, entries_of
 from robochoc.journal.entries import Ended
 from robochoc.journal.events import AnyEvent, Began, Decided, Lost, Received, Sent, Settled
-from robochoc.journal.journal import BadJournal, Follower, Header, Line, Recorder, lines_of, read_journal
+from robochoc.journal.journal import Follower, Header, JournalError, Line, Recorder, lines_of, read_journal
 from robochoc.model.outcome import Outcome, Verdict
 
 HEADER = Header(team="four", protocol="abt", runtime="simulator", seed=0)
@@ -83,7 +83,7 @@ def holds_no_lie(content: bytes, lines: list[Line], where: str) -> bool:
     """What comes of reading `content`, of which `lines` are true; whether anything could be read."""
     try:
         found, damage = lines_in(content)
-    except BadJournal:
+    except JournalError:
         return False
     assert found == lines[: len(found)], where
     # All is there but for the end, of which nobody can tell that it is missing when it was a block of its own.
@@ -116,7 +116,7 @@ def test_every_truncation_of_the_text_form() -> None:
     for length in range(0, len(content), 3):
         try:
             found, damage = lines_in(content[:length])
-        except BadJournal:
+        except JournalError:
             assert length <= content.index(b"\n")
             continue
         assert found == lines[: len(found)]
@@ -188,7 +188,7 @@ def test_corruptions_of_the_text_form_never_crash() -> None:
     for _ in range(1000):
         bad = bytearray(content)
         bad[chance.randrange(len(bad))] = chance.randrange(256)
-        with suppress(BadJournal):
+        with suppress(JournalError):
             read_journal(bytes(bad))
 
 
@@ -221,7 +221,7 @@ def test_a_block_that_unpacks_to_more_than_it_says_is_refused_unread() -> None:
     journal = PREAMBLE + sizes + digest + packed
     tracemalloc.start()
     try:
-        with pytest.raises(BadJournal, match="another length"):
+        with pytest.raises(JournalError, match="another length"):
             read_journal(journal)
         assert tracemalloc.get_traced_memory()[1] < 10 * 2**20
     finally:
@@ -235,23 +235,23 @@ def test_a_block_that_claims_too_much_is_refused(sizes: tuple[int, int]) -> None
 
 
 def test_other_versions_are_refused_with_both_numbers() -> None:
-    with pytest.raises(BadJournal, match="of format 9, and this robochoc reads format 1"):
+    with pytest.raises(JournalError, match="of format 9, and this robochoc reads format 1"):
         read_journal(made(columns(HEADER), preamble=PREAMBLE[:8] + struct.pack("<HH", 9, 0)))
-    with pytest.raises(BadJournal, match="entries are of version 7, and this robochoc reads 1 and 2"):
+    with pytest.raises(JournalError, match="entries are of version 7, and this robochoc reads 1 and 2"):
         read_journal(made(columns(msgspec.structs.replace(HEADER, version=7))))
-    with pytest.raises(BadJournal, match="checksum"):
+    with pytest.raises(JournalError, match="checksum"):
         read_journal(PREAMBLE[:10] + b"\x01\x00" + made(columns(HEADER))[12:])
 
 
 def test_entries_in_a_wrong_place_are_damage() -> None:
     lost = Lost(t=0, robot="R", why="")
     ended = Ended(outcome=Outcome("four", "abt", "simulator", 0, Verdict.SOLUTION))
-    with pytest.raises(BadJournal, match="expected the header"):
+    with pytest.raises(JournalError, match="expected the header"):
         read_journal(made(columns(lost)))
     assert "a second header" in str(read_journal(made(columns(HEADER), columns(HEADER))).damage)
     assert "more follows the end" in str(read_journal(made(columns(HEADER, ended), columns(lost))).damage)
     for first in ((HEADER, HEADER), (HEADER, ended, lost), (lost, HEADER), ()):
-        with pytest.raises(BadJournal):
+        with pytest.raises(JournalError):
             read_journal(made(columns(*first)))
     assert read_journal(made(columns(HEADER))).damage is None
     assert read_journal(made(columns(HEADER), columns())).events == ()
@@ -293,7 +293,7 @@ def test_columns_that_were_altered_are_entries_or_refused(place: int, within: in
         parts[place] = new
     try:
         lines = entries_of(msgspec.msgpack.encode(parts))
-    except BadBlock:
+    except BlockError:
         return
     text = msgspec.json.encode(lines)
     assert len(msgspec.json.decode(text, type=list[Line])) == len(lines)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from robochoc.formats import PREDEFINED
-from robochoc.model.change import BadChange, changed, changed_by, rejoined, without
+from robochoc.model.change import ChangeError, changed, changed_by, rejoined, without
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
@@ -50,8 +50,8 @@ def links(team: Team) -> dict[str, dict[str, tuple[str, ...]]]:
     return {robot.name: {child.name: child.variables for child in robot.children} for robot in team.robots}
 
 
-def refused(team: Team, *changes: Change) -> BadChange:
-    with pytest.raises(BadChange) as caught:
+def refused(team: Team, *changes: Change) -> ChangeError:
+    with pytest.raises(ChangeError) as caught:
         changed(team, changes)
     assert str(caught.value) == caught.value.message
     assert caught.value.hint
@@ -314,5 +314,5 @@ def test_a_file_that_has_changed_meanwhile_may_not_fit(robot: Robot, message: st
     below = team_of(dict.fromkeys("ABCDE", (1, 2)), [differ("D", "E")])["RE"]
     above = replace(team["RD"], children=(Child("RE", ("D",)),))
     team = replace(team, robots=(*team.robots[:3], above, below))
-    with pytest.raises(BadChange, match=re.escape(message)):
+    with pytest.raises(ChangeError, match=re.escape(message)):
         rejoined(team, robot)

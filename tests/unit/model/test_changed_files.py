@@ -10,7 +10,7 @@ from pathlib import Path
 from random import Random
 
 from robochoc.formats import read_robot, read_team, write_team
-from robochoc.model.change import BadChange, rejoined, without
+from robochoc.model.change import ChangeError, rejoined, without
 from robochoc.model.problem import Constraint, Domain, Robot, Team
 from tests.protocols.test_abt import triangle
 from tests.support.changes import random_journey, stages
@@ -80,7 +80,7 @@ def test_a_team_that_a_robot_rejoined_could_stand_in_files(tmp_path: Path) -> No
                 continue
             try:
                 back = rejoined(last, first[name])
-            except BadChange:
+            except ChangeError:
                 continue
             came += 1
             check_files(back, tmp_path / "back")

@@ -19,7 +19,7 @@ from robochoc.model.expression import (
     ExpressionError,
     Name,
     Type,
-    Undefined,
+    UndefinedValueError,
     compiled,
     evaluate,
     names,
@@ -119,14 +119,14 @@ def folded(operator: str, x: int, y: int) -> int | None:
 def value(expression: Expression, values: Mapping[str, int]) -> int | None:
     try:
         return evaluate(expression, values)
-    except Undefined:
+    except UndefinedValueError:
         return None
 
 
 def compiled_value(expression: Expression, values: Mapping[str, int]) -> int | None:
     try:
         return compiled(expression, list(values))(list(values.values()))
-    except Undefined:
+    except UndefinedValueError:
         return None
 
 

@@ -30,7 +30,7 @@ from robochoc.journal.journal import Header, Journal, Recorder, read_journal
 from robochoc.model.message import Message, Value
 from robochoc.protocols.abt import ABT, Nogood
 from robochoc.protocols.dynabt import DynABT
-from robochoc.replay import CannotReplay, Means, Replayed, replay
+from robochoc.replay import CannotReplayError, Means, Replayed, replay
 from robochoc.run.orchestrator import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_names
 from robochoc.run.scenario import Announcer, Journey
@@ -297,7 +297,7 @@ def without_given(journal: Journal) -> Journal:
 def test_files_help_where_the_journal_does_not_say_what_robots_were_given() -> None:
     team = queens3d(3)
     journal = without_given(recorded(team, replace(FOUR, withdraw=Withdrawal.MAXIMAL)))
-    with pytest.raises(CannotReplay, match="--team DIR") as caught:
+    with pytest.raises(CannotReplayError, match="--team DIR") as caught:
         replay(journal)
     assert not caught.value.broken
     assert identical(replay(journal, Means(team=team)))
@@ -319,7 +319,7 @@ def test_settings_and_orders_that_only_the_command_line_knows() -> None:
 
 def test_a_protocol_that_is_not_installed(four: Journal) -> None:
     events = [msgspec.structs.replace(e, protocol="Telepathy") if isinstance(e, Began) else e for e in four.events]
-    with pytest.raises(CannotReplay, match="no protocol whose class is called 'Telepathy' is installed"):
+    with pytest.raises(CannotReplayError, match="no protocol whose class is called 'Telepathy' is installed"):
         replay(with_events(four, events))
 
 
@@ -342,7 +342,7 @@ def test_a_journal_of_strangers_raises_nothing_else() -> None:
         events[place] = event
         try:
             outcomes.add(replay(with_events(journal, events)).identical)
-        except CannotReplay as why:
+        except CannotReplayError as why:
             outcomes.add(why.broken)
     assert outcomes == {True, False}
 

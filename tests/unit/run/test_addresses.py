@@ -6,24 +6,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.run.networked.address import DEFAULT_PORT, BadPlace, Place
+from robochoc.run.networked.address import DEFAULT_PORT, Address, AddressError
 
 
 @pytest.mark.parametrize(
     ("text", "place"),
     [
-        ("192.168.1.14", Place("192.168.1.14", DEFAULT_PORT)),
-        ("192.168.1.14:7000", Place("192.168.1.14", 7000)),
-        ("master.example:7447", Place("master.example", 7447)),
-        ("[fe80::1]:7447", Place("fe80::1", 7447)),
-        ("[::1]", Place("::1", DEFAULT_PORT)),
-        ("::1", Place("::1", DEFAULT_PORT)),
-        ("host:", Place("host", DEFAULT_PORT)),
+        ("192.168.1.14", Address("192.168.1.14", DEFAULT_PORT)),
+        ("192.168.1.14:7000", Address("192.168.1.14", 7000)),
+        ("master.example:7447", Address("master.example", 7447)),
+        ("[fe80::1]:7447", Address("fe80::1", 7447)),
+        ("[::1]", Address("::1", DEFAULT_PORT)),
+        ("::1", Address("::1", DEFAULT_PORT)),
+        ("host:", Address("host", DEFAULT_PORT)),
     ],
 )
-def test_a_host_and_perhaps_a_port(text: str, place: Place) -> None:
-    assert Place.parse(text) == place
-    assert Place.parse(str(place)) == place
+def test_a_host_and_perhaps_a_port(text: str, place: Address) -> None:
+    assert Address.parse(text) == place
+    assert Address.parse(str(place)) == place
 
 
 @pytest.mark.parametrize(
@@ -31,15 +31,15 @@ def test_a_host_and_perhaps_a_port(text: str, place: Place) -> None:
     ["", ":7447", "host:0", "host:65535", "host:x", "a b:1", "tcp/host:1", "host:7447:1", "-h:1", "h-:1"],
 )
 def test_anything_else_is_told_what_was_expected(text: str) -> None:
-    with pytest.raises(BadPlace, match="HOST:PORT"):
-        Place.parse(text)
+    with pytest.raises(AddressError, match="HOST:PORT"):
+        Address.parse(text)
 
 
 @given(st.text(max_size=40))
 def test_no_text_does_worse_than_to_be_refused(text: str) -> None:
     try:
-        place = Place.parse(text)
-    except BadPlace:
+        place = Address.parse(text)
+    except AddressError:
         return
     assert 0 < place.port < place.enrolment_port < 65536
 
@@ -49,4 +49,4 @@ def test_no_text_does_worse_than_to_be_refused(text: str) -> None:
     [("127.0.0.1", False), ("0.0.0.0", True), ("::", True), ("master.example", False)],  # noqa: S104 - asked about only
 )
 def test_an_address_that_stands_for_all_is_the_name_of_none(host: str, *, anywhere: bool) -> None:
-    assert Place(host).anywhere is anywhere
+    assert Address(host).anywhere is anywhere

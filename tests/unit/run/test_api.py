@@ -11,12 +11,12 @@ import pytest
 
 import robochoc
 from robochoc.api import protocol_called
-from robochoc.formats import InvalidInput, write_team
+from robochoc.formats import InvalidInputError, write_team
 from robochoc.journal.events import AnyEvent, Concluded
 from robochoc.model.outcome import Outcome, Verdict
-from robochoc.run.networked.address import BadPlace
-from robochoc.run.registry import UnknownProtocol, offers
-from robochoc.solver.encoding import Unsupported
+from robochoc.run.networked.address import AddressError
+from robochoc.run.registry import UnknownProtocolError, offers
+from robochoc.solver.encoding import UnsupportedError
 from tests.conformance.test_epochs import differ
 from tests.support.machines import Site
 from tests.support.problems import team_of
@@ -73,12 +73,12 @@ def test_the_protocol_that_suits_costs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "error", "told"),
     [
-        ({"protocol": "nonsense"}, UnknownProtocol, "nonsense"),
+        ({"protocol": "nonsense"}, UnknownProtocolError, "nonsense"),
         ({"runtime": "clouds"}, ValueError, "clouds"),
         ({"order": "clouds"}, ValueError, "clouds"),
         ({"withdraw": "clouds"}, ValueError, "clouds"),
         ({"colour": "red"}, TypeError, "colour"),
-        ({"settings": {"colour": "red"}}, Unsupported, "colour"),
+        ({"settings": {"colour": "red"}}, UnsupportedError, "colour"),
     ],
 )
 def test_what_is_no_option(options: dict[str, object], error: type[Exception], told: str) -> None:
@@ -88,10 +88,10 @@ def test_what_is_no_option(options: dict[str, object], error: type[Exception], t
 
 
 def test_what_is_no_team(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match="nowhere"):
+    with pytest.raises(InvalidInputError, match="nowhere"):
         robochoc.load(tmp_path / "nowhere")
     (tmp_path / "A.xml").write_text(COSTS.replace("1..3", "3..1"))
-    with pytest.raises(InvalidInput, match=r"A\.xml:3"):
+    with pytest.raises(InvalidInputError, match=r"A\.xml:3"):
         robochoc.load(tmp_path)
 
 
@@ -127,7 +127,7 @@ def test_every_protocol_has_a_class_that_names_it() -> None:
 
 @pytest.mark.parametrize("word", ["", "XYZ", "ABT "])
 def test_protocols_that_nobody_knows(word: str) -> None:
-    with pytest.raises(UnknownProtocol, match="robochoc protocols"):
+    with pytest.raises(UnknownProtocolError, match="robochoc protocols"):
         protocol_called(word)
 
 
@@ -137,9 +137,9 @@ def test_containers_that_were_not_told_all(tmp_path: Path) -> None:
         container.run()
     with pytest.raises(ValueError, match="'RobotABT' is no type of agent"):
         container.set_agent_type("RobotABT")
-    with pytest.raises(UnknownProtocol):
+    with pytest.raises(UnknownProtocolError):
         container.set_agent_type("AgentXYZ")
-    with pytest.raises(BadPlace, match="HOST:PORT"):
+    with pytest.raises(AddressError, match="HOST:PORT"):
         container.set_main_container("no where")
     container.set_agent_type("AgentABT")
     with pytest.raises(ValueError, match="set_main_container"):

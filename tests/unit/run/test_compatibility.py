@@ -12,7 +12,7 @@ from robochoc.run import compatibility as refusals
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.orchestrator import solve
 from robochoc.run.registry import Offer, offers
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.exact import EXACT
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of
@@ -43,7 +43,7 @@ def options_for(name: str, withdraw: Withdrawal | None = None) -> Options:
 
 
 def refused(team: Team, options: Options) -> str:
-    with pytest.raises(Unsupported) as refusal:
+    with pytest.raises(UnsupportedError) as refusal:
         solve(team, options)
     return str(refusal.value)
 
@@ -83,7 +83,7 @@ def test_whoever_is_named_in_any_refusal_takes_the_team(withdraw: Withdrawal | N
     for offer in offers():
         try:
             solve(team, options_for(offer.name, withdraw))
-        except Unsupported as refusal:
+        except UnsupportedError as refusal:
             sent_to |= set(named(str(refusal))) or {str(refusal).rpartition("; ")[2]}
     alone = {one for one in sent_to if " " in one}
     assert alone <= {"no protocol that is installed does"}

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from robochoc.services import descriptions, directory
-from robochoc.services.descriptions import AgentDescription, Reason, Refused, ServiceDescription, matches
+from robochoc.services.descriptions import AgentDescription, Reason, RequestRefusedError, ServiceDescription, matches
 from robochoc.services.directory import Directory, Notice
 
 LASER = ServiceDescription("eyes", "laser", "Ann", ("abt", "afc"), ("o",), ("sl",), (("range", "30"), ("unit", "m")))
@@ -80,7 +80,7 @@ def test_everybody_speaks_for_himself_only() -> None:
         lambda: there.deregister("r1", requester="r2"),
     )
     for forbidden in acts:
-        with pytest.raises(Refused) as caught:
+        with pytest.raises(RequestRefusedError) as caught:
             forbidden()
         assert caught.value.reason is Reason.UNAUTHORISED
     assert there.search(ANYBODY, 0) == (described("r1"),)
@@ -95,10 +95,10 @@ def test_registered_once_known_or_not() -> None:
         lambda: there.unsubscribe("r1"),
     )
     for unknown in acts:
-        with pytest.raises(Refused, match=r"^not-registered$"):
+        with pytest.raises(RequestRefusedError, match=r"^not-registered$"):
             unknown()
     there.register(described("r1"), 0, requester="r1")
-    with pytest.raises(Refused, match=r"^already-registered$"):
+    with pytest.raises(RequestRefusedError, match=r"^already-registered$"):
         there.register(described("r1"), 0, requester="r1")
     there.deregister("r1", requester="r1")
     there.register(described("r1"), 0, requester="r1")
@@ -114,7 +114,7 @@ def test_a_lease_ends_unless_it_is_renewed_or_modified() -> None:
     assert names(there.search(ANYBODY, 10)) == ["modified", "renewed", "stays"]
     assert there.expire(10) == ("gone",)
     assert there.expire(10) == ()
-    with pytest.raises(Refused, match="not-registered"):
+    with pytest.raises(RequestRefusedError, match="not-registered"):
         there.renew("modified", 14, requester="modified")
     assert there.expire(19) == ("modified", "renewed")
     assert names(there.search(ANYBODY, 1e9)) == ["stays"]
@@ -175,7 +175,7 @@ def test_several_templates_of_one_subscriber_are_one_view() -> None:
     there.modify(described("r1", None, "abt"), 0, requester="r1")
     there.unsubscribe("watch")
     assert there.notices() == ()
-    with pytest.raises(Refused, match="not-registered"):
+    with pytest.raises(RequestRefusedError, match="not-registered"):
         there.unsubscribe("watch", ANYBODY)
 
 
@@ -205,7 +205,7 @@ MANY = tuple(map(str, range(descriptions.MAX_NAMES + 1)))
 )
 def test_what_is_incomplete_or_too_large_is_refused(description: AgentDescription, about: str) -> None:
     there = Directory()
-    with pytest.raises(Refused, match=about) as caught:
+    with pytest.raises(RequestRefusedError, match=about) as caught:
         there.register(description, 0, requester=description.name)
     assert len(str(caught.value)) < 100
     assert not len(there)
@@ -213,7 +213,7 @@ def test_what_is_incomplete_or_too_large_is_refused(description: AgentDescriptio
 
 def test_templates_are_bounded_too() -> None:
     for ask in (Directory().search, lambda template, now: Directory().subscribe("w", template, now)):
-        with pytest.raises(Refused, match="unrecognised-parameter-value"):
+        with pytest.raises(RequestRefusedError, match="unrecognised-parameter-value"):
             ask(AgentDescription(protocols=MANY), 0)
 
 
@@ -224,9 +224,9 @@ def test_the_directory_fills_up(monkeypatch: pytest.MonkeyPatch) -> None:
     for robot in ("r1", "r2"):
         there.register(described(robot, 5), 0, requester=robot)
         there.subscribe(robot, ANYBODY, 0)
-    with pytest.raises(Refused, match=r"internal-error .* full"):
+    with pytest.raises(RequestRefusedError, match=r"internal-error .* full"):
         there.register(described("r3"), 0, requester="r3")
-    with pytest.raises(Refused, match=r"internal-error .* full"):
+    with pytest.raises(RequestRefusedError, match=r"internal-error .* full"):
         there.subscribe("r3", ANYBODY, 0)
     there.subscribe("r1", ANYBODY, 0)
     there.register(described("r3"), 5, requester="r3")

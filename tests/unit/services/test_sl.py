@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import robochoc.services.sl
 from robochoc.services.communicative_acts import Performative
-from robochoc.services.descriptions import AgentDescription, Refused, ServiceDescription
+from robochoc.services.descriptions import AgentDescription, RequestRefusedError, ServiceDescription
 from robochoc.services.directory import Directory
 from robochoc.services.facilitator import handle
 from robochoc.services.identifier import AgentIdentifier, expression_of, identifier_of, identifier_on
@@ -25,7 +25,17 @@ from robochoc.services.sl import (
     df_on,
     request,
 )
-from robochoc.services.symbolic import BadExpression, Caps, Expression, List, String, Word, name, read, written
+from robochoc.services.symbolic import (
+    Caps,
+    Expression,
+    List,
+    String,
+    SymbolicExpressionError,
+    Word,
+    name,
+    read,
+    written,
+)
 from tests.support.clocks import working
 
 CAPS = Caps(10_000, 100, 10)
@@ -103,7 +113,7 @@ def foreign(expression: Expression) -> object:
     ],
 )
 def test_bad_expressions_are_told_with_their_place(text: str, message: str, at: int) -> None:
-    with pytest.raises(BadExpression, match=message) as caught:
+    with pytest.raises(SymbolicExpressionError, match=message) as caught:
         read(text, CAPS)
     assert caught.value.at == at
 
@@ -119,7 +129,7 @@ def test_backslashes_before_other_characters_stand_for_themselves() -> None:
 @given(st.text(alphabet='()":#\\ ab0\n', max_size=40))
 @settings(max_examples=300)
 def test_any_text_is_read_or_refused(text: str) -> None:
-    with contextlib.suppress(BadExpression):
+    with contextlib.suppress(SymbolicExpressionError):
         expression = read(text, CAPS)
         assert read(written(expression), Caps(200, 100, 10)) == expression
 
@@ -128,7 +138,7 @@ def test_millions_of_escapes_take_no_time() -> None:
     many = 5_000_000
     with working(3):
         assert read('"' + '\\"' * many + '"', Caps(3 * many, 1, 1)) == String('"' * many)
-        with pytest.raises(BadExpression, match="never closed"):
+        with pytest.raises(SymbolicExpressionError, match="never closed"):
             read('"' + '\\"' * many, Caps(3 * many, 1, 1))
 
 
@@ -291,9 +301,9 @@ def test_any_content_has_an_answer(act: str) -> None:
 
 def test_what_is_no_result_is_no_answer_to_a_search() -> None:
     for content in ("((done x))", "((result x))", "((result x (list)))"):
-        with pytest.raises(BadExpression):
+        with pytest.raises(SymbolicExpressionError):
             descriptions_in(content)
-    with pytest.raises(Refused, match="unexpected-parameter"):
+    with pytest.raises(RequestRefusedError, match="unexpected-parameter"):
         descriptions_in("((result x (set (df-agent-description :wings 2))))")
 
 

@@ -18,7 +18,7 @@ from robochoc.services.facilitator import handle
 from robochoc.services.identifier import AgentIdentifier
 from robochoc.services.sl import REQUEST_CAPS, Function, df_on, request
 from robochoc.services.symbolic import Expression, read
-from robochoc.sniffer.acl import ACLMessage, BadACL, parse, text
+from robochoc.sniffer.acl import ACLError, ACLMessage, parse, text
 from robochoc.sniffer.performatives import ACTS, OTHERWISE, act_of
 from tests.support.program import ROOT
 from tests.support.talks import (
@@ -133,7 +133,7 @@ def test_messages_of_others_are_read_in_any_case_and_layout() -> None:
     ],
 )
 def test_bad_texts_are_told_with_their_place(bad: str, message: str, at: int) -> None:
-    with pytest.raises(BadACL, match=message) as caught:
+    with pytest.raises(ACLError, match=message) as caught:
         parse(bad)
     assert caught.value.at == at
     assert len(str(caught.value)) < 200
@@ -145,7 +145,7 @@ def test_any_text_is_a_message_or_bad(anything: str) -> None:
     for whole in (anything, f"(INFORM {anything})", f"(INFORM :sender (agent-identifier {anything}))"):
         try:
             acl = parse(whole)
-        except BadACL:
+        except ACLError:
             continue
         assert parse(text(acl)) == acl
 

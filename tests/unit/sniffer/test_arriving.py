@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.network.journal_server import PIECE_BYTES, Piece
-from robochoc.journal.blocks import BEGINNING, PREAMBLE, Damaged, framed
-from robochoc.journal.entries import BadJournal
-from robochoc.run.networked.address import Place
+from robochoc.journal.blocks import BEGINNING, PREAMBLE, JournalDamagedError, framed
+from robochoc.journal.entries import JournalError
+from robochoc.run.networked.address import Address
 from robochoc.sniffer.remote import Arriving, Followed, WholeBlocks
 
 RUN = "run"
@@ -41,7 +41,7 @@ class Kept:
 
     def __init__(self) -> None:
         self.content = b""
-        self.journal = Arriving(Place("master"), RUN, self._keep)
+        self.journal = Arriving(Address("master"), RUN, self._keep)
 
     def _keep(self, whole: bytes) -> None:
         self.content += whole
@@ -72,7 +72,7 @@ def test_nothing_is_kept_from_where_a_byte_is_another(place: int, change: int) -
 def test_a_block_that_is_missing_doubled_or_cut() -> None:
     missing, doubled = b"".join(BLOCKS[:3] + BLOCKS[4:]), b"".join(BLOCKS[:4] + BLOCKS[3:])
     for content in (missing, doubled):
-        with pytest.raises(Damaged, match="checksum"):
+        with pytest.raises(JournalDamagedError, match="checksum"):
             WholeBlocks().take(content)
     kept = Kept()
     ending = kept.journal.take(told(0, WHOLE[:-1], over=True))
@@ -80,7 +80,7 @@ def test_a_block_that_is_missing_doubled_or_cut() -> None:
         over=False, why=f"the run is over, but of its journal byte {ENDS[-2]:,}: it ends within a block"
     )
     assert kept.content == WHOLE[: ENDS[-2]]
-    with pytest.raises(BadJournal):
+    with pytest.raises(JournalError):
         WholeBlocks().take(b"{}")
 
 

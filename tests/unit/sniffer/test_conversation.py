@@ -24,7 +24,7 @@ from robochoc.protocols.first_fit import FirstFit
 from robochoc.run.registry import protocol_named
 from robochoc.services.communicative_acts import Performative
 from robochoc.services.identifier import AgentIdentifier
-from robochoc.sniffer.acl import ACLMessage, BadACL
+from robochoc.sniffer.acl import ACLError, ACLMessage
 from robochoc.sniffer.conversation import MAX_JSON, Conversation
 from robochoc.sniffer.performatives import ACTS
 from tests.support.cost_problems import random_cost_team
@@ -193,7 +193,7 @@ def test_an_envelope_has_all_parameters_that_apply() -> None:
 )
 def test_what_no_robot_would_send_is_no_envelope(changed: dict[str, Any], message: str) -> None:
     forged = msgspec.structs.replace(conversation().acl_of(OK, 1), **changed)
-    with pytest.raises(BadACL, match=re.escape(message)) as caught:
+    with pytest.raises(ACLError, match=re.escape(message)) as caught:
         conversation().envelope_of(forged)
     assert caught.value.at is None
     assert len(str(caught.value)) < 300
@@ -201,7 +201,7 @@ def test_what_no_robot_would_send_is_no_envelope(changed: dict[str, Any], messag
 
 def test_what_is_no_message_has_no_acl_message() -> None:
     for content in (b"", b"\xc0", encode(Ok((3,)))[:-1], b"\x91" * 100_000):
-        with pytest.raises(BadACL, match="no message of abt"):
+        with pytest.raises(ACLError, match="no message of abt"):
             conversation().acl_of(OK._replace(content=content), 1)
 
 

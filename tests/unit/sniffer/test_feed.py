@@ -17,7 +17,7 @@ from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.sniffer.acl import parse
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.conversation import Conversation
-from robochoc.sniffer.feed import DETAILS, MOST_EPOCHS, MOST_NOTES, MOST_ROWS, BadRequest, Feed, verdict_of
+from robochoc.sniffer.feed import DETAILS, MOST_EPOCHS, MOST_NOTES, MOST_ROWS, BadRequestError, Feed, verdict_of
 from robochoc.sniffer.packed import packed_feed
 from robochoc.sniffer.speech import PLATFORM
 from robochoc.sniffer.trace import Trace
@@ -74,12 +74,12 @@ def test_decisions_are_those_of_the_journal() -> None:
 def test_rows_that_are_not_there_or_too_many_are_refused(name: str) -> None:
     feed = fed("abt")
     for first, end in ((0, 1 << 40), (5, 4), (-1, 3), (1 << 40, 1 << 41)):
-        with pytest.raises(BadRequest, match="there are no rows"):
+        with pytest.raises(BadRequestError, match="there are no rows"):
             getattr(feed, name)(first, end)
     events = (Settled(t=0, robot="a", clock=0, checks=0) for _ in range(MOST_ROWS + 1))
     large = Feed(Trace.of(Journal(Header(team="", protocol="", runtime="", seed=0), tuple(events), None)))
     large.steps(1, MOST_ROWS + 1)
-    with pytest.raises(BadRequest, match="too many at once"):
+    with pytest.raises(BadRequestError, match="too many at once"):
         large.steps(0, MOST_ROWS + 1)
 
 
@@ -88,7 +88,7 @@ def test_details_come_in_chunks() -> None:
     assert len(told(feed.details(0))) == DETAILS
     assert [one["content"] for one in told(feed.details(1))] == [{"n": DETAILS + more} for more in range(3)]
     for chunk in (2, -1, 1 << 60):
-        with pytest.raises(BadRequest, match="no chunk"):
+        with pytest.raises(BadRequestError, match="no chunk"):
             feed.details(chunk)
 
 

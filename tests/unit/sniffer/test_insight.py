@@ -17,7 +17,7 @@ from robochoc.journal.events import Concluded, Sent, Settled, actor
 from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.findings import Best
-from robochoc.replay import CannotReplay, Means, State, states_of
+from robochoc.replay import CannotReplayError, Means, State, states_of
 from robochoc.replay.glance import LONGEST, glance
 from robochoc.replay.inspection import MOST_VALUES
 from robochoc.replay.phrases import Phrases
@@ -208,7 +208,7 @@ class Backwards(ABT):
 
 def test_another_protocol_than_the_one_recorded_is_no_insight() -> None:
     journal = recorded(pair(), SIMULATED)
-    with pytest.raises(CannotReplay, match="RB does not do again what was recorded: in its step 0 of run 0"):
+    with pytest.raises(CannotReplayError, match="RB does not do again what was recorded: in its step 0 of run 0"):
         list(states_of(journal, "RB", Means(protocols={"ABT": Backwards})))
 
 

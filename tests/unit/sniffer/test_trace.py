@@ -19,7 +19,7 @@ from robochoc.journal.journal import Header, Journal
 from robochoc.run.orchestrator import Options, Runtime, ScheduleName
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.feed import columns_of, steps_of
-from robochoc.sniffer.trace import MOST_COUNTED, MOST_NAMES, Trace, TraceTooLarge
+from robochoc.sniffer.trace import MOST_COUNTED, MOST_NAMES, Trace, TraceTooLargeError
 from tests.support.recorded import record, recorded
 
 HEADER = Header(team="a team", protocol="abt", runtime="simulator", seed=0)
@@ -268,7 +268,7 @@ def replace_clock(event: Sent, number: int) -> Sent:
 def test_more_names_than_can_be_told_apart_are_refused() -> None:
     trace = Trace(HEADER)
     trace.add(settled(f"r{number}") for number in range(MOST_NAMES))
-    with pytest.raises(TraceTooLarge, match="65535 names of robots"):
+    with pytest.raises(TraceTooLargeError, match="65535 names of robots"):
         trace.add([settled("one more")])
 
 

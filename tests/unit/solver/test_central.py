@@ -19,13 +19,13 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.model.expression import Type, parse
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Predicate, Relation, Semantics, Team
-from robochoc.run.orchestrator import Options, Refuted, Runtime, solve
+from robochoc.run.orchestrator import Options, RefutedError, Runtime, solve
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_words import Solved
 from robochoc.solver.central import Judge, Judgement
 from robochoc.solver.cliques import cliques, strengthened
 from robochoc.solver.encoding import Codes, Component, Network, Table
-from robochoc.solver.failures import SolverLost
+from robochoc.solver.failures import SolverLostError
 from robochoc.solver.merged import identifiers
 from robochoc.solver.symmetry import Symmetry, broken, orbits, symmetries
 from tests.conformance.test_complex_teams import by_hand
@@ -202,7 +202,7 @@ def test_when_the_time_is_over_the_judge_says_unknown() -> None:
 
 def test_a_no_solution_that_the_judge_refutes_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Judge, "judge", lambda *_, **__: Judgement(Verdict.SOLUTION))
-    with pytest.raises(Refuted, match="no solution, and a judge has found one"):
+    with pytest.raises(RefutedError, match="no solution, and a judge has found one"):
         solve(queens3d(4), Options(runtime=Runtime.SIMULATOR, verify=True))
 
 
@@ -302,5 +302,5 @@ def test_a_search_that_broke_off_proves_nothing(monkeypatch: pytest.MonkeyPatch)
     """ACE says so in one line of many; a broken-off search without solutions is no `no-solution`."""
     monkeypatch.setattr(AceProcess, "_hear", lambda *_: Solved(found=0, complete=False, solutions=b""))
     for options in ({"count": True}, {"count": False}):
-        with pytest.raises(SolverLost, match="stopped before"):
+        with pytest.raises(SolverLostError, match="stopped before"):
             Judge(always_ace=True).judge(queens3d(7), **options)

@@ -20,13 +20,13 @@ from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Se
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run.incumbent import absent
-from robochoc.run.orchestrator import Options, Refuted, Runtime, Withdrawal, solve
+from robochoc.run.orchestrator import Options, RefutedError, Runtime, Withdrawal, solve
 from robochoc.run.second_opinion import contradiction
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_words import Solved
 from robochoc.solver.central import Judge, Judgement
-from robochoc.solver.encoding import Unsupported
-from robochoc.solver.failures import SolverLost
+from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.failures import SolverLostError
 from robochoc.verification.checker import objections
 from robochoc.verification.objective import aside_cost
 from tests.support.complex_problems import complex_team, random_complex_team
@@ -115,19 +115,19 @@ def test_costs_are_compared_in_units_of_their_divisor(solver: AceProcess) -> Non
 def test_costs_beyond_what_ace_can_add_are_refused(solver: AceProcess) -> None:
     table = Relation("R", 2, Semantics.SOFT, ((1, 1), (2, 2)), (10**17, 3), 0)
     team = with_costs(team_of({"A": (1, 2), "B": (1, 2)}, [Constraint("C", table, ("A", "B"), ("A", "B"))]))
-    with pytest.raises(Unsupported, match=r"add up to 100,000,000,000,000,000 at worst.*written as infinity"):
+    with pytest.raises(UnsupportedError, match=r"add up to 100,000,000,000,000,000 at worst.*written as infinity"):
         solve(team, CENTRAL, solver=solver)
 
 
 def test_a_soft_constraint_with_too_many_prices_is_refused() -> None:
     domains = {"A": range(1100), "B": range(1100)}
     team = with_costs(team_of(domains, [Constraint("C7", PREDEFINED["ne"], ("A", "B"), ("A", "B"), cost=2)]))
-    with pytest.raises(Unsupported, match="constraint C7 has a price for 1,210,000 combinations"):
+    with pytest.raises(UnsupportedError, match="constraint C7 has a price for 1,210,000 combinations"):
         solve(team, CENTRAL)
 
 
 def test_counting_is_for_problems_without_costs() -> None:
-    with pytest.raises(Unsupported, match="is a DisWCSP, where every assignment"):
+    with pytest.raises(UnsupportedError, match="is a DisWCSP, where every assignment"):
         solve(coloring(3, 2, 2), replace(CENTRAL, count=True))
 
 
@@ -135,13 +135,13 @@ def test_an_answer_that_does_not_cost_what_the_judge_says_is_none(monkeypatch: p
     team = coloring(3, 2, 2)
     wrong = Judgement(Verdict.OPTIMAL, dict.fromkeys(team.variables, 1), cost=1, bound=1)
     monkeypatch.setattr(Judge, "judge", lambda *_, **__: wrong)
-    with pytest.raises(SolverLost, match="costs 3, and it says 1"):
+    with pytest.raises(SolverLostError, match="costs 3, and it says 1"):
         solve(team, CENTRAL)
 
 
 def test_a_search_that_broke_off_proves_no_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(AceProcess, "_hear", lambda *_: Solved(found=1, complete=False, solutions=b"\0" * 4 * 6))
-    with pytest.raises(SolverLost, match="stopped before"):
+    with pytest.raises(SolverLostError, match="stopped before"):
         Judge(always_ace=True).judge(coloring(3, 2, 2))
 
 
@@ -217,12 +217,12 @@ def test_everybody_may_have_to_step_aside(solver: AceProcess) -> None:
 
 
 def test_there_is_nothing_to_count_where_robots_step_aside() -> None:
-    with pytest.raises(Unsupported, match="--count is of solutions for all robots"):
+    with pytest.raises(UnsupportedError, match="--count is of solutions for all robots"):
         solve(queens3d(3), replace(FEWEST, count=True))
 
 
 def test_maximal_is_for_the_robots() -> None:
-    with pytest.raises(Unsupported, match="--withdraw fewest"):
+    with pytest.raises(UnsupportedError, match="--withdraw fewest"):
         solve(queens3d(3), replace(CENTRAL, withdraw=Withdrawal.MAXIMAL))
 
 
@@ -272,7 +272,7 @@ def test_a_least_cost_that_the_judge_finds_too_is_confirmed(monkeypatch: pytest.
 
 
 def test_a_cost_that_is_not_the_least_is_refuted(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(Refuted, match=r"the least cost, 3, and a judge has found one that costs 1$"):
+    with pytest.raises(RefutedError, match=r"the least cost, 3, and a judge has found one that costs 1$"):
         claimed(Cheapest, coloring(3, 2, 2), monkeypatch)
 
 
@@ -280,7 +280,7 @@ def test_more_aside_than_need_be_is_refuted(monkeypatch: pytest.MonkeyPatch) -> 
     """Nobody could be added, and yet: without the first, all others could stay."""
     pairs = [("A", name) for name in ("B", "C", "D")]
     star = team_of(dict.fromkeys("ABCD", (1,)), [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in pairs])
-    with pytest.raises(Refuted, match=r"the least cost, 3, and a judge has found one that costs 1$"):
+    with pytest.raises(RefutedError, match=r"the least cost, 3, and a judge has found one that costs 1$"):
         claimed(OnlyTheFirst, star, monkeypatch, withdraw=Withdrawal.FEWEST)
     heavy = replace(star, robots=(replace(star.robots[0], weight=3), *star.robots[1:]))
     outcome = claimed(OnlyTheFirst, heavy, monkeypatch, withdraw=Withdrawal.FEWEST)
@@ -306,7 +306,7 @@ def test_a_no_solution_of_costs_is_refuted_too(monkeypatch: pytest.MonkeyPatch) 
         def start(self) -> None:
             self.conclude(Verdict.NO_SOLUTION)
 
-    with pytest.raises(Refuted, match="has no solution, and a judge has found one"):
+    with pytest.raises(RefutedError, match="has no solution, and a judge has found one"):
         claimed(Never, coloring(3, 2, 2), monkeypatch)
 
 

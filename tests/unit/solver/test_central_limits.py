@@ -19,7 +19,7 @@ from robochoc.run.orchestrator import Options, solve
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import Judge, Judgement
 from robochoc.solver.encoding import Codes, Network, Table
-from robochoc.solver.failures import SolverTimeout
+from robochoc.solver.failures import SolverTimeoutError
 from robochoc.solver.weighted import priced
 from robochoc.verification.checker import cost, objections
 from tests.support.clocks import once, waiting
@@ -79,7 +79,7 @@ def test_a_task_that_is_given_up_has_a_best_once_ace_has_one(warm: AceProcess) -
 
     def best_of(limit: float) -> Codes | None:
         warm.begin(part.network, costs=part.costs)
-        with pytest.raises(SolverTimeout) as over:
+        with pytest.raises(SolverTimeoutError) as over:
             warm.answer(time.monotonic() + limit)
         return over.value.best
 

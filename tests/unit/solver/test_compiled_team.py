@@ -27,7 +27,7 @@ from robochoc.run.scenario import Journey
 from robochoc.solver.agent_problem import NO_BRIEF, parts
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, as_compiled
 from robochoc.solver.domain import CompiledDomain, compiled_domain
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.objective import Objective
 from tests.support.cost_problems import with_costs
 from tests.support.loose_problems import every_order, loose_team, turned_interface, untold_interface
@@ -215,5 +215,5 @@ def test_costs_that_come_later_must_fit_as_well() -> None:
         AddConstraint("RB", "RA", Constraint(f"D{number}", _UNLIKE, ("A", "B"), ("A", "B"), cost=most))
         for number in range(5)
     ]
-    with pytest.raises(Unsupported, match="scale them down"):
+    with pytest.raises(UnsupportedError, match="scale them down"):
         solve(replace(team, scenario=(Event(tuple(dear)),)), Options(protocol="dpop", runtime=Runtime.SIMULATOR))

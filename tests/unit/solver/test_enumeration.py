@@ -21,9 +21,9 @@ from robochoc.solver.ace import AceProcess
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.central import Judge
 from robochoc.solver.compile import Compiler, Limits, Source
-from robochoc.solver.domain import TooManySolutions
+from robochoc.solver.domain import TooManySolutionsError
 from robochoc.solver.encoding import Codes, Network, Table
-from robochoc.solver.enumeration import STEPS_BEFORE_ACE, STEPS_EACH, Budget, OutOfSteps, cheapest, enumerated
+from robochoc.solver.enumeration import STEPS_BEFORE_ACE, STEPS_EACH, Budget, OutOfStepsError, cheapest, enumerated
 from robochoc.solver.propagation import propagated
 from robochoc.solver.question import Means
 from robochoc.solver.weighted import Priced, priced
@@ -191,7 +191,7 @@ def test_the_same_steps_are_taken_every_time() -> None:
     assert len(set(used)) == 1
     assert enumerated(network, Budget(used[0]), limit=None, count_only=True).number == 40
     short = Budget(used[0] - 1)
-    with pytest.raises(OutOfSteps):
+    with pytest.raises(OutOfStepsError):
         enumerated(network, short, limit=None, count_only=True)
     assert short.used == short.steps
 
@@ -233,7 +233,7 @@ def test_wide_domains_take_steps_before_they_take_memory(width: int) -> None:
     network = Network((domain, domain), (equal,))
     tracemalloc.start()
     try:
-        with pytest.raises(OutOfSteps):
+        with pytest.raises(OutOfStepsError):
             enumerated(network, Budget(STEPS_EACH + STEPS_BEFORE_ACE), limit=2, count_only=False)
         assert tracemalloc.get_traced_memory()[1] < 1 << 20
     finally:
@@ -260,7 +260,7 @@ def test_local_solutions_are_limited_as_by_ace() -> None:
     robot = pair_of_five("ne").robots[0]
     with Compiler(Limits(solutions=20)) as compiler:
         assert compiler.compile(robot).domain.total == 20
-    with Compiler(Limits(solutions=19)) as compiler, pytest.raises(TooManySolutions, match="more than 19"):
+    with Compiler(Limits(solutions=19)) as compiler, pytest.raises(TooManySolutionsError, match="more than 19"):
         compiler.compile(robot)
 
 

@@ -12,7 +12,7 @@ from robochoc.formats import PREDEFINED, write_team
 from robochoc.formats.xcsp3 import xcsp3
 from robochoc.model.problem import INFINITE, Constraint, Kind, Relation, Semantics, Team
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import least_cost, random_complex_cost_team, random_cost_team, with_costs
 from tests.support.problems import random_team, solutions, team_of
@@ -74,7 +74,7 @@ def test_ace_accepts_what_is_exported(batch: int, tmp_path: Path) -> None:
 @pytest.mark.parametrize("values", [(LEAST - 1,), (MOST + 1,), (10**17, 10**17 + 1), (-(10**17), 0), (0, LEAST, MOST)])
 def test_integers_that_ace_cannot_read_are_refused(values: tuple[int, ...]) -> None:
     team = team_of({"A": tuple(sorted(values)), "B": (1, 2)}, [])
-    with pytest.raises(Unsupported, match=r"has a variable A with the value .* ACE takes values from"):
+    with pytest.raises(UnsupportedError, match=r"has a variable A with the value .* ACE takes values from"):
         xcsp3(team)
 
 

@@ -15,7 +15,7 @@ from robochoc.formats import PREDEFINED, write_team
 from robochoc.formats.xcsp3 import xcsp3
 from robochoc.generators.coloring import coloring
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
-from robochoc.solver.encoding import Unsupported
+from robochoc.solver.encoding import UnsupportedError
 from tests.support.complex_problems import complex_team
 from tests.support.cost_problems import least_cost, random_complex_cost_team, random_cost_team, with_costs
 from tests.support.problems import team_of
@@ -104,7 +104,7 @@ def spared() -> Team:
 def test_costs_that_no_solver_could_add_are_not_exported() -> None:
     table = Relation("R", 2, Semantics.SOFT, ((1, 1),), (10**12,), 0)
     team = with_costs(team_of({"A": (1, 2), "B": (1, 2)}, [Constraint("C", table, ("A", "B"), ("A", "B"))]))
-    with pytest.raises(Unsupported, match="costs that add up to more than"):
+    with pytest.raises(UnsupportedError, match="costs that add up to more than"):
         xcsp3(team)
 
 

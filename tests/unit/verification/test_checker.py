@@ -15,7 +15,7 @@ from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.orchestrator import Options, Refuted, Runtime, solve
+from robochoc.run.orchestrator import Options, RefutedError, Runtime, solve
 from robochoc.verification.checker import cost, could_join, objections, price
 from tests.support.problems import ON_ONE_MACHINE, team_of, teams
 
@@ -101,5 +101,5 @@ class Liar(Protocol):
 @pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_a_protocol_that_lies_is_refuted(monkeypatch: pytest.MonkeyPatch, runtime: Runtime) -> None:
     monkeypatch.setattr(robochoc.run.orchestrator, "protocol_named", lambda _name: Liar)
-    with pytest.raises(Refuted, match=r"broken by V1\.1 = 1, V1\.2 = 1"):
+    with pytest.raises(RefutedError, match=r"broken by V1\.1 = 1, V1\.2 = 1"):
         solve(queens3d(3), Options(runtime=runtime))
