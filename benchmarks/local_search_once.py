@@ -17,7 +17,7 @@ from robochoc.formats import PREDEFINED
 from robochoc.model.problem import Child, Constraint, Domain, Kind, Parent, Robot, Team, Variable
 from robochoc.run.incumbent import course
 from robochoc.run.registry import protocol_named
-from robochoc.solver.agent_problem import Brief
+from robochoc.solver.agent_problem import RunParameters
 
 COLOURS = Domain("Colours", (range(3),))
 
@@ -54,7 +54,7 @@ def main() -> None:
     name, agents, degree, seed, cycles, *settings = sys.argv[1:]
     team = soft_colouring(int(agents), int(degree), int(seed))
     given = {"cycles": cycles, **dict(setting.split("=", 1) for setting in settings)}
-    run = Simulation(team, protocol_named(name), Concurrent(int(seed)), brief=Brief(int(seed), given))
+    run = Simulation(team, protocol_named(name), Concurrent(int(seed)), brief=RunParameters(int(seed), given))
     cpu_s, wall_s = time.process_time(), time.perf_counter()
     result = run.search()
     cpu_s, wall_s = time.process_time() - cpu_s, time.perf_counter() - wall_s

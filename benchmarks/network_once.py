@@ -29,8 +29,8 @@ from robochoc.authority.identity import Identity, IdentityTexts
 from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.local import LOOPBACK, LocalNetwork
 from robochoc.communication.network.router import RefusalObserver, Router
-from robochoc.communication.network.settings import LEASE_MS, Conditions
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.settings import LEASE_MS, NetworkSettings
+from robochoc.communication.network.transport import Transport
 from robochoc.communication.network.zenoh_config import config
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.processes.queues import QueueReader, QueueWriter
@@ -117,7 +117,7 @@ class PostEnd:
     """robochoc's post: mutual TLS, access control, advanced publishers and subscribers."""
 
     def __init__(self, endpoint: str, texts: IdentityTexts, other: str) -> None:
-        self._post = Post(endpoint, Identity.of(texts), watch=())
+        self._post = Transport(endpoint, Identity.of(texts), watch=())
         self._other = other
 
     def send(self, content: bytes) -> None:
@@ -180,7 +180,7 @@ def _search(how: Robots, protocol: type[Rally]) -> tuple[float, int]:
 
 def _session(how: Robots, protocol: type[Rally]) -> Session:
     if how.network:
-        return LocalNetwork(pair(), protocol, conditions=Conditions(filters=how.filters))
+        return LocalNetwork(pair(), protocol, conditions=NetworkSettings(filters=how.filters))
     return ProcessesRun(pair(), protocol)
 
 

@@ -20,11 +20,11 @@ from robochoc.journal.events import Observer
 from robochoc.model.orders import Order
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
-from robochoc.run.defaults import suits
+from robochoc.run.defaults import default_protocol
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.orchestrator import solve
 from robochoc.run.registry import UnknownProtocolError, offers
-from robochoc.run.scenario import Field
+from robochoc.run.scenario import Environment
 
 if TYPE_CHECKING:
     from robochoc.communication.network.robot import Ending
@@ -51,7 +51,7 @@ class Problem:
         withdraw: str | None = None,
         settings: Mapping[str, object] = {},
         observer: Observer | None = None,
-        field: Field | None = None,
+        field: Environment | None = None,
         **options: Any,  # noqa: ANN401 - the other fields of `Options`, by their names
     ) -> Outcome:
         """Let the robots solve it together; see `robochoc.run.options.Options` for what else can be said.
@@ -62,7 +62,7 @@ class Problem:
         `if __name__ == "__main__":`.
         """
         asked = Options(
-            protocol=protocol or suits(self.team.kind),
+            protocol=protocol or default_protocol(self.team.kind),
             runtime=Runtime(runtime),
             order=Order(order) if order else None,
             withdraw=Withdrawal(withdraw) if withdraw else None,

@@ -14,8 +14,8 @@ import msgspec
 from robochoc.journal.events import AnyEvent
 from robochoc.model.outcome import Metrics
 from robochoc.protocols.findings import Findings
-from robochoc.solver.agent_problem import Part
-from robochoc.solver.explanation import Void
+from robochoc.solver.agent_problem import AgentProblem
+from robochoc.solver.explanation import Invalidated
 
 QUEUES_AT_ONCE = 16
 """How many queues a robot asks for in one go. The parent holds so many descriptors more meanwhile."""
@@ -101,7 +101,7 @@ class Pause(_Control, frozen=True):
 
 
 class Change(_Control, frozen=True):
-    """A new epoch. `change` holds the robot's `Part` and what is `Void` (see `sealed`).
+    """A new epoch. `change` holds the robot's `AgentProblem` and what is `Invalidated` (see `sealed`).
 
     Robots in `gone` have left; if there are others of their names, queues to and from them are to be opened anew.
     """
@@ -129,12 +129,12 @@ class Wave(_Control, frozen=True):
     number: int
 
 
-def sealed(part: Part, void: Void) -> bytes:
+def sealed(part: AgentProblem, void: Invalidated) -> bytes:
     """What `Change` holds."""
     return bytes(ForkingPickler.dumps((part, void)))
 
 
-def unsealed(change: bytes) -> tuple[Part, Void]:
+def unsealed(change: bytes) -> tuple[AgentProblem, Invalidated]:
     """What `sealed` was given. Only for bytes from the own parent, over the socket that only the two of them have.
 
     A process is started with the same means (`multiprocessing`); no message of a protocol ever comes here.

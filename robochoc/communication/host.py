@@ -19,9 +19,9 @@ from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import DynamicProtocol, Protocol, Said, Settings
-from robochoc.solver.agent_problem import NO_BRIEF, Brief, Part
+from robochoc.solver.agent_problem import NO_BRIEF, AgentProblem, RunParameters
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.explanation import Void
+from robochoc.solver.explanation import Invalidated
 
 
 class SettingsError(ValueError):
@@ -50,11 +50,11 @@ class Host:
     """Drives one robot's protocol object."""
 
     @classmethod
-    def of(cls, protocol: type[Protocol], part: Part) -> Self:
+    def of(cls, protocol: type[Protocol], part: AgentProblem) -> Self:
         """A host for the robot whose part of the problem is `part`. Raises `UnsupportedError` (see `LocalProblem`)."""
         return cls(protocol(LocalProblem(part), PriorityOrder(part.order, part.links)), part.brief)
 
-    def __init__(self, protocol: Protocol, brief: Brief = NO_BRIEF) -> None:
+    def __init__(self, protocol: Protocol, brief: RunParameters = NO_BRIEF) -> None:
         self.protocol = protocol
         self.name = protocol.problem.agent
         self._equip(brief)
@@ -99,7 +99,7 @@ class Host:
         self._begun = True
         return self._step(protocol.start)
 
-    def change(self, part: Part, void: Void) -> None:
+    def change(self, part: AgentProblem, void: Invalidated) -> None:
         """A new epoch: the problem has changed to `part`, and counting begins again.
 
         A protocol that can goes on with what it knows; any other is begun anew. Raises `UnsupportedError`.
@@ -165,7 +165,7 @@ class Host:
         """What this robot has sent and checked so far; `ncccs` is its own clock."""
         return Metrics(dict(self.sent), self.bytes, self.clock, self.checks, largest=self.largest)
 
-    def _equip(self, brief: Brief) -> None:
+    def _equip(self, brief: RunParameters) -> None:
         """Give the protocol what it cannot have of itself: what was set, and chance."""
         protocol = self.protocol
         if brief.settings:

@@ -10,9 +10,9 @@ from typing import NamedTuple, Self
 from robochoc.communication.run_result import RunResult
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, Brief, Part, parts
+from robochoc.solver.agent_problem import NO_BRIEF, AgentProblem, RunParameters, agent_problems
 from robochoc.solver.compiled_team import CompiledTeam, as_compiled
-from robochoc.solver.explanation import Void
+from robochoc.solver.explanation import Invalidated
 
 
 class Epoch(NamedTuple):
@@ -23,19 +23,19 @@ class Epoch(NamedTuple):
     """
 
     compiled: CompiledTeam
-    void: Void = Void(frozenset(), frozenset())
+    void: Invalidated = Invalidated(frozenset(), frozenset())
     fresh: frozenset[str] = frozenset()
-    brief: Brief = NO_BRIEF
+    brief: RunParameters = NO_BRIEF
 
     @property
     def team(self) -> Team:
         """The team, in the order that its robots work in."""
         return self.compiled.team
 
-    def parts(self, protocol: type[Protocol]) -> dict[str, Part]:
+    def parts(self, protocol: type[Protocol]) -> dict[str, AgentProblem]:
         """What each robot knows when it speaks `protocol`."""
         traits = protocol.traits
-        return parts(self.compiled, self.brief, everywhere=traits.everywhere, tree=traits.tree)
+        return agent_problems(self.compiled, self.brief, everywhere=traits.everywhere, tree=traits.tree)
 
 
 class Session(ABC):

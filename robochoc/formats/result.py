@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from robochoc.model.outcome import Epoch, Metrics, Outcome, Place, Thoroughness, Verdict
+from robochoc.model.outcome import Epoch, Metrics, Outcome, PseudoTreeNode, Thoroughness, Verdict
 
 
 class ResultError(ValueError):
@@ -65,7 +65,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     order: str | None = None
     bound: float | int | None = None
     placed_by: str | None = None
-    tree: dict[str, Place] = {}
+    tree: dict[str, PseudoTreeNode] = {}
     confirmed: bool = False
     channel: str | None = None
     claimed_by: str | None = None

@@ -17,10 +17,10 @@ from robochoc.formats import InvalidInputError, robot_in, robot_xml
 from robochoc.formats.names import is_name
 from robochoc.journal.events import Given
 from robochoc.model.problem import INFINITE, Constraint, Domain, Relation, Robot, Team, Variable
-from robochoc.solver.agent_problem import NO_BRIEF, Brief
-from robochoc.solver.explanation import Void
+from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
+from robochoc.solver.explanation import Invalidated
 
-NOTHING_VOID = Void(frozenset(), frozenset())
+NOTHING_VOID = Invalidated(frozenset(), frozenset())
 _STAND_IN = (range(1),)
 """What is written for an empty domain, as a file has none."""
 
@@ -39,8 +39,8 @@ class TeamWriter:
     def given(
         self,
         team: Team,
-        brief: Brief = NO_BRIEF,
-        void: Void = NOTHING_VOID,
+        brief: RunParameters = NO_BRIEF,
+        void: Invalidated = NOTHING_VOID,
         *,
         fresh: Collection[str] = (),
         quiet: bool = True,
@@ -105,14 +105,14 @@ class TeamReader:
         return team
 
 
-def brief_of(given: Given) -> Brief:
+def brief_of(given: Given) -> RunParameters:
     """What all robots were told beside the problem."""
-    return Brief(given.seed, given.settings, given.aside)
+    return RunParameters(given.seed, given.settings, given.aside)
 
 
-def void_of(given: Given) -> Void:
+def void_of(given: Given) -> Invalidated:
     """What of the epoch before does not stand."""
-    return Void(frozenset(given.void_keys), frozenset(given.void_agents))
+    return Invalidated(frozenset(given.void_keys), frozenset(given.void_agents))
 
 
 def _as_given(robot: Robot, shown: tuple[str, ...], empty: Collection[str]) -> Robot:

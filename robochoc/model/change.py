@@ -89,7 +89,7 @@ def possible(team: Team, changes: Iterable[Change]) -> tuple[Team, list[Change]]
     return team, taken
 
 
-def described(change: Change) -> str:
+def describe_change(change: Change) -> str:
     """`change` in a few words."""
     match change:
         case RemoveAgent(name):

@@ -58,7 +58,7 @@ class Metrics:
 
 
 @dataclass(frozen=True)
-class Place:
+class PseudoTreeNode:
     """A robot's place in a pseudo-tree: who stands right above it (None: a root), and who else of its neighbours does.
 
     `pseudo_parents` are neighbours further up, on the way to the root.
@@ -86,7 +86,7 @@ class Epoch:
     witness: str | None = None
     lost: tuple[str, ...] = ()
     bound: float | None = None
-    tree: dict[str, Place] = field(default_factory=dict)
+    tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
     confirmed: bool = False
 
 
@@ -135,7 +135,7 @@ class Outcome:
     """The priority order that was asked for, by name; `listed` for one of the user's own."""
     bound: float | None = None
     """No assignment costs less (with withdrawal: no fewer robots, by weight, step aside); None: nobody can tell."""
-    tree: dict[str, Place] = field(default_factory=dict)
+    tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
     """The pseudo-tree that the robots have built, if their protocol builds one."""
     confirmed: bool = False
     """Whether the central judge, who was asked, comes to the same `no-solution` or the same least cost."""

@@ -18,7 +18,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 
 from robochoc.model.message import Message
-from robochoc.model.outcome import Place, Verdict
+from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
@@ -124,7 +124,7 @@ class TreeProtocol(Protocol):
     @property
     def findings(self) -> Findings:
         """The place in the tree."""
-        return Findings(place=Place(self.parent, self.pseudo_parents) if self.placed else None)
+        return Findings(place=PseudoTreeNode(self.parent, self.pseudo_parents) if self.placed else None)
 
     def _propagate(self, waves: Sequence[tuple[str, Wave]]) -> None:
         for receiver, wave in waves:

@@ -31,7 +31,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import DynamicProtocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.explanation import Void, domain_key
+from robochoc.solver.explanation import Invalidated, domain_key
 
 
 class Nogood(abt.Nogood, frozen=True):
@@ -62,7 +62,7 @@ class DynABT(ABT, DynamicProtocol):
         self.untold = []
         super().start()
 
-    def change(self, problem: LocalProblem, order: PriorityOrder, void: Void) -> None:
+    def change(self, problem: LocalProblem, order: PriorityOrder, void: Invalidated) -> None:
         """The propagation phase: keep what still stands."""
         for agent in void.agents:
             self._update(agent, None)
@@ -90,7 +90,7 @@ class DynABT(ABT, DynamicProtocol):
                 self.send(child, Ok(current))
         self.untold = []
 
-    def _adjust_nogoods(self, problem: LocalProblem, order: PriorityOrder, void: Void) -> None:
+    def _adjust_nogoods(self, problem: LocalProblem, order: PriorityOrder, void: Invalidated) -> None:
         """The store and the value, in the places that values have in the changed domain."""
         old, self.store = self.store, NogoodStore(order, len(problem.values))
         known = {} if problem.agent in void.agents else {value: i for i, value in enumerate(self.problem.values)}

@@ -10,7 +10,7 @@ from __future__ import annotations
 import msgspec
 
 from robochoc.model.message import Value
-from robochoc.model.outcome import Place
+from robochoc.model.outcome import PseudoTreeNode
 
 
 class Best(msgspec.Struct, frozen=True):
@@ -38,7 +38,7 @@ class Findings(msgspec.Struct, frozen=True):
 
     best: Best | None = None
     bound: float | None = None
-    place: Place | None = None
+    place: PseudoTreeNode | None = None
     trail: Trail | None = None
 
 

@@ -19,7 +19,7 @@ from robochoc.protocols.findings import NOTHING, Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.explanation import Void
+from robochoc.solver.explanation import Invalidated
 
 
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -115,7 +115,7 @@ class DynamicProtocol(Protocol):
     """
 
     @abstractmethod
-    def change(self, problem: LocalProblem, order: PriorityOrder, void: Void) -> None:
+    def change(self, problem: LocalProblem, order: PriorityOrder, void: Invalidated) -> None:
         """Take in the changed problem, and drop what rests on anything in `void`. Nobody is searching: say nothing.
 
         A verdict that stands in spite of the changes is kept, and ends the epoch at once.

@@ -33,8 +33,8 @@ tables that are made before the search (see `LocalProblem.tables`), so all const
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
->>> from robochoc.solver.agent_problem import Brief
->>> result = Simulation(queens3d(4), SFB, Concurrent(seed=0), brief=Brief(aside=1)).run()
+>>> from robochoc.solver.agent_problem import RunParameters
+>>> result = Simulation(queens3d(4), SFB, Concurrent(seed=0), brief=RunParameters(aside=1)).run()
 >>> sum(bool(values) for values in result.assignments.values())  # of 16, and no more can fly
 10
 >>> result.findings["Robot1.1"].bound

@@ -19,9 +19,9 @@ from robochoc.journal.journal import Header, Journal, metrics_of
 from robochoc.model.outcome import Epoch, Outcome, Verdict
 from robochoc.replay.rebuild import Ensemble
 from robochoc.replay.steps import Run
-from robochoc.run.evaluation import answered, placed
+from robochoc.run.evaluation import evaluate, evaluate_withdrawal
 from robochoc.run.options import CENTRAL
-from robochoc.run.registry import speaker
+from robochoc.run.registry import protocol_by_class
 from robochoc.solver.domain import TooManySolutionsError
 from robochoc.verification.checker import RefutedError
 
@@ -79,7 +79,7 @@ def contradictions(journal: Journal, runs: Sequence[Played], *, whole: bool) -> 
 def _beginning(header: Header, runs: Sequence[Run], placed_by: str | None) -> Iterator[Contradiction]:
     """The header, against what the robots were given. Where one alone had no solution, the search is left out."""
     first = next((run.began.protocol for run in runs if run.began), "")
-    found = speaker(first, [header.protocol])  # a class that is installed by no name may be played, too
+    found = protocol_by_class(first, [header.protocol])  # a class that is installed by no name may be played, too
     if found is not None and found[0] not in (header.protocol, placed_by):
         yield Contradiction(what="the header's protocol", recorded=header.protocol, replayed=found[0])
     for run in runs:
@@ -127,15 +127,15 @@ def _answer(run: Run, ensemble: Ensemble, outcome: Outcome) -> Epoch | Outcome |
     try:
         if given.aside is not None or _places(run, outcome):
             bare = Outcome(outcome.team, outcome.protocol, outcome.runtime, outcome.seed, Verdict.UNKNOWN)
-            return placed(bare, team, result, ensemble.compiled, given.aside)
-        return answered(Epoch(result.verdict, team.order), team, result, traits, ensemble.compiled)
+            return evaluate_withdrawal(bare, team, result, ensemble.compiled, given.aside)
+        return evaluate(Epoch(result.verdict, team.order), team, result, traits, ensemble.compiled)
     except (RefutedError, TooManySolutionsError):
         return Epoch(Verdict.UNKNOWN, team.order)
 
 
 def _places(run: Run, outcome: Outcome) -> bool:
     """Whether `run` is the one in which those step aside who find no place."""
-    found = speaker(run.began.protocol, filter(None, [outcome.placed_by])) if run.began else None
+    found = protocol_by_class(run.began.protocol, filter(None, [outcome.placed_by])) if run.began else None
     return found is not None and found[0] == outcome.placed_by
 
 

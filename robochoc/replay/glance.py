@@ -14,7 +14,7 @@ import msgspec
 
 from robochoc.protocols.order import PriorityOrder
 from robochoc.replay.phrases import cut
-from robochoc.solver.agent_problem import Part
+from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.compiled import LocalProblem
 
 DEEPEST = 3
@@ -22,7 +22,7 @@ DEEPEST = 3
 MOST = 12
 """Of a collection, so many entries."""
 LONGEST = 200
-_SETTING = (LocalProblem, PriorityOrder, Part)
+_SETTING = (LocalProblem, PriorityOrder, AgentProblem)
 """What many things hold, and what says nothing of them."""
 
 

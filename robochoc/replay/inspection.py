@@ -23,7 +23,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.sbt import SBT
 from robochoc.replay.glance import glance
 from robochoc.replay.phrases import CountedPhrases, Phrases, as_value, cut
-from robochoc.solver.agent_problem import Part
+from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.compiled import LocalProblem
 
 MOST_VALUES = 60
@@ -44,7 +44,7 @@ _EMPTY = {"nothing", "none"}
 class Look:
     """Looks at one robot, which knows `part` of the problem."""
 
-    def __init__(self, part: Part) -> None:
+    def __init__(self, part: AgentProblem) -> None:
         self._part = part
         self._problem = LocalProblem(part)  # one of its own: what is checked here counts for nobody
         self._own = Phrases(part.interfaces)

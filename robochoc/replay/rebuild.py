@@ -17,16 +17,16 @@ from robochoc.model.orders import Order, OrderError, order_of, reordered
 from robochoc.model.problem import Robot, Team
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.replay.steps import Run
-from robochoc.run.registry import UnknownProtocolError, speaker, spoken
+from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_by_name
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.agent_problem import Brief, Part
+from robochoc.solver.agent_problem import AgentProblem, RunParameters
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import CompileError, Compiler, CompileTimeoutError, Limits
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
 from robochoc.solver.domain import CompiledDomain, TooManySolutionsError
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
-from robochoc.verification.objective import aside_cost
+from robochoc.verification.objective import withdrawal_cost
 
 _UNCOMPILED = (
     TooManySolutionsError,
@@ -74,7 +74,7 @@ class Ensemble(NamedTuple):
 
     protocol: type[Protocol]
     hosts: Mapping[str, Host]
-    parts: Mapping[str, Part]
+    parts: Mapping[str, AgentProblem]
     quiet: bool
     mindful: Collection[str]
     compiled: CompiledTeam
@@ -122,7 +122,7 @@ class Cast:
         name = run.began.protocol
         if name in self._means.protocols:
             return self._means.protocols[name]
-        found = speaker(name, filter(None, [asked]))
+        found = protocol_by_class(name, filter(None, [asked]))
         if found is not None:
             return found[1]
         hint = "install the package that it came from (robochoc protocols shows what there is)"
@@ -131,7 +131,7 @@ class Cast:
     @staticmethod
     def _named(name: str) -> type[Protocol]:
         try:
-            return spoken(name)
+            return protocol_by_name(name)
         except UnknownProtocolError as unknown:
             raise CannotReplayError(str(unknown)) from unknown
 
@@ -161,10 +161,10 @@ class Cast:
         seed = self._header.seed if self._header else 0
         asked = self._header.protocol if self._header else None
         if asked is None or self._named(asked) is protocol:
-            return Epoch(self._compiled(team), brief=Brief(seed, self._means.settings))
+            return Epoch(self._compiled(team), brief=RunParameters(seed, self._means.settings))
         there = [robot for robot in filed.robots if run.given is not None or robot.name in team]
-        aside = aside_cost(replace(filed, robots=tuple(there))) if protocol.traits.costs else None
-        return Epoch(self._compiled(team), brief=Brief(seed, aside=aside))
+        aside = withdrawal_cost(replace(filed, robots=tuple(there))) if protocol.traits.costs else None
+        return Epoch(self._compiled(team), brief=RunParameters(seed, aside=aside))
 
     def _ordered(self, team: Team) -> Team:
         """Return `team` in the order of the run. Raises `OrderError`, `ValueError`."""
@@ -195,7 +195,7 @@ class Cast:
         return compiled
 
 
-def _host(protocol: type[Protocol], part: Part, before: Host | None, epoch: Epoch) -> Host:
+def _host(protocol: type[Protocol], part: AgentProblem, before: Host | None, epoch: Epoch) -> Host:
     """The robot of `part`: the one that was there before, if it goes on, or a new one. Raises `CannotReplayError`."""
     name = part.robot.name
     try:

@@ -15,7 +15,7 @@ from robochoc.run.registry import offers
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.exact import EXACT, refuse_inexact
 from robochoc.solver.weighted import HIGHEST
-from robochoc.verification.objective import aside_cost
+from robochoc.verification.objective import withdrawal_cost
 
 PAIR = 2
 LARGEST = 2**62
@@ -207,4 +207,4 @@ def _refuse_dear(team: Team, *, aside: bool) -> None:
 
 def _most(team: Team, *, aside: bool) -> float:
     """What costs could add up to, with those of stepping aside if robots may."""
-    return aside_cost(team) * (sum(robot.weight for robot in team.robots) + 1 if aside else 1)
+    return withdrawal_cost(team) * (sum(robot.weight for robot in team.robots) + 1 if aside else 1)

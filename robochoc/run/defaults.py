@@ -8,6 +8,6 @@ FIRST_FIT = "first-fit"
 """Says who steps aside with `--withdraw maximal`. Nobody can ask for it by name."""
 
 
-def suits(kind: str) -> str:
+def default_protocol(kind: str) -> str:
     """The protocol for a team of this `Kind`."""
     return SATISFIES if kind == "DisCSP" else MINIMISES

@@ -14,7 +14,7 @@ from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.checker import RefutedError, cost, could_join, objections
 
 
-def answered(epoch: Epoch, team: Team, result: RunResult, traits: Traits, compiled: CompiledTeam) -> Epoch:
+def evaluate(epoch: Epoch, team: Team, result: RunResult, traits: Traits, compiled: CompiledTeam) -> Epoch:
     """`epoch`, with the answer of a search by a protocol that has `traits`; as it is where there is none.
 
     `team` is what the answer is held against, as the files have it; `compiled` is what the robots have worked on.
@@ -35,7 +35,9 @@ def answered(epoch: Epoch, team: Team, result: RunResult, traits: Traits, compil
     return _with(epoch, team, found.assignment, Verdict.SOLUTION if team.kind is Kind.DISCSP else result.verdict)
 
 
-def placed(outcome: Outcome, team: Team, result: RunResult, compiled: CompiledTeam, aside: float | None) -> Outcome:
+def evaluate_withdrawal(
+    outcome: Outcome, team: Team, result: RunResult, compiled: CompiledTeam, aside: float | None
+) -> Outcome:
     """`outcome`, with the robots that step aside as `result` has it: so that nobody could be added, or the fewest.
 
     `aside` is what it cost that a robot of weight 1 does so; None where nothing was minimised. Robots that were lost

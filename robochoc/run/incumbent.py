@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from robochoc.communication.run_result import RunResult
-from robochoc.model.outcome import Place
+from robochoc.model.outcome import PseudoTreeNode
 from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.solver.compiled_team import CompiledTeam
@@ -55,7 +55,7 @@ def bound_of(findings: Mapping[str, Findings]) -> float | None:
     return int(least) if bounds and least < INFINITE else None
 
 
-def tree_of(findings: Mapping[str, Findings]) -> dict[str, Place]:
+def tree_of(findings: Mapping[str, Findings]) -> dict[str, PseudoTreeNode]:
     """The pseudo-tree that the robots have built: those that have their place in it."""
     return {name: found.place for name, found in findings.items() if found.place is not None}
 

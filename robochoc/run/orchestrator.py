@@ -13,7 +13,7 @@ from robochoc.communication.run_result import Progress
 from robochoc.communication.session import Session
 from robochoc.formats import check_team, held_to_rules
 from robochoc.journal.events import Observer
-from robochoc.model.change import changed_by, described
+from robochoc.model.change import changed_by, describe_change
 from robochoc.model.orders import Order, OrderError, favourable, order_of
 from robochoc.model.outcome import Epoch, Metrics, Outcome, Verdict
 from robochoc.model.problem import INFINITE, Team
@@ -21,13 +21,13 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run.compatibility import instead, refuse_central, refuse_field, refuse_unfit
 from robochoc.run.defaults import FIRST_FIT, MINIMISES
-from robochoc.run.evaluation import answered, check, placed
+from robochoc.run.evaluation import check, evaluate, evaluate_withdrawal
 from robochoc.run.incumbent import absent
 from robochoc.run.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
-from robochoc.run.registry import protocol_named, spoken
-from robochoc.run.runtimes import opened
-from robochoc.run.scenario import Announcer, Field, Journey, Opening, Played
-from robochoc.solver.agent_problem import Brief
+from robochoc.run.registry import protocol_by_name, protocol_named
+from robochoc.run.runtimes import open_session
+from robochoc.run.scenario import Announcer, Environment, Opening, Played, ScenarioRun
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import CompileTimeoutError
 from robochoc.solver.compiled_team import CompiledTeam
@@ -35,11 +35,11 @@ from robochoc.solver.domain import TooManySolutionsError
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.solver.team_compiler import NoLocalSolutionError, OutOfTimeError, TeamCompiler
 from robochoc.verification.checker import RefutedError
-from robochoc.verification.objective import aside_cost
+from robochoc.verification.objective import withdrawal_cost
 
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess
-    from robochoc.solver.central import Judge
+    from robochoc.solver.central import CentralSolver
 
 __all__ = ["CENTRAL", "OnLoss", "Options", "RefutedError", "Runtime", "ScheduleName", "Withdrawal", "solve"]
 
@@ -51,7 +51,7 @@ def solve(
     observer: Observer | None = None,
     progress: Callable[[Progress], None] | None = None,
     solver: AceProcess | None = None,
-    field: Field | None = None,
+    field: Environment | None = None,
 ) -> Outcome:
     """Let `team` solve its problem, epoch by epoch if it changes, and hold each answer against every constraint.
 
@@ -82,7 +82,7 @@ class _Run:
         observer: Observer | None,
         progress: Callable[[Progress], None] | None,
         solver: AceProcess | None,
-        field: Field | None,
+        field: Environment | None,
     ) -> None:
         self._team = team
         self._field = field
@@ -113,7 +113,7 @@ class _Run:
         protocol = protocol_named(options.protocol)
         refuse_unfit(self._team, options, protocol)
         names = order_of(self._team, options.order, options.seed) if isinstance(options.order, Order) else options.order
-        journey = Journey(
+        journey = ScenarioRun(
             self._team,
             names,
             self._compiled,
@@ -130,7 +130,7 @@ class _Run:
             outcome = replace(self._summary(), verdict=Verdict.UNKNOWN, assignment={}, verified=False)
             return replace(_without(outcome, journey), reason="; ".join([str(limit), *journey.regrets]))
 
-    def _travel(self, journey: Journey, protocol: type[Protocol]) -> Outcome:
+    def _travel(self, journey: ScenarioRun, protocol: type[Protocol]) -> Outcome:
         """All epochs; then those step aside who find no place, if they are to."""
         if self._options.withdraw is Withdrawal.FEWEST and protocol.traits.costs:
             return self._placed(self._outcome, journey, protocol)
@@ -150,7 +150,7 @@ class _Run:
         if outcome.verdict is Verdict.NO_SOLUTION and self._options.withdraw is not None:
             fewest = self._options.withdraw is Withdrawal.FEWEST
             second = MINIMISES if fewest else FIRST_FIT
-            outcome = self._placed(replace(outcome, placed_by=second), journey, spoken(second))
+            outcome = self._placed(replace(outcome, placed_by=second), journey, protocol_by_name(second))
         return outcome
 
     def _limit(self, witness: str | None, sent: int) -> str:
@@ -163,7 +163,7 @@ class _Run:
             return f"{self._options.protocol} has come to its end, and all that it came by breaks a hard constraint"
         return f"so many messages have been sent (--messages {self._options.messages})"
 
-    def _play(self, journey: Journey, protocol: type[Protocol]) -> Mapping[str, str]:
+    def _play(self, journey: ScenarioRun, protocol: type[Protocol]) -> Mapping[str, str]:
         """Play all epochs; returns the robots that are lost, if nobody is left."""
         lost: Mapping[str, str] = {}
         with self._session(protocol, journey.compiled(), self._brief) as session:
@@ -173,21 +173,21 @@ class _Run:
                 lost = played.result.lost
         return lost
 
-    def _tell_field(self, journey: Journey) -> None:
+    def _tell_field(self, journey: ScenarioRun) -> None:
         """The field, if there is one, is told of the last epoch; what it says will happen."""
         left_s = 0 if journey.is_over else self._left_s()
         event = self._field(journey.team, self._epochs[-1], left_s) if self._field else None
         if event:
             journey.expect(event)
 
-    def _placed(self, outcome: Outcome, journey: Journey, protocol: type[Protocol]) -> Outcome:
+    def _placed(self, outcome: Outcome, journey: ScenarioRun, protocol: type[Protocol]) -> Outcome:
         """Who finds a place among those that are left, as `protocol` has it; the others step aside.
 
         One that was not asked for (`placed_by`) gets no settings, and to be fast an order of its own if it has costs.
         """
-        brief = Brief(self._options.seed) if outcome.placed_by else self._brief
+        brief = RunParameters(self._options.seed) if outcome.placed_by else self._brief
         if protocol.traits.costs:
-            brief = brief._replace(aside=aside_cost(self._team))
+            brief = brief._replace(aside=withdrawal_cost(self._team))
         while True:
             team = journey.arranged()
             if outcome.placed_by == MINIMISES and self._options.order is None:
@@ -203,7 +203,7 @@ class _Run:
                 raise RobotsLostError(result.lost)
         spent = replace(outcome.metrics + result.metrics, compile_s=self._compiler.seconds)
         outcome = replace(_without(outcome, journey), metrics=spent)
-        outcome = placed(outcome, journey.team, result, compiled, brief.aside)
+        outcome = evaluate_withdrawal(outcome, journey.team, result, compiled, brief.aside)
         if outcome.verdict is Verdict.UNKNOWN:
             return replace(outcome, reason=self._limit(None, sum(spent.messages.values())))
         if outcome.verdict is not Verdict.OPTIMAL or brief.aside is None:
@@ -229,7 +229,7 @@ class _Run:
         if result.verdict is Verdict.NO_SOLUTION:
             sure = self._confirmed(team)
             return replace(epoch, verified=sure, confirmed=sure)
-        epoch = answered(epoch, team, result, traits, compiled)
+        epoch = evaluate(epoch, team, result, traits, compiled)
         if epoch.verdict is not Verdict.OPTIMAL or epoch.cost is None:
             return epoch
         return replace(epoch, confirmed=self._confirmed(team, total=epoch.cost))
@@ -269,7 +269,7 @@ class _Run:
             self._solver = self._solver or warm
             for events in range(len(self._team.scenario) + 1):
                 changes = self._team.scenario[events - 1].changes if events else ()
-                opened = ", ".join(map(described, changes)) or "nothing" if events else "the start"
+                opened = ", ".join(map(describe_change, changes)) or "nothing" if events else "the start"
                 count = self._judged(changed_by(self._team, events), opened)
         outcome = replace(self._summary(), count=count)
         aside = absent(self._team, outcome.assignment) if self._options.withdraw and outcome.verified else ()
@@ -285,7 +285,7 @@ class _Run:
             judgement = self._judge().judge(team, count=True)
             epoch, count = Epoch(judgement.verdict, team.order), judgement.count
         else:
-            epoch = decided(self._judge(), team, self._options, int(aside_cost(team)))
+            epoch = decided(self._judge(), team, self._options, int(withdrawal_cost(team)))
         if epoch.verified:
             aside = absent(team, epoch.assignment) if self._options.withdraw else ()
             check(team, epoch.assignment, aside, maximal=epoch.verdict is not Verdict.UNKNOWN)
@@ -303,11 +303,11 @@ class _Run:
 
         return confirmed(self._judge(), team, self._options.protocol, alone, total=total, aside=aside)
 
-    def _judge(self) -> Judge:
-        from robochoc.solver.central import Judge  # noqa: PLC0415 - start-up: seldom asked for
+    def _judge(self) -> CentralSolver:
+        from robochoc.solver.central import CentralSolver  # noqa: PLC0415 - start-up: seldom asked for
 
         show = partial(self._show, "ACE decides the whole team")
-        return Judge(self._cache, self._deadline, show, self._solver, always_ace=self._options.local.always_ace)
+        return CentralSolver(self._cache, self._deadline, show, self._solver, always_ace=self._options.local.always_ace)
 
     # What an epoch needs
 
@@ -316,12 +316,12 @@ class _Run:
         return self._compiler.compile(team, every=self._dynamic or bool(self._epochs))
 
     @property
-    def _brief(self) -> Brief:
-        return Brief(self._options.seed, self._options.settings)
+    def _brief(self) -> RunParameters:
+        return RunParameters(self._options.seed, self._options.settings)
 
-    def _session(self, protocol: type[Protocol], team: CompiledTeam, brief: Brief) -> Session:
+    def _session(self, protocol: type[Protocol], team: CompiledTeam, brief: RunParameters) -> Session:
         """`protocol` in the runtime asked for."""
-        return opened(protocol, team, brief, self._options, self._observer, self._progress)
+        return open_session(protocol, team, brief, self._options, self._observer, self._progress)
 
     def _left_s(self) -> float | None:
         return None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
@@ -331,7 +331,7 @@ class _Run:
             self._progress(Progress(0, time.monotonic() - self._began, stage))
 
 
-def _without(outcome: Outcome, journey: Journey) -> Outcome:
+def _without(outcome: Outcome, journey: ScenarioRun) -> Outcome:
     """`outcome`, without the robots that were lost on the way."""
     lost = tuple(journey.withdrawn)
     return replace(outcome, withdrawn=lost, lost=lost)

@@ -72,19 +72,19 @@ def protocol_named(name: str) -> type[Protocol]:
     return offer.protocol
 
 
-def spoken(name: str) -> type[Protocol]:
+def protocol_by_name(name: str) -> type[Protocol]:
     """Like `protocol_named`, of all that robots can be told to speak: also what only says who steps aside."""
     return FirstFit if name == FIRST_FIT else protocol_named(name)
 
 
-def speaker(class_name: str, likely: Iterable[str] = ()) -> tuple[str, type[Protocol]] | None:
+def protocol_by_class(class_name: str, likely: Iterable[str] = ()) -> tuple[str, type[Protocol]] | None:
     """Name and class of the protocol whose class is called `class_name`, as journals have it; `likely` names first.
 
     None: nothing that is installed is called that.
     """
     for name in (*likely, FIRST_FIT, MINIMISES):
         with suppress(UnknownProtocolError):
-            protocol = spoken(name)
+            protocol = protocol_by_name(name)
             if protocol.__name__ == class_name:
                 return name, protocol
     for offer in offers():

@@ -13,7 +13,7 @@ from robochoc.communication.session import Session
 from robochoc.journal.events import Observer
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName
-from robochoc.solver.agent_problem import Brief
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
 
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 
 class _Rest(TypedDict):
-    brief: Brief
+    brief: RunParameters
     observer: Observer | None
     progress: Callable[[Progress], None] | None
 
 
-def opened(
+def open_session(
     protocol: type[Protocol],
     team: CompiledTeam,
-    brief: Brief,
+    brief: RunParameters,
     options: Options,
     observer: Observer | None,
     progress: Callable[[Progress], None] | None,
@@ -59,13 +59,13 @@ def opened(
 def _network(protocol: type[Protocol], team: CompiledTeam, options: Options, rest: _Rest) -> Session:
     try:
         from robochoc.communication.network.local import LocalNetwork  # noqa: PLC0415 - and it is an extra
-        from robochoc.communication.network.settings import PATIENCE_S, Conditions  # noqa: PLC0415 - as above
+        from robochoc.communication.network.settings import PATIENCE_S, NetworkSettings  # noqa: PLC0415 - as above
     except ModuleNotFoundError as missing:
         raise UnsupportedError(
             f"--runtime network needs {missing.name}; say: pip install 'robochoc[network]'"
         ) from None
     survive, patience_s = options.on_loss is OnLoss.WITHDRAW, options.patience or PATIENCE_S
-    conditions = Conditions(filters=options.filters, survive=survive, patience_s=patience_s)
+    conditions = NetworkSettings(filters=options.filters, survive=survive, patience_s=patience_s)
     return LocalNetwork(team, protocol, conditions=conditions, **rest)
 
 

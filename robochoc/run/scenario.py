@@ -4,7 +4,7 @@ An epoch ends when its problem is solved, when the scenario's next event comes, 
 the problem opens the next one. A protocol that can (`DynamicProtocol`) goes on with what still stands; any other
 begins anew, so that the two can be compared.
 
-What is to come may be known from the beginning, as a scenario, or be told epoch by epoch, by a `Field`.
+What is to come may be known from the beginning, as a scenario, or be told epoch by epoch, by a `Environment`.
 """
 
 from __future__ import annotations
@@ -20,19 +20,28 @@ from robochoc.communication.session import Epoch, Session
 from robochoc.formats import InvalidInputError, read_robot
 from robochoc.journal.events import Began, Observer
 from robochoc.journal.given import TeamWriter
-from robochoc.model.change import ChangeError, changed, changed_by, concerns, described, possible, rejoined, without
+from robochoc.model.change import (
+    ChangeError,
+    changed,
+    changed_by,
+    concerns,
+    describe_change,
+    possible,
+    rejoined,
+    without,
+)
 from robochoc.model.orders import reordered
 from robochoc.model.outcome import Epoch as Answered
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import AddAgent, Change, Event, Robot, Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, Brief
+from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.explanation import Void, void
+from robochoc.solver.explanation import Invalidated, invalidated_by
 
 Compile = Callable[[Team], CompiledTeam]
 
-Field = Callable[[Team, Answered, float | None], Event | None]
+Environment = Callable[[Team, Answered, float | None], Event | None]
 """Where decisions go and changes come from, while the team waits: the robots' surroundings.
 
 It is given each epoch's team and how that epoch ended, once the answer was held against every constraint, and how many
@@ -61,7 +70,7 @@ class Opening(NamedTuple):
     by: str = ""
 
     @classmethod
-    def of(cls, team: CompiledTeam, brief: Brief) -> Self:
+    def of(cls, team: CompiledTeam, brief: RunParameters) -> Self:
         """Return a run of `team` as it is."""
         return cls(Epoch(team, brief=brief))
 
@@ -87,7 +96,7 @@ class Announcer:
         self._observer(self._writer.given(epoch.team, epoch.brief, epoch.void, fresh=fresh, quiet=quiet))
 
 
-class Journey:
+class ScenarioRun:
     """A team on its way through its scenario, and through losses.
 
     `order` is the priority order asked for (None: the files'). `compile_` compiles a team.
@@ -106,7 +115,7 @@ class Journey:
         *,
         messages: int | None = None,
         spares: int = 0,
-        brief: Brief = NO_BRIEF,
+        brief: RunParameters = NO_BRIEF,
     ) -> None:
         self.team = self._full = changed_by(team, events=0)
         self.withdrawn: list[str] = []
@@ -190,7 +199,7 @@ class Journey:
         """What of `event` can still happen, in a few words."""
         out = set(self.withdrawn)
         changes = possible(self._full, event.changes)[1] if self._loose else event.changes
-        words = [described(change) for change in changes if out.isdisjoint(concerns(self._full, change))]
+        words = [describe_change(change) for change in changes if out.isdisjoint(concerns(self._full, change))]
         return ", ".join(words) or "nothing"
 
     def _added_by(self, event: Event) -> Collection[str]:
@@ -234,8 +243,8 @@ class Journey:
     def _go_over(self, session: Session, fresh: Collection[str]) -> Epoch:
         """Have `session` work on the team as it is now."""
         now = session.workable(self.arranged())
-        keys, agents = void(session.compiled.team, now)
-        stale = Void(keys, agents | set(fresh))
+        keys, agents = invalidated_by(session.compiled.team, now)
+        stale = Invalidated(keys, agents | set(fresh))
         epoch = Epoch(self._compile(now), stale, frozenset(fresh), self._brief)
         session.change(epoch)
         return epoch

@@ -8,12 +8,12 @@ from robochoc.model.outcome import Epoch, Verdict
 from robochoc.model.problem import INFINITE, Kind, Team
 from robochoc.run.incumbent import absent
 from robochoc.run.options import Options, Withdrawal
-from robochoc.solver.central import Judge, Judgement
+from robochoc.solver.central import CentralSolver, Judgement
 from robochoc.solver.failures import SolverLostError
 from robochoc.verification.checker import RefutedError, cost, has_local_solution
 
 
-def decided(judge: Judge, team: Team, options: Options, aside: int) -> Epoch:
+def decided(judge: CentralSolver, team: Team, options: Options, aside: int) -> Epoch:
     """What `judge` makes of `team`, with the fewest robots aside if that is asked for and has to be.
 
     `aside` is the price at which a robot of weight 1 steps aside. Raises as `Judge.judge` does, and `SolverLostError`
@@ -30,7 +30,7 @@ def decided(judge: Judge, team: Team, options: Options, aside: int) -> Epoch:
 
 
 def confirmed(
-    judge: Judge,
+    judge: CentralSolver,
     team: Team,
     protocol: str,
     alone: str | None = None,

@@ -11,11 +11,11 @@ from typing import NamedTuple
 from robochoc.authority.identity import Identity
 from robochoc.communication.network.access import journal_key
 from robochoc.communication.network.control_messages import Sniff, Sniffable
-from robochoc.communication.network.framing import MASTER, FrameRefusedError, Letters
+from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing
 from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.journal_server import piece_in, question
 from robochoc.communication.network.refusals import LONGEST
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.transport import Transport
 from robochoc.journal.blocks import JournalDamagedError, Unframer
 from robochoc.journal.entries import JournalError
 from robochoc.run.networked.address import Address
@@ -74,7 +74,7 @@ def receive(
     is called when the master has agreed, `stopped` asked now and then whether to stop. Raises `CannotConnectError` and,
     when the master does not agree, `NoAnswerError`.
     """
-    with Post(str(place), identity, watch=(), patience_s=patience_s) as post:
+    with Transport(str(place), identity, watch=(), patience_s=patience_s) as post:
         sniffer = _Sniffer(place, post)
         run = sniffer.admitted(max(ANSWER_S, patience_s), stopped)
         if run is None:
@@ -124,11 +124,11 @@ class Arriving:
 class _Sniffer:
     """One who asks the master at `place`, by its `post`."""
 
-    def __init__(self, place: Address, post: Post) -> None:
+    def __init__(self, place: Address, post: Transport) -> None:
         self._place = place
         self._name = post.name
         self._post = post
-        self._letters = Letters(post.name)
+        self._letters = Framing(post.name)
         self._number = secrets.randbits(_NUMBER_BITS)
 
     def admitted(self, patience_s: float, stopped: Callable[[], bool]) -> str | None:

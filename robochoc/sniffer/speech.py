@@ -16,7 +16,7 @@ import msgspec
 
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.registry import UnknownProtocolError, speaker, spoken
+from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_by_name
 from robochoc.services.identifier import AgentIdentifier, identifier_on
 from robochoc.sniffer.acl import ACLMessage
 from robochoc.sniffer.conversation import CLOCK, JSON, ONTOLOGY, Conversation
@@ -130,8 +130,8 @@ def spoken_in(trace: Trace, number: int) -> tuple[str, type[Protocol]] | None:
     called = trace.runs[number].protocol
     if called == trace.header.protocol:  # a journal of one run without a beginning
         with suppress(UnknownProtocolError):
-            return called, spoken(called)
-    return speaker(called, [trace.header.protocol])
+            return called, protocol_by_name(called)
+    return protocol_by_class(called, [trace.header.protocol])
 
 
 def plain(value: object, depth: int = 32) -> Any:  # noqa: ANN401 - any JSON

@@ -21,7 +21,7 @@ Links = Mapping[str, tuple[str, ...]]
 """The parents of each robot."""
 
 
-class Brief(NamedTuple):
+class RunParameters(NamedTuple):
     """What all robots of a run are told beside the problem.
 
     `seed` is what their chance is drawn from, `settings` are the protocol's, as they were given. `aside` is what it
@@ -34,10 +34,10 @@ class Brief(NamedTuple):
     aside: float | None = None
 
 
-NO_BRIEF = Brief()
+NO_BRIEF = RunParameters()
 
 
-class Part(NamedTuple):
+class AgentProblem(NamedTuple):
     """What one robot knows when the search begins.
 
     `own` is the robot itself with its compiled domain. `order`, `interfaces` and the declared `domains` of interface
@@ -55,7 +55,7 @@ class Part(NamedTuple):
     domains: Mapping[str, Domain] = MappingProxyType({})
     links: Links | None = None
     secretive: tuple[str, ...] = ()
-    brief: Brief = NO_BRIEF
+    brief: RunParameters = NO_BRIEF
 
     @property
     def robot(self) -> Robot:
@@ -68,9 +68,9 @@ class Part(NamedTuple):
         return self.own.domain
 
 
-def parts(
-    team: Team | CompiledTeam, brief: Brief = NO_BRIEF, *, everywhere: bool = False, tree: bool = False
-) -> dict[str, Part]:
+def agent_problems(
+    team: Team | CompiledTeam, brief: RunParameters = NO_BRIEF, *, everywhere: bool = False, tree: bool = False
+) -> dict[str, AgentProblem]:
     """Return the part of each robot of `team` that is compiled, in priority order.
 
     `everywhere`: every robot of a constraint's scope knows it. `tree`: all know who is whose parent.
@@ -93,6 +93,6 @@ def parts(
             if child.constraints:
                 secretive[child.name].append(robot.name)
     return {
-        name: Part(own, team.order, shown, tuple(copies[name]), known, links, tuple(secretive[name]), brief)
+        name: AgentProblem(own, team.order, shown, tuple(copies[name]), known, links, tuple(secretive[name]), brief)
         for name, own in compiled.robots.items()
     }

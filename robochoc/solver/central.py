@@ -67,7 +67,7 @@ class _Wanted:
         return ("static", "default") if self.in_order else ("default", "static")
 
 
-class Judge:
+class CentralSolver:
     """Decides teams, small ones by enumeration, others by ACE (with `always_ace` all).
 
     `deadline` is on the monotonic clock; `progress` is called while ACE works. A `solver` that is warm may be lent;

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, Model
-from robochoc.solver.agent_problem import Part
+from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.explanation import Known, held, held_below
 from robochoc.solver.filters import Filters
 from robochoc.solver.shared import Conflict, Others, OwnValues, SharedConstraint, in_order_of_lowest
@@ -52,7 +52,7 @@ class LocalProblem:
     constraint asks anything of whoever is there with it.
     """
 
-    def __init__(self, part: Part) -> None:
+    def __init__(self, part: AgentProblem) -> None:
         robot = part.robot
         rank = {name: place for place, name in enumerate(part.order)}
         self.agent = robot.name

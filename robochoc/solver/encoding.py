@@ -121,7 +121,7 @@ def price_on(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence
     return lambda values: definition.cost(arguments(values))
 
 
-def dearest(constraint: Constraint) -> float:
+def max_cost(constraint: Constraint) -> float:
     """The most that `constraint` charges short of being broken."""
     definition = constraint.definition
     if isinstance(definition, Predicate):

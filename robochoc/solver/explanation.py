@@ -19,7 +19,7 @@ class Known(NamedTuple):
     constraint: Constraint
 
 
-class Void(NamedTuple):
+class Invalidated(NamedTuple):
     """What a change has made void: `keys` of constraints and domains that no longer rule out what they did.
 
     Of `agents` not even the values mean what they meant: they have left, or show other variables than before.
@@ -51,7 +51,7 @@ def domain_key(agent: str) -> str:
     return f"{agent}="
 
 
-def void(old: Team, new: Team) -> Void:
+def invalidated_by(old: Team, new: Team) -> Invalidated:
     """What of `old` does not stand in `new`: constraints that are gone, domains that have grown, robots that left."""
     keys = set()
     agents = set()
@@ -63,7 +63,7 @@ def void(old: Team, new: Team) -> Void:
             keys.add(domain_key(robot.name))
         present = _all_held(now) if now else []
         keys.update(one.key for one in _all_held(robot) if one not in present)
-    return Void(frozenset(keys), frozenset(agents))
+    return Invalidated(frozenset(keys), frozenset(agents))
 
 
 def _all_held(robot: Robot) -> list[Known]:

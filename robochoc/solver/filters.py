@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from robochoc.model.message import Value
-from robochoc.solver.agent_problem import Part
+from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.shared import SharedConstraint
 
@@ -27,7 +27,7 @@ class Filters:
     """
 
     def __init__(
-        self, part: Part, values: Sequence[Value], constraints: Mapping[str, Sequence[SharedConstraint]]
+        self, part: AgentProblem, values: Sequence[Value], constraints: Mapping[str, Sequence[SharedConstraint]]
     ) -> None:
         self._part = part
         self._constraints = constraints

@@ -8,7 +8,7 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 
 from robochoc.model.message import Value
 from robochoc.model.problem import Constraint
-from robochoc.solver.encoding import dearest, holds_on, price_on
+from robochoc.solver.encoding import holds_on, max_cost, price_on
 
 Conflict = Mapping[str, Value]
 """Assignments of other robots that rule out an own value: the left side of a nogood."""
@@ -107,7 +107,7 @@ class SharedConstraint:
     @property
     def dearest(self) -> float:
         """The most that it charges short of being broken."""
-        return dearest(self._constraint)
+        return max_cost(self._constraint)
 
     def prices(self, others: Others) -> list[float]:
         """What each own value pays when the others are as `others` says."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, Team
-from robochoc.solver.encoding import dearest, price_on
+from robochoc.solver.encoding import max_cost, price_on
 
 
 class Objective:
@@ -64,6 +64,6 @@ class Objective:
         return sum(self._paid) + sum(self._weights[name] for name in self._absent) * (self._aside or 0)
 
 
-def aside_cost(team: Team) -> float:
+def withdrawal_cost(team: Team) -> float:
     """What stepping aside has to cost, for a robot of weight 1, so that nobody does so to spare others their costs."""
-    return 1 + sum(dearest(constraint) for constraint in team.constraints())
+    return 1 + sum(max_cost(constraint) for constraint in team.constraints())

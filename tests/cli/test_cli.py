@@ -316,6 +316,6 @@ def test_the_help_of_commands_imports_nothing_heavy() -> None:
         "print(*sys.modules)"
     )
     modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert {f"robochoc.cli.{name}" for name in COMMANDS} <= {*modules}
+    assert {f"robochoc.cli.commands.{name}" for name in COMMANDS} <= {*modules}
     heavy = {"numpy", "meshcat", "lxml", "rich", "msgspec", "multiprocessing", "tornado", "pycsp3", "zenoh"}
     assert not heavy & set(modules)

@@ -20,7 +20,7 @@ import pytest
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run.registry import UnknownProtocolError, protocol_named, protocol_names
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support import golden
 from tests.support.problems import team_of
@@ -98,7 +98,7 @@ def test_the_guide_installs_and_its_own_tests_and_the_conformance_suite_are_amon
     said = "".join(BLOCKS[place][1] for place in COMMANDS)
     assert INSTALL in said
     assert "pytest docs/examples/breakout" in said
-    assert "pytest tests/test_conformance.py" in said
+    assert "pytest tests/conformance/test_conformance.py" in said
 
 
 def test_the_guides_code_is_the_examples() -> None:
@@ -109,7 +109,7 @@ def test_the_guides_code_is_the_examples() -> None:
 
 
 def test_the_guide_explains_every_trait_and_all_that_a_robot_knows() -> None:
-    problem = LocalProblem(parts(team_of({"A": (1,)}, []))["RA"])
+    problem = LocalProblem(agent_problems(team_of({"A": (1,)}, []))["RA"])
     assert _explained("trait") == {field.name for field in fields(Traits)}
     assert _explained("member") == {name for name in dir(problem) if not name.startswith("_")}
 

@@ -19,7 +19,7 @@ from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver import compiled
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.central import Judge
+from robochoc.solver.central import CentralSolver
 from robochoc.solver.compile import Compiler
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain, compiled_domain
@@ -102,7 +102,7 @@ def test_ace_abt_the_judge_and_brute_force_agree(batch: int) -> None:
                 check_domain(robot, compiler.compile(robot).domain)
             count = sum(1 for _ in solutions(team))
             expected = Verdict.SOLUTION if count else Verdict.NO_SOLUTION
-            assert Judge(solver=solver).judge(team, count=True).count == count
+            assert CentralSolver(solver=solver).judge(team, count=True).count == count
             assert solve(team, Options(protocol="central", cache=False), solver=solver).verdict is expected
             options = replace(random_schedule(chance), cache=False, order=any_order(team, chance))
             assert solve(team, options, solver=solver).verdict is expected

@@ -20,7 +20,7 @@ from robochoc.formats import InvalidInputError, read_team, write_team
 from robochoc.formats.result import ResultError, read_result, result_json
 from robochoc.journal.blocks import BEGINNING, PREAMBLE, JournalDamagedError, Unframer, framed
 from robochoc.journal.journal import Header, JournalError, Recorder, lines_of, read_journal
-from robochoc.model.outcome import Epoch, Metrics, Outcome, Place, Verdict
+from robochoc.model.outcome import Epoch, Metrics, Outcome, PseudoTreeNode, Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.dpop import DPOP
@@ -173,7 +173,7 @@ def results() -> Sequence[bytes]:
         lost=("Robot3",),
         order="listed",
         bound=11,
-        tree={"A": Place(None), "B": Place("A", ("C",))},
+        tree={"A": PseudoTreeNode(None), "B": PseudoTreeNode("A", ("C",))},
         epochs=(epoch, epoch),
         channel="radio",
         placed_by="sfb",

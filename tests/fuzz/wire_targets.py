@@ -36,7 +36,7 @@ from robochoc.authority.frames import (
 from robochoc.authority.keyring import KeyCard, KeyCardError
 from robochoc.communication.control import Conclusion, Counters, Events, Failed, Pause, Ready, Wave
 from robochoc.communication.network import control_messages as words
-from robochoc.communication.network.framing import MASTER, FrameRefusedError, Letters
+from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing
 from robochoc.communication.network.profile import (
     Profile,
     ProfileError,
@@ -51,7 +51,7 @@ from robochoc.communication.network.profile import (
 from robochoc.communication.network.shared import SharedConstraintError, SharedRecord, known_of, record_of
 from robochoc.formats import on_one_line
 from robochoc.journal.events import AnyEvent, Decided, Sent
-from robochoc.model.outcome import Metrics, Place, Verdict
+from robochoc.model.outcome import Metrics, PseudoTreeNode, Verdict
 from robochoc.model.problem import Robot, Team
 from robochoc.protocols.findings import Findings
 from robochoc.services.communicative_acts import Performative
@@ -95,7 +95,7 @@ def letters(receiver: str) -> Sequence[bytes]:
     """Letters to the master, or to a robot, with every word."""
     metrics = Metrics({"Ok": 3}, 80, 5, 9, 0.25)
     epoch = 1
-    findings = Findings(bound=3, place=Place("R", ("S",)))
+    findings = Findings(bound=3, place=PseudoTreeNode("R", ("S",)))
     events: list[AnyEvent] = [
         Sent(t=0, sender="A", receiver="B", type="Ok", content={"value": [1]}, bytes=9, clock=3),
         Decided(t=0.5, robot="A", assignment={"V": 1}, clock=4),
@@ -153,7 +153,7 @@ def check_letter(receiver: str, content: bytes) -> bool:
     accepted = False
     for sender in senders[::-1] if receiver != MASTER else ["B"]:
         for _ in range(2):
-            reader = Letters(receiver, "run")
+            reader = Framing(receiver, "run")
             try:
                 number = msgspec.msgpack.decode(content)[1]
                 if isinstance(number, int) and 1 < number < 1 << 62:
@@ -167,8 +167,8 @@ def check_letter(receiver: str, content: bytes) -> bool:
                 continue
             accepted = True
             _look_into(opened.word)
-            writer = Letters(sender, "run")
-            again = Letters(receiver, "run").read(sender, writer.write(receiver, opened.word))
+            writer = Framing(sender, "run")
+            again = Framing(receiver, "run").read(sender, writer.write(receiver, opened.word))
             assert repr(again.word) == repr(opened.word), "another word is read from what was written"
     return accepted
 

@@ -11,7 +11,7 @@ import pytest
 from robochoc.authority.authority import Authority
 from robochoc.authority.certificates import new_key, signing_request
 from robochoc.authority.registry import Right, Role
-from robochoc.communication.network.connection_policy import Gate
+from robochoc.communication.network.connection_policy import ConnectionPolicy
 from robochoc.communication.network.router import Router
 from tests.support.authorities import Clock, identity_of
 
@@ -31,8 +31,8 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[Rules]:
 
 
 @pytest.fixture
-def gate(authority: Authority, opened: list[Rules]) -> Iterator[Gate]:
-    gate = Gate(authority, authority.master_identity(("127.0.0.1",)), "127.0.0.1:1", None, 1000)
+def gate(authority: Authority, opened: list[Rules]) -> Iterator[ConnectionPolicy]:
+    gate = ConnectionPolicy(authority, authority.master_identity(("127.0.0.1",)), "127.0.0.1:1", None, 1000)
     gate.sniffable = True
     gate.open()
     assert opened.pop() == ({}, ())
@@ -45,7 +45,7 @@ def redeem(authority: Authority, secret: bytes, name: str) -> None:
 
 
 def test_who_comes_with_a_token_from_before_needs_no_other_router(
-    authority: Authority, gate: Gate, opened: list[Rules]
+    authority: Authority, gate: ConnectionPolicy, opened: list[Rules]
 ) -> None:
     token = authority.enrol("A")
     eye = authority.enrol("Eye", Role.OBSERVER, may=[Right.SNIFF])
@@ -61,7 +61,7 @@ def test_who_comes_with_a_token_from_before_needs_no_other_router(
 
 
 def test_who_was_revoked_stays_out_until_the_new_token_is_shown(
-    authority: Authority, gate: Gate, opened: list[Rules], tmp_path: Path
+    authority: Authority, gate: ConnectionPolicy, opened: list[Rules], tmp_path: Path
 ) -> None:
     """The router knows names only, and there is still a certificate in this one."""
     identity_of(authority, "A", tmp_path / "a")
@@ -76,7 +76,9 @@ def test_who_was_revoked_stays_out_until_the_new_token_is_shown(
     assert opened[2:] == [({"A": ()}, ())]
 
 
-def test_who_was_revoked_before_it_came_is_not_let_in(authority: Authority, gate: Gate, opened: list[Rules]) -> None:
+def test_who_was_revoked_before_it_came_is_not_let_in(
+    authority: Authority, gate: ConnectionPolicy, opened: list[Rules]
+) -> None:
     authority.enrol("A")
     gate.follow()
     authority.revoke("A")
@@ -85,7 +87,7 @@ def test_who_was_revoked_before_it_came_is_not_let_in(authority: Authority, gate
 
 
 def test_a_certificate_that_has_expired_lets_nobody_in(
-    authority: Authority, gate: Gate, opened: list[Rules], clock: Clock, tmp_path: Path
+    authority: Authority, gate: ConnectionPolicy, opened: list[Rules], clock: Clock, tmp_path: Path
 ) -> None:
     identity_of(authority, "A", tmp_path / "a")
     gate.follow()

@@ -38,14 +38,14 @@ from robochoc.communication.network.framing import (
     LARGEST_LETTER,
     MASTER,
     FrameRefusedError,
+    Framing,
     Letter,
-    Letters,
     MessageTooLargeError,
     Opened,
 )
 from robochoc.communication.network.profile import Profile
 from robochoc.journal.events import Received
-from robochoc.model.outcome import Metrics, Place
+from robochoc.model.outcome import Metrics, PseudoTreeNode
 from robochoc.model.problem import Kind
 from robochoc.protocols.findings import Best, Findings, Trail
 
@@ -54,8 +54,8 @@ OUTSIDE = (Register, Welcome, Denied, Joined, Ask, Told, Sniff, Sniffable)
 WORDS = get_args(ToMaster), get_args(ToRobot), get_args(ToPeer)
 
 
-def pair(sender: str = "R1", receiver: str = "R2", run: str = "run") -> tuple[Letters, Letters]:
-    return Letters(sender, run), Letters(receiver, run)
+def pair(sender: str = "R1", receiver: str = "R2", run: str = "run") -> tuple[Framing, Framing]:
+    return Framing(sender, run), Framing(receiver, run)
 
 
 def said(number: int) -> Said:
@@ -73,7 +73,9 @@ SPECIAL: dict[type[Word], st.SearchStrategy[Word]] = {
         st.booleans(),
         st.dictionaries(TEXTS, NUMBERS, max_size=2),
         st.builds(Metrics, st.dictionaries(TEXTS, NUMBERS, max_size=2), NUMBERS, NUMBERS, NUMBERS),
-        st.just(Findings(best=Best(3, {"R1": (1, None)}), place=Place("R0", ("R2",)), trail=Trail([(0, 1)], 4))),
+        st.just(
+            Findings(best=Best(3, {"R1": (1, None)}), place=PseudoTreeNode("R0", ("R2",)), trail=Trail([(0, 1)], 4))
+        ),
         st.dictionaries(TEXTS, st.builds(Exchanged, NUMBERS, NUMBERS, NUMBERS), max_size=2),
     ),
     Gap: st.builds(Gap, TEXTS, st.integers(1, 2**53)),
@@ -163,9 +165,9 @@ def test_a_missing_letter_is_missed() -> None:
 
 
 def test_senders_do_not_use_up_each_others_numbers() -> None:
-    reader = Letters("R9", "run")
+    reader = Framing("R9", "run")
     for sender in ("R1", "R2"):
-        opened = reader.read(sender, Letters(sender, "run").write("R9", said(1)))
+        opened = reader.read(sender, Framing(sender, "run").write("R9", said(1)))
         reader.take(sender, opened.number)
     with pytest.raises(FrameRefusedError, match="letter 2 is missing before letter 3"):
         reader.read("R2", msgspec.msgpack.encode(Letter("run", 3, said(3))))
@@ -178,14 +180,14 @@ def test_numbers_begin_at_1(number: int) -> None:
 
 
 def test_letters_of_another_run_are_replays() -> None:
-    old, reader = Letters("R1", "before"), Letters("R2", "run")
+    old, reader = Framing("R1", "before"), Framing("R2", "run")
     content = old.write("R2", said(1))
     with pytest.raises(FrameRefusedError, match="another run"):
         reader.read("R1", content)
     with pytest.raises(FrameRefusedError, match="another run"):
-        Letters("R2").read("R1", content)
+        Framing("R2").read("R1", content)
     with pytest.raises(FrameRefusedError, match="another run"):
-        Letters("R2").read("R1", Letters("R1").write("R2", said(1)))  # no run is no run in common
+        Framing("R2").read("R1", Framing("R1").write("R2", said(1)))  # no run is no run in common
 
 
 def test_a_new_run_begins_at_1() -> None:
@@ -197,20 +199,20 @@ def test_a_new_run_begins_at_1() -> None:
 
 
 def test_another_life_begins_at_1_for_that_robot_only() -> None:
-    master = Letters(MASTER, "run")
+    master = Framing(MASTER, "run")
     for name in ("R1", "R2"):
-        master.take(name, master.read(name, Letters(name, "run").write(MASTER, Ready(1))).number)
+        master.take(name, master.read(name, Framing(name, "run").write(MASTER, Ready(1))).number)
         master.write(name, Wave(1))
     master.forget("R1")
     master.forget("R7")
     assert (master.next_number("R1"), master.next_number("R2")) == (1, 2)
-    assert master.read("R1", Letters("R1", "run").write(MASTER, Ready(1))).number == 1
+    assert master.read("R1", Framing("R1", "run").write(MASTER, Ready(1))).number == 1
     with pytest.raises(FrameRefusedError, match="replay"):
-        master.read("R2", Letters("R2", "run").write(MASTER, Ready(1)))
+        master.read("R2", Framing("R2", "run").write(MASTER, Ready(1)))
 
 
 def test_words_before_a_run_have_no_number() -> None:
-    robot, master = Letters("R1"), Letters(MASTER, "run")
+    robot, master = Framing("R1"), Framing(MASTER, "run")
     content = robot.write(MASTER, Register(PROFILE, "visit"))
     for _ in range(2):
         opened = master.read("R1", content)
@@ -219,7 +221,7 @@ def test_words_before_a_run_have_no_number() -> None:
     assert robot.next_number(MASTER) == 1
     answer = master.write("R1", Welcome("visit", "run", (), observed=False, private=False))
     assert robot.read(MASTER, answer).number == 0
-    assert master.read("R1", Letters("R1", "run").write(MASTER, Ready(1))).number == 1
+    assert master.read("R1", Framing("R1", "run").write(MASTER, Ready(1))).number == 1
 
 
 # Sizes
@@ -263,7 +265,7 @@ def test_words_of_another_direction_are_refused(
         for kind in kinds:
             word = data.draw(some(kind))
             content = msgspec.msgpack.encode(Letter("run", 1, word))
-            reader = Letters(receiver, "run")
+            reader = Framing(receiver, "run")
             if place == direction:
                 assert type(reader.read(sender, content).word) is kind
             else:
@@ -279,7 +281,7 @@ def test_words_of_another_direction_are_refused(
 @settings(max_examples=100, deadline=None)
 def test_arbitrary_bytes_are_refused(sender: str, receiver: str, content: bytes) -> None:
     with pytest.raises(FrameRefusedError, match="malformed"):
-        Letters(receiver, "run").read(sender, content)
+        Framing(receiver, "run").read(sender, content)
 
 
 LETTERS = [
@@ -303,7 +305,7 @@ def test_damaged_letters_are_refused_or_read_never_worse(letter: tuple[str, str,
     flipped = bytearray(content)
     flipped[bit // 8] ^= 1 << bit % 8
     for damaged in (bytes(flipped), content[: bit // 8], content + bytes(flipped[: 1 + bit // 8])):
-        reader = Letters(receiver, "run")
+        reader = Framing(receiver, "run")
         try:
             opened = reader.read(sender, damaged)
         except FrameRefusedError:
@@ -315,7 +317,7 @@ def test_damaged_letters_are_refused_or_read_never_worse(letter: tuple[str, str,
 def test_deep_nesting_is_refused(nested: bytes) -> None:
     for sender in (MASTER, "R1"):
         with pytest.raises(FrameRefusedError, match="malformed"):
-            Letters("R2", "run").read(sender, nested)
+            Framing("R2", "run").read(sender, nested)
 
 
 def test_a_length_that_lies_allocates_nothing() -> None:

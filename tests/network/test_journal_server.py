@@ -18,14 +18,14 @@ from robochoc.communication.network.journal_server import (
     ANSWERED_AT_MOST,
     PIECE_BYTES,
     SNIFF,
+    JournalServer,
     NotAnsweredError,
     Piece,
     Publication,
-    PublicationDesk,
     piece_in,
     question,
 )
-from robochoc.communication.network.master_events import Chronicle
+from robochoc.communication.network.master_events import MasterEvents
 from robochoc.journal.entries import JournalError
 from robochoc.journal.events import AnyEvent, Granted, Refused
 
@@ -107,7 +107,7 @@ def test_one_who_asks_without_end_is_not_answered_and_others_are(publication: Pu
 def test_where_nothing_can_be_written_the_run_goes_on_and_followers_are_told() -> None:
     with Path("/dev/full").open("r+b", buffering=0) as full:
         publication = Publication(full.fileno())
-        desk = PublicationDesk(RUN, lambda _name: True, Chronicle(None))
+        desk = JournalServer(RUN, lambda _name: True, MasterEvents(None))
         desk.publication = publication
         assert desk.welcome("Eye", Sniff(1)).why == ""
         publication.write(b"block")
@@ -147,7 +147,7 @@ def test_places_that_no_journal_has(start: object, publication: Publication) -> 
 def test_the_desk_asks_who_may_and_tells_what_it_said(publication: Publication) -> None:
     told: list[AnyEvent] = []
     may: set[str] = {"Eye"}
-    desk = PublicationDesk(RUN, may.__contains__, Chronicle(told.append))
+    desk = JournalServer(RUN, may.__contains__, MasterEvents(told.append))
     assert desk.welcome("Eye", Sniff(1)).why.endswith("it needs --sniffable")
     assert desk.answer("Eye", question(RUN, 0)) is None
     assert not desk.lagging

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from robochoc.communication.network.master_events import Chronicle
+from robochoc.communication.network.master_events import MasterEvents
 from robochoc.communication.network.quotas import BURST_S, EVENTS_A_SECOND
 from robochoc.journal.events import AnyEvent, Decided, Granted, Lost, Refused, Registered
 
@@ -18,7 +18,7 @@ def test_times_are_since_the_search_began(monkeypatch: pytest.MonkeyPatch) -> No
         "robochoc.communication.network.master_events.time", SimpleNamespace(monotonic=lambda: next(now))
     )
     told: list[AnyEvent] = []
-    chronicle = Chronicle(told.append)
+    chronicle = MasterEvents(told.append)
     chronicle.registered("A")
     chronicle.begin()
     chronicle.lost("A", "gone")
@@ -34,7 +34,7 @@ def test_times_are_since_the_search_began(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_robots_tell_of_themselves_only() -> None:
     told: list[AnyEvent] = []
-    chronicle = Chronicle(told.append)
+    chronicle = MasterEvents(told.append)
     own, others = (Decided(t=3.0, robot=name, assignment={"V": 1}, clock=1) for name in "AB")
     chronicle.told("A", [own, others, own])
     assert [event for event in told if isinstance(event, Decided)] == [own, own]
@@ -42,7 +42,7 @@ def test_robots_tell_of_themselves_only() -> None:
 
 
 def test_where_nobody_observes_nothing_is_told() -> None:
-    chronicle = Chronicle(None)
+    chronicle = MasterEvents(None)
     chronicle.refuse("A", "anything", "it may not")
     chronicle.registered("A")
 
@@ -50,7 +50,7 @@ def test_where_nobody_observes_nothing_is_told() -> None:
 def test_who_tells_more_than_robots_have_to_tell_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robochoc.communication.network.master_events.time", SimpleNamespace(monotonic=lambda: 0.0))
     told: list[AnyEvent] = []
-    chronicle = Chronicle(told.append)
+    chronicle = MasterEvents(told.append)
     flood = [Decided(t=3.0, robot="A", assignment={}, clock=1)] * EVENTS_A_SECOND
     for _ in range(int(BURST_S) + 3):
         chronicle.told("A", flood)

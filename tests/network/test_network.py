@@ -7,7 +7,7 @@ from random import Random
 import pytest
 
 from robochoc.communication.network.local import LocalNetwork
-from robochoc.communication.network.settings import Conditions
+from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.communication.run_result import RunResult
 from robochoc.generators.queens3d import queens3d
@@ -16,7 +16,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.findings import NOTHING
 from robochoc.run.registry import protocol_named
-from robochoc.solver.agent_problem import Brief
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooLargeError
 from robochoc.verification.checker import cost, objections
@@ -36,7 +36,7 @@ MANY = ("abt", "afc-ng", "awc", "dynabt", "sbt", "agile-abt", "afc-tree", "sfb",
 def run_over_network(
     team: Team | CompiledTeam,
     protocol: str,
-    conditions: Conditions = Conditions(),
+    conditions: NetworkSettings = NetworkSettings(),
     events: list[AnyEvent] | None = None,
 ) -> tuple[RunResult, tuple[bool, float] | None]:
     """The result, and what the robots themselves say of the values that were decided."""
@@ -53,7 +53,7 @@ def agrees(
     filters: tuple[str, ...] = (),
 ) -> Verdict:
     """The verdict is brute force's, and the robots' own check agrees with the checker's."""
-    result, checked = run_over_network(compiled_by_hand(team), protocol, Conditions(filters))
+    result, checked = run_over_network(compiled_by_hand(team), protocol, NetworkSettings(filters))
     truth = next(solutions(team), None)
     assert result.verdict is (Verdict.NO_SOLUTION if truth is None else Verdict.SOLUTION), (team, protocol)
     assert not result.lost
@@ -116,7 +116,7 @@ def test_costs(protocol: str, seed: int) -> None:
 def test_local_search_ends_by_itself() -> None:
     """An incomplete protocol need not find the best; what it decides is told, and its cost agreed on."""
     team = random_cost_team(Random("network mgm"), n_ary=False)
-    with LocalNetwork(team, protocol_named("mgm"), brief=Brief(settings={"cycles": "20"})) as network:
+    with LocalNetwork(team, protocol_named("mgm"), brief=RunParameters(settings={"cycles": "20"})) as network:
         result = network.search(TIMEOUT_S)
         held, told = network.master.checked(result.assignments)
     assert set(result.assignments) == set(team.order)
@@ -129,7 +129,7 @@ def test_local_search_ends_by_itself() -> None:
 def test_four_queens(filters: tuple[str, ...]) -> None:
     """All that happens is observed: who comes, and every message twice."""
     events: list[AnyEvent] = []
-    result, _ = run_over_network(queens3d(4), "abt", Conditions(filters), events=events)
+    result, _ = run_over_network(queens3d(4), "abt", NetworkSettings(filters), events=events)
     assert (result.verdict, result.witness) == (Verdict.NO_SOLUTION, "Robot1.1")
     assert {e.robot for e in events if isinstance(e, Registered)} == set(queens3d(4).order)
     sent = sum(isinstance(e, Sent) for e in events)
@@ -148,7 +148,7 @@ def test_what_is_observed_of_a_solution_is_complete() -> None:
 
 
 def test_a_private_run_tells_no_values() -> None:
-    result, _ = run_over_network(CHAIN, "abt", Conditions(private=True))
+    result, _ = run_over_network(CHAIN, "abt", NetworkSettings(private=True))
     assert result.verdict is Verdict.SOLUTION
     assert not any(result.assignments.values())
     assert all(findings == NOTHING for findings in result.findings.values())
@@ -172,7 +172,7 @@ def test_limits() -> None:
 
 def test_when_the_time_is_over_there_is_what_was_decided_so_far() -> None:
     def searched(limit: float) -> RunResult:
-        with LocalNetwork(CHAIN, Held, brief=Brief(settings={"file": "/nowhere"})) as network:
+        with LocalNetwork(CHAIN, Held, brief=RunParameters(settings={"file": "/nowhere"})) as network:
             return network.search(timeout=limit)
 
     result = once(lambda result: len(result.assignments) == len(CHAIN.order), searched)

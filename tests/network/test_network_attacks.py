@@ -24,7 +24,7 @@ from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot import NetworkRobot
 from robochoc.communication.network.router import Router
-from robochoc.communication.network.transport import CannotConnectError, Post
+from robochoc.communication.network.transport import CannotConnectError, Transport
 from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.abt import Ok
@@ -72,17 +72,17 @@ def test_a_robot_that_is_not_of_the_team(run: NetworkRun) -> None:
 def test_a_certificate_of_another_authority(run: NetworkRun) -> None:
     other = Household(CHAIN.order).identity("RX0")
     with pytest.raises(CannotConnectError, match="does not let RX0 in"):
-        Post(run.endpoint, other, patience_s=SOON_S)
+        Transport(run.endpoint, other, patience_s=SOON_S)
     run.wait_for_refusal("somebody", "connect", "does not believe the master")
     with pytest.raises(CannotConnectError):  # this one does not mind whom it talks to
-        Post(run.endpoint, replace(other, ca=run.household.identity("RX0").ca), patience_s=SOON_S)
+        Transport(run.endpoint, replace(other, ca=run.household.identity("RX0").ca), patience_s=SOON_S)
     run.wait_for_refusal("somebody", "connect", "its certificate is not of this Authority")
     run.wait_for_progress()
 
 
 def test_a_certificate_that_has_expired(run: NetworkRun) -> None:
     with pytest.raises(CannotConnectError):
-        Post(run.endpoint, out_of_date(run.household, "RX0"), patience_s=SOON_S)
+        Transport(run.endpoint, out_of_date(run.household, "RX0"), patience_s=SOON_S)
     run.wait_for_refusal("somebody", "connect", "its certificate has expired")
     run.wait_for_progress()
 

@@ -6,10 +6,10 @@ import time
 from pathlib import Path
 
 from robochoc.communication.network.control_messages import Bye, Joined, Leave, Register, Welcome
-from robochoc.communication.network.framing import MASTER, Letters, Opened
+from robochoc.communication.network.framing import MASTER, Framing, Opened
 from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.profile import profile_of
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.transport import Transport
 from tests.support.held import CHAIN
 from tests.support.network_runs import SLICE_S, NetworkRun
 from tests.support.relays import Relay
@@ -34,7 +34,7 @@ def test_robots_that_are_away_for_a_moment_hear_the_masters_farewell(tmp_path: P
 def test_who_joins_while_the_master_says_farewell_hears_it(tmp_path: Path) -> None:
     """Not before: it may not have been welcomed yet, and would take it for another run's."""
     with NetworkRun(tmp_path, absent=CHAIN.order) as run, run.post("RX0") as post:
-        letters = Letters("RX0")
+        letters = Framing("RX0")
         post.send(MASTER, letters.write(MASTER, Register(profile_of(CHAIN["RX0"]), "a life")))
         run.give_up()
         welcomes = [heard(post, letters) for _ in range(4)]  # until it answers
@@ -47,7 +47,7 @@ def test_who_joins_while_the_master_says_farewell_hears_it(tmp_path: Path) -> No
         post.send(MASTER, letters.write(MASTER, Bye()))
 
 
-def heard(post: Post, letters: Letters) -> Opened:
+def heard(post: Transport, letters: Framing) -> Opened:
     item = post.inbox.get(timeout=10)
     assert isinstance(item, Arrived)
     return letters.read(MASTER, item.content)

@@ -21,13 +21,13 @@ from robochoc.authority.authority import Authority
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.robot import Ending, NetworkRobot
-from robochoc.communication.network.settings import Conditions
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.settings import NetworkSettings
+from robochoc.communication.network.transport import Transport
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.communication.run_result import RunResult
 from robochoc.journal.events import AnyEvent, Lost, Received, Sent
 from robochoc.model.outcome import Verdict
-from robochoc.solver.agent_problem import Brief
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.authorities import identity_of
 from tests.support.clocks import waiting
@@ -93,9 +93,9 @@ class Team:
 
 
 @contextmanager
-def held_team(folder: Path, conditions: Conditions = Conditions()) -> Iterator[Team]:
+def held_team(folder: Path, conditions: NetworkSettings = NetworkSettings()) -> Iterator[Team]:
     events: list[AnyEvent] = []
-    brief = Brief(settings={"file": str(folder / "go")})
+    brief = RunParameters(settings={"file": str(folder / "go")})
     with LocalNetwork(CHAIN, Held, observer=events.append, conditions=conditions, brief=brief) as network:
         team = Team(network, events, folder / "go")
         try:
@@ -126,7 +126,7 @@ def test_a_robot_killed_in_the_search(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_robots_killed_in_a_search_that_survives_it(tmp_path: Path) -> None:
-    with held_team(tmp_path, Conditions(survive=True)) as team:
+    with held_team(tmp_path, NetworkSettings(survive=True)) as team:
         team.wait_for_progress()
         team.strike("RX2", signal.SIGKILL)
         result = team.end()
@@ -143,7 +143,7 @@ def test_a_robot_killed_after_the_search(tmp_path: Path) -> None:
 
 
 def test_a_robot_that_is_stopped_for_too_long(tmp_path: Path) -> None:
-    with held_team(tmp_path, Conditions(lease_ms=1000, patience_s=2)) as team:
+    with held_team(tmp_path, NetworkSettings(lease_ms=1000, patience_s=2)) as team:
         team.wait_for_progress()
         team.strike("RX2", signal.SIGSTOP)
         with pytest.raises(RobotsLostError, match="RX2 was lost: it has not been there for 2 s"):
@@ -153,7 +153,7 @@ def test_a_robot_that_is_stopped_for_too_long(tmp_path: Path) -> None:
 @pytest.mark.parametrize("lease_ms", [10_000, pytest.param(500, marks=pytest.mark.slow)])
 def test_a_robot_that_is_stopped_for_a_while(tmp_path: Path, lease_ms: int) -> None:
     """Within the lease nobody notices; after it the router hangs up, and the robot comes back."""
-    with held_team(tmp_path, Conditions(lease_ms=lease_ms, patience_s=20)) as team:
+    with held_team(tmp_path, NetworkSettings(lease_ms=lease_ms, patience_s=20)) as team:
         team.wait_for_progress()
         team.strike("RX1", signal.SIGSTOP)
         time.sleep(1.5)
@@ -190,7 +190,7 @@ def test_a_link_that_is_down(
 ) -> None:
     """All robots are behind it. Afterwards all goes on, and nothing is lost."""
     with (
-        NetworkRun(tmp_path, conditions=Conditions(filters, patience_s=20), absent=CHAIN.order) as run,
+        NetworkRun(tmp_path, conditions=NetworkSettings(filters, patience_s=20), absent=CHAIN.order) as run,
         Relay(run.endpoint) as relay,
     ):
         for name in CHAIN.order:
@@ -210,7 +210,7 @@ def test_a_link_that_is_down(
 @pytest.mark.slow
 def test_a_link_of_one_robot_that_does_not_come_back(tmp_path: Path) -> None:
     with (
-        NetworkRun(tmp_path, conditions=Conditions(patience_s=3), absent=["RX3"]) as run,
+        NetworkRun(tmp_path, conditions=NetworkSettings(patience_s=3), absent=["RX3"]) as run,
         Relay(run.endpoint) as relay,
     ):
         run.start("RX3", relay.endpoint)
@@ -224,7 +224,7 @@ def test_a_link_of_one_robot_that_does_not_come_back(tmp_path: Path) -> None:
 
 def test_a_router_that_is_opened_anew(tmp_path: Path) -> None:
     """Somebody else is enrolled in mid-run: that needs other rules, and so another router."""
-    with NetworkRun(tmp_path, conditions=Conditions(patience_s=20)) as run:
+    with NetworkRun(tmp_path, conditions=NetworkSettings(patience_s=20)) as run:
         run.wait_for_progress()
         for number in range(2):
             before = run.router
@@ -238,7 +238,7 @@ def test_a_router_that_is_opened_anew(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_router_that_dies(tmp_path: Path) -> None:
-    with NetworkRun(tmp_path, conditions=Conditions(patience_s=3)) as run:
+    with NetworkRun(tmp_path, conditions=NetworkSettings(patience_s=3)) as run:
         run.wait_for_progress()
         os.kill(run.router, signal.SIGKILL)
         with pytest.raises(RobotsLostError, match="the router's process has ended"):
@@ -304,7 +304,7 @@ class Elsewhere:
 
     def _take_part(self, name: str, patience_s: float) -> None:
         identity = self.identities[name]
-        with Post(self.endpoint, identity, watch=(), patience_s=30) as post:
+        with Transport(self.endpoint, identity, watch=(), patience_s=30) as post:
             robot = NetworkRobot(CompiledRobot(CHAIN[name]), identity, post, lambda _: Held, Manner(patience_s))
             self.endings[name] = robot.run()
 

@@ -19,8 +19,8 @@ from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.inbox import Arrived, Missed
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.router import Router
-from robochoc.communication.network.settings import LEASE_MS, Conditions
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.settings import LEASE_MS, NetworkSettings
+from robochoc.communication.network.transport import Transport
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.model.outcome import Verdict
 from tests.support.faults import wait_until
@@ -44,7 +44,7 @@ class Watched(Household):
 
 
 @contextmanager
-def watched(folder: Path, conditions: Conditions = Conditions()) -> Iterator[NetworkRun]:
+def watched(folder: Path, conditions: NetworkSettings = NetworkSettings()) -> Iterator[NetworkRun]:
     run = NetworkRun(folder, CHAIN, conditions)
     run.household = Watched(CHAIN.order)
     with run:
@@ -52,7 +52,7 @@ def watched(folder: Path, conditions: Conditions = Conditions()) -> Iterator[Net
         yield run
 
 
-def put_with_a_gap(post: Post, receiver: str, content: bytes) -> None:
+def put_with_a_gap(post: Transport, receiver: str, content: bytes) -> None:
     """Three packets on the own key, of a source of the own, the last one with a number far beyond."""
     key = letter_key(receiver, post.name)
     publisher = post._session.declare_publisher(  # noqa: SLF001
@@ -76,7 +76,7 @@ def test_an_observers_gap_is_its_own(tmp_path: Path) -> None:
 
 
 def test_a_robots_gap_is_its_loss(tmp_path: Path) -> None:
-    with watched(tmp_path, Conditions(survive=True, patience_s=2)) as run, run.post("RX3") as post:
+    with watched(tmp_path, NetworkSettings(survive=True, patience_s=2)) as run, run.post("RX3") as post:
         put_with_a_gap(post, MASTER, b"anything")
         result = run.wait_for_result()
     assert result.lost == {"RX3": f"{FAR - 3:,} letters of it were lost for good on the way to the master"}
@@ -96,7 +96,7 @@ def test_a_gap_between_robots_that_is_none_is_told_and_ends_nothing(tmp_path: Pa
 @pytest.mark.slow
 def test_a_gap_between_robots_that_is_one_names_the_sender(tmp_path: Path) -> None:
     """With the key of RX3 somebody has taken the number of a letter of RX3, and there is a gap."""
-    with watched(tmp_path, Conditions(patience_s=3)) as run:
+    with watched(tmp_path, NetworkSettings(patience_s=3)) as run:
         with run.post("RX3") as post:
             put_with_a_gap(post, "RX2", letter(run, "RX3", "RX2", Said(0, 0, b"")))
             run.wait_for_refusal("RX3", "a letter to RX2", "lost for good")
@@ -109,7 +109,7 @@ def test_a_gap_is_put_down_to_whose_key_it_came_on() -> None:
     household = Household(("A", "B", "C"))
     router = Router(free_endpoint(), household.master_identity(("127.0.0.1",)), None, LEASE_MS)
     router.open({"A": (ALL,), "B": (ALL,), "C": (ALL,)})
-    join = partial(Post, router.endpoint, watch=(), patience_s=PATIENCE_S)
+    join = partial(Transport, router.endpoint, watch=(), patience_s=PATIENCE_S)
     try:
         with (
             join(household.identity("A")) as a,

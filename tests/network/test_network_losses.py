@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 
 from robochoc.communication.network.local import LocalNetwork
-from robochoc.communication.network.settings import Conditions
+from robochoc.communication.network.settings import NetworkSettings
 from robochoc.formats import PREDEFINED
 from robochoc.journal.events import AnyEvent, Lost, Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint
 from robochoc.run.registry import protocol_named
-from robochoc.run.scenario import Journey, Played
-from robochoc.solver.agent_problem import Brief
+from robochoc.run.scenario import Played, ScenarioRun
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.checker import objections
 from tests.support.complex_problems import complex_team
@@ -45,11 +45,11 @@ def test_those_who_are_left_go_on_with_the_values_that_they_had(tmp_path: Path) 
             go.touch()
         events.append(event)
 
-    brief = Brief(settings={"file": str(go)})
-    journey = Journey(TEAM, None, CompiledTeam, lambda: None, brief=brief)
+    brief = RunParameters(settings={"file": str(go)})
+    journey = ScenarioRun(TEAM, None, CompiledTeam, lambda: None, brief=brief)
     played: list[Played] = []
     with LocalNetwork(
-        journey.compiled(), Held, observer=observe, conditions=Conditions(survive=True), brief=brief
+        journey.compiled(), Held, observer=observe, conditions=NetworkSettings(survive=True), brief=brief
     ) as network:
         for one in journey.go(network, lambda _: None):
             played.append(one)

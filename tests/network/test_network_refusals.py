@@ -7,7 +7,7 @@ import threading
 from robochoc.communication.control import Conclusion, Counters, Ready
 from robochoc.communication.network.refusals import KINDS, LONGEST, WHO, Refusals
 from robochoc.communication.network.router import Log, Refusal
-from robochoc.communication.network.search_state import Tally, is_of
+from robochoc.communication.network.search_state import SearchState, is_of
 from robochoc.journal.events import Decided, Received, Refused
 from robochoc.model.outcome import Verdict
 from tests.support.clocks import working
@@ -23,7 +23,7 @@ def test_what_a_robot_tells_of_others() -> None:
 
 
 def test_what_a_tally_does_not_take() -> None:
-    tally = Tally(2, ["A", "B"])
+    tally = SearchState(2, ["A", "B"])
     for word in (Conclusion(2, "maybe"), Conclusion(1, "no-solution"), Counters(1, 0, 5, 5), Ready(1)):
         tally.hear("A", word)
     tally.hear("C", Conclusion(2, "no-solution"))
@@ -36,7 +36,7 @@ def test_what_a_tally_does_not_take() -> None:
 
 
 def test_messages_that_are_missing_are_told_only_when_nothing_moves_any_more() -> None:
-    tally = Tally(1, ["A", "B"])
+    tally = SearchState(1, ["A", "B"])
     tally.hear("A", Counters(1, 0, 3, 0))
     assert tally.missing(0, 10) == 0
     tally.hear("B", Counters(1, 0, 0, 2))

@@ -29,11 +29,11 @@ from robochoc.communication.network.control_messages import (
     Welcome,
     Word,
 )
-from robochoc.communication.network.framing import MASTER, Letter, Letters
+from robochoc.communication.network.framing import MASTER, Framing, Letter
 from robochoc.communication.network.inbox import Arrived, Item, Presence, Woken
 from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.robot import Ending, NetworkRobot
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.transport import Transport
 from robochoc.protocols.abt import ABT
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.lone_robot import LEAVE, UNPROVEN, differ, ok, played, task
@@ -187,7 +187,7 @@ def test_orders_of_another_search_are_objected_to(word: Word) -> None:
         (msgspec.msgpack.encode(Letter(RUN, 1, Pause())), "malformed"),
         (msgspec.msgpack.encode(Letter(RUN, 1, Leave("now", failed=False))), "malformed"),
         (msgspec.msgpack.encode(Letter(RUN, 1, Welcome("v", RUN, (), observed=False, private=False))), "malformed"),
-        (Letters("RA", "another").write("RB", Said(1, 0, ok(1))), "another run"),
+        (Framing("RA", "another").write("RB", Said(1, 0, ok(1))), "another run"),
         (msgspec.msgpack.encode(Letter(RUN, 2, Said(1, 0, ok(1)))), "letter 1 is missing"),
         (msgspec.msgpack.encode(Letter(RUN, 0, Said(1, 0, ok(1)))), "replay"),
     ],
@@ -240,7 +240,7 @@ def test_what_is_no_message_is_refused_and_takes_no_place() -> None:
             case Ready():
                 yield Search(1)
                 for content in (b"no message", ok(1)):
-                    yield Arrived("RA", Letters("RA", RUN).write("RB", Said(1, 0, content)))
+                    yield Arrived("RA", Framing("RA", RUN).write("RB", Said(1, 0, content)))
             case Counters(_, 0, _, 1):
                 yield LEAVE
             case _:
@@ -293,7 +293,9 @@ def test_noise_before_the_welcome_is_nothing_to_tell() -> None:
     post.inbox.put(Arrived(MASTER, msgspec.msgpack.encode(Letter("", 1, LEAVE))))
     post.inbox.put(Arrived(MASTER, msgspec.msgpack.encode(Letter("", 0, Denied("another's", "no")))))
     post.router = ""
-    robot = NetworkRobot(CompiledRobot(differ()["RB"]), UNPROVEN, cast("Post", post), lambda _name: ABT, Manner(0.01))
+    robot = NetworkRobot(
+        CompiledRobot(differ()["RB"]), UNPROVEN, cast("Transport", post), lambda _name: ABT, Manner(0.01)
+    )
     assert robot.run().why == "the master is gone: no link to it for 0.01 s"
     assert [type(word) for word in post.heard] == [Register]
     assert not played(script)[0].failed

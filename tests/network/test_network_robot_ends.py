@@ -26,12 +26,12 @@ from robochoc.communication.network.control_messages import (
     Welcome,
     Word,
 )
-from robochoc.communication.network.framing import MASTER, Letter, Letters
+from robochoc.communication.network.framing import MASTER, Framing, Letter
 from robochoc.communication.network.inbox import Arrived, Item, Missed
 from robochoc.communication.network.quotas import Kept, Share
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.shared import PredicateRecord, SharedRecord
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.transport import Transport
 from robochoc.model.problem import INFINITE, Model
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.awc import AWC
@@ -146,7 +146,7 @@ def test_copies_before_the_task_are_kept_and_later_ones_change_nothing() -> None
     assert len(post.heard_of(Ready)) == 1
     ((receiver, content),) = post.sent
     assert receiver == "RA"
-    assert isinstance(Letters("RA", RUN).read("RB", content).word, Copies)
+    assert isinstance(Framing("RA", RUN).read("RB", content).word, Copies)
 
 
 def test_without_copies_a_robot_is_not_ready_but_reports() -> None:
@@ -180,7 +180,7 @@ def test_who_is_denied_ends() -> None:
         yield post.letter(Denied(word.visit, "a robot called RB is registered already"))
 
     post = Scripted("RB", answers)
-    ending = NetworkRobot(CompiledRobot(differ()["RB"]), UNPROVEN, cast("Post", post), lambda _name: ABT).run()
+    ending = NetworkRobot(CompiledRobot(differ()["RB"]), UNPROVEN, cast("Transport", post), lambda _name: ABT).run()
     assert ending == Ending(
         "the master does not take RB: a robot called RB is registered already", failed=True, assignment={}
     )

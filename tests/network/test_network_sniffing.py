@@ -18,7 +18,7 @@ import zenoh
 
 from robochoc.communication.network.access import ALL, journal_key
 from robochoc.communication.network.control_messages import Sniff, Sniffable
-from robochoc.communication.network.framing import MASTER, Letters
+from robochoc.communication.network.framing import MASTER, Framing
 from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.journal_server import ANSWERED_AT_MOST, Publication, piece_in, question
 from robochoc.communication.network.transport import CannotConnectError
@@ -261,7 +261,7 @@ def test_a_master_that_gives_nothing_out(tmp_path: Path) -> None:
         run.wait_for_refusal("Eye", "sniff", "--sniffable")
         with run.post("Eye") as post:
             assert post.ask(journal_key("Eye"), question(run.master.run, 0), PATIENCE_S) is None
-            letters = Letters("Eye")
+            letters = Framing("Eye")
             for number in range(50):
                 post.send(MASTER, letters.write(MASTER, Sniff(number)))
             run.wait_for_refusal("Eye", "ask", "more than 20 requests a second")

@@ -11,7 +11,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.abt import ABT
 from robochoc.run.registry import protocol_named, protocol_names
-from robochoc.solver.agent_problem import Brief
+from robochoc.solver.agent_problem import RunParameters
 from tests.support.cost_problems import least_cost, random_cost_team
 from tests.support.lone_robot import differ
 from tests.support.offices import Office
@@ -45,7 +45,7 @@ def test_nobody_is_doubted_who_is_honest(name: str) -> None:
     protocol = protocol_named(name)
     chance = Random(4)
     team = random_cost_team(chance, n_ary=False) if protocol.traits.costs else random_team(chance, n_ary=False)
-    brief = Brief(settings={"cycles": "5"} if hasattr(protocol.settings, "cycles") else {})
+    brief = RunParameters(settings={"cycles": "5"} if hasattr(protocol.settings, "cycles") else {})
     office = Office(known_to_both(team), protocol, brief=brief)
     result = office.search()
     assert not office.failures

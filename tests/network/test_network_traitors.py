@@ -10,11 +10,11 @@ import msgspec
 import pytest
 
 from robochoc.communication.network.control_messages import Copies, Denied, Register, Said, Word
-from robochoc.communication.network.framing import MASTER, Letters
+from robochoc.communication.network.framing import MASTER, Framing
 from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.profile import Profile, profile_of
-from robochoc.communication.network.settings import Conditions
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.settings import NetworkSettings
+from robochoc.communication.network.transport import Transport
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
@@ -28,7 +28,7 @@ from tests.support.network_runs import NetworkRun, letter
 
 @pytest.mark.parametrize("filters", [("signed", "sealed"), pytest.param((), marks=pytest.mark.slow)])
 def test_a_robot_is_revoked_and_the_others_are_told_of_it(tmp_path: Path, filters: tuple[str, ...]) -> None:
-    with NetworkRun(tmp_path, conditions=Conditions(filters, survive=True, patience_s=2)) as run:
+    with NetworkRun(tmp_path, conditions=NetworkSettings(filters, survive=True, patience_s=2)) as run:
         run.wait_for_progress()
         run.household.revoke("RX2")
         result = run.wait_for_result()
@@ -43,7 +43,7 @@ def test_a_robot_is_revoked_and_the_others_are_told_of_it(tmp_path: Path, filter
 
 @pytest.mark.slow
 def test_a_robot_is_revoked_and_the_run_ends(tmp_path: Path) -> None:
-    with NetworkRun(tmp_path, conditions=Conditions(patience_s=3)) as run:
+    with NetworkRun(tmp_path, conditions=NetworkSettings(patience_s=3)) as run:
         run.wait_for_progress()
         run.household.revoke("RX2")
         with pytest.raises(RobotsLostError, match="RX2 was lost: its certificate was revoked"):
@@ -83,9 +83,9 @@ def test_profiles_that_lie(tmp_path: Path) -> None:
         assert run.let_go().verdict is Verdict.SOLUTION
 
 
-def told(post: Post, visit: str) -> bool:
+def told(post: Transport, visit: str) -> bool:
     """Whether the master denies the registration `visit`."""
-    letters = Letters(post.name)
+    letters = Framing(post.name)
     while isinstance(item := post.inbox.get(timeout=10), Arrived):
         word = letters.read(item.sender, item.content).word
         if isinstance(word, Denied) and word.visit == visit:
@@ -110,7 +110,7 @@ def test_what_the_directory_cannot_take_does_not_keep_a_robot_out(tmp_path: Path
 )
 def test_a_router_that_changes_letters(tmp_path: Path, filters: tuple[str, ...]) -> None:
     """It can put on any key. What it makes up, changes or moves elsewhere is not genuine, whoever it is from."""
-    with NetworkRun(tmp_path, TRIANGLE, Conditions(filters)) as run:
+    with NetworkRun(tmp_path, TRIANGLE, NetworkSettings(filters)) as run:
         run.wait_for_progress()
         with run.post("RX0") as reader, run.post("RX1") as carrier:
             true = recorded_said(reader)
@@ -130,23 +130,23 @@ def test_constraints_that_others_have_to_know_are_sealed_too(
 ) -> None:
     monkeypatch.setattr(Held, "traits", replace(Held.traits, everywhere=True))
     sent: list[bytes] = []
-    write = Letters.write
+    write = Framing.write
 
-    def recorded(letters: Letters, receiver: str, word: Word) -> bytes:
+    def recorded(letters: Framing, receiver: str, word: Word) -> bytes:
         content = write(letters, receiver, word)
         if isinstance(word, Copies):
             sent.append(content)
         return content
 
-    monkeypatch.setattr(Letters, "write", recorded)
-    with NetworkRun(tmp_path, TRIANGLE, Conditions(filters)) as run:
+    monkeypatch.setattr(Framing, "write", recorded)
+    with NetworkRun(tmp_path, TRIANGLE, NetworkSettings(filters)) as run:
         assert run.let_go().verdict is Verdict.NO_SOLUTION
     assert len(sent) == 3
     assert any(b"ne(X" in content for content in sent) is not bool(filters)
 
 
-def recorded_said(reader: Post) -> Said:
-    letters = Letters(reader.name)
+def recorded_said(reader: Transport) -> Said:
+    letters = Framing(reader.name)
     while isinstance(item := reader.inbox.get(timeout=10), Arrived):
         word = letters._of_robot.decode(item.content).word if item.sender != MASTER else None  # noqa: SLF001
         if isinstance(word, Said):
@@ -157,7 +157,7 @@ def recorded_said(reader: Post) -> Said:
 @pytest.mark.slow
 def test_a_message_that_is_lost_for_good_ends_the_run(tmp_path: Path) -> None:
     """With the key of RX2 somebody has said nothing, in a letter that bears the number of RX2's first one."""
-    with NetworkRun(tmp_path, conditions=Conditions(patience_s=3)) as run:
+    with NetworkRun(tmp_path, conditions=NetworkSettings(patience_s=3)) as run:
         run.wait_for_progress()
         with run.post("RX2") as post:
             post.send("RX3", letter(run, "RX2", "RX3", Said(0, 0, b"")))

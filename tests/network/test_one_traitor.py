@@ -13,11 +13,11 @@ from robochoc.cli.reports.outcome import report
 from robochoc.communication.control import Conclusion, Counters, Ready
 from robochoc.communication.network.control_messages import Account, Exchanged, Judged
 from robochoc.communication.network.plausibility import Declared
-from robochoc.communication.network.search_state import Tally
+from robochoc.communication.network.search_state import SearchState
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.formats.result import read_result, result_json
-from robochoc.model.outcome import ALL_ROBOTS, Metrics, Outcome, Place, Thoroughness, Verdict
+from robochoc.model.outcome import ALL_ROBOTS, Metrics, Outcome, PseudoTreeNode, Thoroughness, Verdict
 from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.afc import AFC
@@ -126,8 +126,8 @@ def test_no_solution_rests_on_its_word(lied: Callable[..., Office]) -> None:
     assert (result.verdict, result.witness, result.lost) == (Verdict.NO_SOLUTION, "RB", {})
 
 
-def begun(traits: Traits = AFC.traits) -> Tally:
-    tally = Tally(1, ("RA", "RB", "RC"), None, Declared(traits))
+def begun(traits: Traits = AFC.traits) -> SearchState:
+    tally = SearchState(1, ("RA", "RB", "RC"), None, Declared(traits))
     tally.ordered = True
     return tally
 
@@ -357,7 +357,7 @@ def test_it_has_checked_what_cannot_be(lied: Callable[..., Office], change: dict
         (traitors.finding(Findings(bound=float("nan"))), "it tells of costs that cannot be"),
         (traitors.finding(Findings(best=Best(-1.0, {}))), "it tells of costs that cannot be"),
         (traitors.finding(Findings(best=Best(1, {"\x1b[2J": (1,)}))), "it tells of a robot that is not of the team"),
-        (traitors.finding(Findings(place=Place("R9"))), "it tells of a robot that is not of the team"),
+        (traitors.finding(Findings(place=PseudoTreeNode("R9"))), "it tells of a robot that is not of the team"),
         (traitors.finding(Findings(trail=Trail([(0, -1)], 0))), "it tells of cycles that cannot be"),
     ],
 )
@@ -405,7 +405,7 @@ def test_messages_that_nobody_has_sent(
     assert not office.tally.doubts_about_verdict, "a solution is checked, whatever was counted"
 
 
-def quiet(accounts: dict[str, Account], heard: dict[str, tuple[int, int]], traits: Traits) -> Tally:
+def quiet(accounts: dict[str, Account], heard: dict[str, tuple[int, int]], traits: Traits) -> SearchState:
     """All have answered two waves, and reported."""
     tally = begun(traits)
     for _ in range(2):

@@ -35,7 +35,7 @@ from robochoc.formats.extension import MAX_VALUES
 from robochoc.model.change import without
 from robochoc.model.problem import Domain, Kind, Robot, Team
 from robochoc.protocols.traits import Traits
-from robochoc.solver.agent_problem import NO_BRIEF, Brief, Part, parts
+from robochoc.solver.agent_problem import NO_BRIEF, AgentProblem, RunParameters, agent_problems
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
 from robochoc.solver.domain import CompiledDomain
 from tests.support.complex_problems import random_complex_team
@@ -79,15 +79,15 @@ def nothing_of(_robot: Robot) -> CompiledDomain:
     return CompiledDomain((), (), (), (), ())
 
 
-def part_of(robot: Robot, task: Task) -> Part:
+def part_of(robot: Robot, task: Task) -> AgentProblem:
     """What a robot knows across machines."""
-    brief = Brief(task.seed, task.settings, task.aside)
+    brief = RunParameters(task.seed, task.settings, task.aside)
     domains = {name: domain_of(name, ranges) for name, ranges in task.domains.items()}
     own = CompiledRobot(among(robot, task.interfaces), nothing_of)
-    return Part(own, task.order, task.interfaces, (), domains, task.links, task.secretive, brief)
+    return AgentProblem(own, task.order, task.interfaces, (), domains, task.links, task.secretive, brief)
 
 
-def comparable(part: Part) -> Part:
+def comparable(part: AgentProblem) -> AgentProblem:
     """Without what says the same twice: the names of domains, and what a robot shows that its file implies."""
     domains = {name: Domain(name, domain.ranges) for name, domain in part.domains.items()}
     return part._replace(
@@ -99,9 +99,9 @@ def comparable(part: Part) -> Part:
     )
 
 
-def assert_same(team: Team, members: Members, robots: Sequence[Robot], brief: Brief) -> None:
+def assert_same(team: Team, members: Members, robots: Sequence[Robot], brief: RunParameters) -> None:
     """What robots know by the master's word is what they would know in a process of the whole team."""
-    expected = parts(CompiledTeam(team, nothing_of), brief, tree=True)
+    expected = agent_problems(CompiledTeam(team, nothing_of), brief, tree=True)
     tasks = members.tasks(1, "abt", TREE, brief)
     assert list(tasks) == list(expected)
     for robot in robots:
@@ -113,7 +113,7 @@ def assert_same(team: Team, members: Members, robots: Sequence[Robot], brief: Br
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
 def test_robots_of_files_know_what_the_whole_team_would_tell_them(folder: Path) -> None:
     team = read_team(folder)
-    brief = Brief(3, {"p": "0.5"}, 17.5)
+    brief = RunParameters(3, {"p": "0.5"}, 17.5)
     assert_same(team, registered(team), team.robots, brief)
 
 
@@ -131,7 +131,7 @@ def test_robots_left_behind_know_what_a_smaller_team_would_tell_them(team: Team,
     members.remove(gone)
     left = without(team, gone)
     assert members.order == left.order
-    expected = parts(CompiledTeam(left, nothing_of), tree=True)
+    expected = agent_problems(CompiledTeam(left, nothing_of), tree=True)
     for name, task in members.tasks(2, "abt", TREE, NO_BRIEF).items():
         known = part_of(team[name], task)
         assert replace(known.robot, shown=()) == replace(left[name], shown=())
@@ -221,9 +221,9 @@ def test_a_silhouette_shows_what_was_told() -> None:
         (changed(variables={"X": ((5, 6), (1, 2))}), "not ascending"),
         (changed(variables={"X": ((1, MAX_VALUES + 1),)}), "X has 100,001 values"),
         (changed(variables={"X": ((-(2**63), 2**63 - 1),)}), "X has 18,446,744,073,709,551,616 values"),
-        (changed(dearest=float("nan")), "costs"),
-        (changed(dearest=float("inf")), "costs"),
-        (changed(dearest=-1.0), "costs"),
+        (changed(max_cost=float("nan")), "costs"),
+        (changed(max_cost=float("inf")), "costs"),
+        (changed(max_cost=-1.0), "costs"),
         (changed(weight=0), "weight"),
         (changed(weight=LARGEST_WEIGHT + 1), "weight"),
     ],

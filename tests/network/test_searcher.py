@@ -21,7 +21,7 @@ from robochoc.communication.network.control_messages import (
 )
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.quotas import MIB
-from robochoc.communication.network.search_state import Tally
+from robochoc.communication.network.search_state import SearchState
 from robochoc.communication.network.searcher import EVENTS_AT_ONCE, Searcher, Surroundings
 from robochoc.communication.network.shared import SharedRecord, record_of
 from robochoc.formats import PREDEFINED
@@ -33,7 +33,7 @@ from robochoc.protocols.awc import AWC
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.syncbb import BestPath, Path, SyncBB
-from robochoc.solver.agent_problem import NO_BRIEF, Brief
+from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.explanation import held
 from tests.support.problems import team_of
@@ -68,7 +68,7 @@ def chain(cost: float = INFINITE) -> Team:
     return team_of(dict.fromkeys("ABC", (1, 2)), [*constraints, Constraint("P", PREDEFINED["lt"], ("B", 9), ("B", 9))])
 
 
-def tasks(team: Team, protocol: type[Protocol], brief: Brief = NO_BRIEF) -> dict[str, Task]:
+def tasks(team: Team, protocol: type[Protocol], brief: RunParameters = NO_BRIEF) -> dict[str, Task]:
     members = Members()
     for name, profile in profiles_of(team).items():
         members.register(name, profile, "visit")
@@ -76,7 +76,7 @@ def tasks(team: Team, protocol: type[Protocol], brief: Brief = NO_BRIEF) -> dict
 
 
 def searcher(
-    around: Surroundings, protocol: type[Protocol] = ABT, brief: Brief = NO_BRIEF, team: Team | None = None
+    around: Surroundings, protocol: type[Protocol] = ABT, brief: RunParameters = NO_BRIEF, team: Team | None = None
 ) -> Searcher:
     """RB's."""
     team = team or chain()
@@ -268,7 +268,7 @@ def test_checking_adds_up_what_its_constraints_charge() -> None:
 
 def test_who_steps_aside_answers_for_nothing() -> None:
     around = Around()
-    one = searcher(around.surroundings(), brief=Brief(aside=1))
+    one = searcher(around.surroundings(), brief=RunParameters(aside=1))
     one.prepare()
     assert one.judged({"A": 1, "C": 1}) == Checked(1, allowed=True, cost=0)
 
@@ -280,7 +280,7 @@ def believed(around: Around) -> Account:
     """Its account, which the master believes."""
     (account,) = around.heard(Account)
     assert isinstance(account, Account)
-    assert not Tally(1, ("RA", "RB", "RC")).hear("RB", account)
+    assert not SearchState(1, ("RA", "RB", "RC")).hear("RB", account)
     return account
 
 

@@ -17,14 +17,14 @@ from robochoc.authority.admission import Household
 from robochoc.communication.control import Failed
 from robochoc.communication.network import transport as post
 from robochoc.communication.network.access import ALL, access_control
-from robochoc.communication.network.framing import LARGEST_LETTER, MASTER, Letters, MessageTooLargeError
+from robochoc.communication.network.framing import LARGEST_LETTER, MASTER, Framing, MessageTooLargeError
 from robochoc.communication.network.inbox import Arrived, Item
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.members import Members, RegistrationRefusedError
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.router import Router
 from robochoc.communication.network.settings import LEASE_MS
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.transport import Transport
 from robochoc.communication.network.zenoh_config import RX_BYTES, config
 from robochoc.generators.random_csp import random_csp
 from robochoc.protocols.abt import ABT
@@ -56,13 +56,13 @@ def router(household: Household) -> Iterator[Router]:
 
 
 @pytest.fixture
-def posts(household: Household, router: Router) -> Iterator[tuple[Post, Post]]:
-    join = partial(Post, router.endpoint, watch=(), patience_s=PATIENCE_S)
+def posts(household: Household, router: Router) -> Iterator[tuple[Transport, Transport]]:
+    join = partial(Transport, router.endpoint, watch=(), patience_s=PATIENCE_S)
     with join(household.identity("A")) as a, join(household.identity("B")) as b:
         yield a, b
 
 
-def letter(of: Post) -> Item:
+def letter(of: Transport) -> Item:
     return of.inbox.get(timeout=PATIENCE_S)
 
 
@@ -121,7 +121,7 @@ def test_the_router_is_ours_whatever_is_in_the_working_directory(
 # What is dropped without a word
 
 
-def test_letters_wait_for_a_receiver_that_does_not_look(posts: tuple[Post, Post]) -> None:
+def test_letters_wait_for_a_receiver_that_does_not_look(posts: tuple[Transport, Transport]) -> None:
     sender, receiver = posts
     for number in range(5_000):
         sender.send("B", number.to_bytes(2) * 200)
@@ -130,7 +130,7 @@ def test_letters_wait_for_a_receiver_that_does_not_look(posts: tuple[Post, Post]
     assert came == [*(Arrived("A", number.to_bytes(2) * 200) for number in range(5_000)), Arrived("A", b"last")]
 
 
-def test_the_largest_letter_arrives(posts: tuple[Post, Post]) -> None:
+def test_the_largest_letter_arrives(posts: tuple[Transport, Transport]) -> None:
     sender, receiver = posts
     content = os.urandom(LARGEST_LETTER)
     sender.send("B", content)
@@ -139,7 +139,7 @@ def test_the_largest_letter_arrives(posts: tuple[Post, Post]) -> None:
 
 def test_a_larger_one_is_refused_before_it_is_sent() -> None:
     assert RX_BYTES > LARGEST_LETTER
-    letters = Letters("A", "run")
+    letters = Framing("A", "run")
     with pytest.raises(
         MessageTooLargeError, match=r"a message of A to MASTER has 8,388,\d+ bytes, more than 8,388,608"
     ):
@@ -148,7 +148,7 @@ def test_a_larger_one_is_refused_before_it_is_sent() -> None:
 
 
 def test_what_was_sent_in_an_outage_arrives_without_a_heartbeat(
-    router: Router, posts: tuple[Post, Post], monkeypatch: pytest.MonkeyPatch
+    router: Router, posts: tuple[Transport, Transport], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The receiver asks for it as it sees the sender again. So heartbeats, which cost much, can be rare."""
     monkeypatch.setattr(post, "HEARTBEAT_S", 3600)
@@ -183,7 +183,7 @@ def test_a_program_forks_after_a_network_run_runs_another_and_ends() -> None:
 def test_sessions_open_and_close_at_once(household: Household, router: Router) -> None:
     with waiting(5):  # it takes some hundredths of a second; a machine may be busy
         for _ in range(5):
-            with Post(router.endpoint, household.identity("A"), watch=(), patience_s=PATIENCE_S) as one:
+            with Transport(router.endpoint, household.identity("A"), watch=(), patience_s=PATIENCE_S) as one:
                 one.send("B", b"hello")
 
 
@@ -205,7 +205,7 @@ def test_what_is_no_part_of_a_key_is_no_name(name: str) -> None:
 def test_a_profile_names_nobody_who_is_no_part_of_a_key() -> None:
     profile = profile_of(random_csp(3, 2, 1.0, 0.3, 1, connected=True).robots[0])
     bad = type(profile)(
-        profile.name, profile.kind, ("*",), (), profile.variables, {}, profile.weight, profile.dearest, ()
+        profile.name, profile.kind, ("*",), (), profile.variables, {}, profile.weight, profile.max_cost, ()
     )
     with pytest.raises(RegistrationRefusedError, match=r"'\*' is no name"):
         Members().register(profile.name, bad, "visit")

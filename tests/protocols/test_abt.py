@@ -9,7 +9,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.abt import ABT, AddLink, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import told, value
 from tests.support.problems import team_of
@@ -31,7 +31,7 @@ def triangle(values: int = 2) -> Team:
 def agent(team: Team, name: str) -> ABT:
     """The protocol object of one robot, started, with nothing left to say."""
     order = PriorityOrder(team.order)
-    abt = ABT(LocalProblem(parts(team)[name]), order)
+    abt = ABT(LocalProblem(agent_problems(team)[name]), order)
     abt.start()
     abt.outbox.clear()
     return abt
@@ -40,7 +40,7 @@ def agent(team: Team, name: str) -> ABT:
 def test_start_takes_the_first_value_and_tells_it_to_lower_neighbours_only() -> None:
     team = triangle()
     order = PriorityOrder(team.order)
-    abt = ABT(LocalProblem(parts(team)["RB"]), order)
+    abt = ABT(LocalProblem(agent_problems(team)["RB"]), order)
     abt.start()
     assert abt.outbox == [("RC", Ok((1,)))]
 

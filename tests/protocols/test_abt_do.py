@@ -15,7 +15,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.abt_do import ABTDORetro, AddLink, Counters, CurrentOrder, Nogood, Ok, Order
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import told, value
 from tests.support.problems import random_team, team_of
@@ -35,7 +35,7 @@ def clique(values: int = 3) -> Team:
 
 def agent(team: Team, name: str) -> ABTDORetro:
     """The protocol object of one robot, started, with nothing left to say."""
-    abt = ABTDORetro(LocalProblem(parts(team, everywhere=True)[name]), PriorityOrder(team.order))
+    abt = ABTDORetro(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
     abt.start()
     abt.outbox.clear()
     return abt
@@ -58,7 +58,7 @@ def orders(said: Sequence[tuple[str, Message]]) -> list[tuple[str, Message]]:
 
 def test_start_takes_the_first_value_and_tells_it_to_lower_neighbours_only() -> None:
     team = clique()
-    abt = ABTDORetro(LocalProblem(parts(team, everywhere=True)["RC"]), PriorityOrder(team.order))
+    abt = ABTDORetro(LocalProblem(agent_problems(team, everywhere=True)["RC"]), PriorityOrder(team.order))
     abt.start()
     assert abt.outbox == [("RD", Ok((1,), 3))]
 

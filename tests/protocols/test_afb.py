@@ -14,7 +14,7 @@ from robochoc.protocols.afb import AFB, CPA, FBCPA, FBEstimate, NewSolution, Ter
 from robochoc.protocols.afb_bounds import Cost
 from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import NO_BRIEF, Brief, parts
+from robochoc.solver.agent_problem import NO_BRIEF, RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import told, value
 from tests.support.problems import team_of
@@ -37,9 +37,9 @@ def chain() -> Team:
     return team_of(dict.fromkeys("ABCD", (1, 2)), constraints)
 
 
-def agent(team: Team, name: str, brief: Brief = NO_BRIEF) -> AFB:
+def agent(team: Team, name: str, brief: RunParameters = NO_BRIEF) -> AFB:
     """The protocol object of one robot, started, with nothing left to say."""
-    robot = AFB(LocalProblem(parts(team, brief=brief, everywhere=True)[name]), PriorityOrder(team.order))
+    robot = AFB(LocalProblem(agent_problems(team, brief=brief, everywhere=True)[name]), PriorityOrder(team.order))
     robot.start()
     robot.outbox.clear()
     return robot
@@ -73,7 +73,7 @@ def solution(cost: Cost, *values: int) -> NewSolution:
 
 
 def test_the_first_robot_generates_the_cpa_and_asks_all_others_for_estimates() -> None:
-    robot = AFB(LocalProblem(parts(team := chain(), everywhere=True)["RA"]), PriorityOrder(team.order))
+    robot = AFB(LocalProblem(agent_problems(team := chain(), everywhere=True)["RA"]), PriorityOrder(team.order))
     robot.start()
     first = cpa((1, 1), least=[0, 0])
     assert robot.outbox == [("RB", first), ("RC", asks((1, 1))), ("RD", asks((1, 1)))]
@@ -150,7 +150,7 @@ def test_an_n_ary_constraint_is_in_one_estimate_only() -> None:
 
 def test_of_a_robot_that_may_step_aside_nothing_is_expected() -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [priced("AB", {}, 5)])
-    assert agent(team, "RA", Brief(aside=9)).prices.estimates == [0]
+    assert agent(team, "RA", RunParameters(aside=9)).prices.estimates == [0]
 
 
 def test_what_a_cpa_has_in_common_with_the_last_one_is_not_priced_again() -> None:
@@ -326,7 +326,7 @@ def test_a_robot_with_an_empty_domain_says_so_at_once() -> None:
 
 def test_a_robot_alone_solves_its_problem_in_silence() -> None:
     team = team_of({"A": (1, 2)}, [priced("A", {(1,): 3, (2,): 1})])
-    robot = AFB(LocalProblem(parts(team)["RA"]), PriorityOrder(team.order))
+    robot = AFB(LocalProblem(agent_problems(team)["RA"]), PriorityOrder(team.order))
     robot.start()
     assert (robot.assignment, robot.outbox, robot.verdict) == ({"A": 2}, [], None)
 

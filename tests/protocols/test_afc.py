@@ -14,7 +14,7 @@ from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.afc import AFC, CPA, Assignments, BacktrackCPA, FcCPA, FilteredDomain, NotOk
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.sbt import SBT
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.problems import random_team, solutions, team_of
 
@@ -34,7 +34,7 @@ def square(values: int = 3) -> Team:
 
 def agent(team: Team, name: str) -> AFC:
     """The protocol object of one robot, started."""
-    afc = AFC(LocalProblem(parts(team)[name]), PriorityOrder(team.order))
+    afc = AFC(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
     afc.start()
     return afc
 
@@ -320,8 +320,8 @@ def test_filtering_step_by_step_finds_what_filtering_afresh_finds(seed: int) -> 
     chance = Random(f"filter {seed}")
     team = random_team(chance)
     order = PriorityOrder(team.order)
-    part = parts(team)[order.names[-1]]
-    above = [LocalProblem(parts(team)[name]).values for name in order.names[:-1]]
+    part = agent_problems(team)[order.names[-1]]
+    above = [LocalProblem(agent_problems(team)[name]).values for name in order.names[:-1]]
     if not all(above):
         return
     domain = FilteredDomain(LocalProblem(part), order)

@@ -15,7 +15,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.afc_ng import CPA, AFCng, Nogood, Solved
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import told, value
 from tests.support.complex_problems import complex_team
@@ -37,7 +37,7 @@ def triangle(values: int = 2) -> Team:
 
 def agent(team: Team, name: str) -> AFCng:
     """The protocol object of one robot, started, with nothing left to say."""
-    afc = AFCng(LocalProblem(parts(team)[name]), PriorityOrder(team.order))
+    afc = AFCng(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
     afc.start()
     afc.outbox.clear()
     return afc
@@ -50,7 +50,9 @@ def cpa(*assignments: tuple[int, int]) -> CPA:
 
 def test_the_first_robot_begins() -> None:
     team = triangle()
-    first, second = (AFCng(LocalProblem(parts(team)[name]), PriorityOrder(team.order)) for name in ("RA", "RB"))
+    first, second = (
+        AFCng(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order)) for name in ("RA", "RB")
+    )
     first.start()
     second.start()
     assert [message for _, message in first.outbox] == [cpa((1, 1))] * 2
@@ -71,7 +73,9 @@ def test_another_robot_s_cpa_only_checks_forward() -> None:
 
 
 def test_a_cpa_goes_to_the_next_robot_and_to_those_that_share_a_constraint() -> None:
-    afc = AFCng(LocalProblem(parts(team := different("ABCDE", "AD AE BC", 2))["RA"]), PriorityOrder(team.order))
+    afc = AFCng(
+        LocalProblem(agent_problems(team := different("ABCDE", "AD AE BC", 2))["RA"]), PriorityOrder(team.order)
+    )
     afc.start()
     assert [receiver for receiver, _ in afc.outbox] == ["RB", "RD", "RE"]
 
@@ -229,7 +233,7 @@ def test_who_is_told_a_solution_takes_its_value_and_is_silent() -> None:
 
 
 def test_a_robot_alone_solves_its_problem_in_silence() -> None:
-    afc = AFCng(LocalProblem(parts(team := team_of({"A": (4, 5)}, []))["RA"]), PriorityOrder(team.order))
+    afc = AFCng(LocalProblem(agent_problems(team := team_of({"A": (4, 5)}, []))["RA"]), PriorityOrder(team.order))
     afc.start()
     assert afc.assignment == {"A": 4}
     assert afc.outbox == []

@@ -16,7 +16,7 @@ from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.afc_ng import CPA, AFCng, Nogood, Solved
 from robochoc.protocols.afc_tree import Accept, AFCTree
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.verification.checker import objections
 from tests.support.agents import told, value
@@ -37,7 +37,7 @@ def fork(values: int = 3) -> Team:
 
 
 def created(team: Team, name: str) -> AFCTree:
-    part = parts(team, tree=True)[name]
+    part = agent_problems(team, tree=True)[name]
     return AFCTree(LocalProblem(part), PriorityOrder(part.order, part.links))
 
 
@@ -176,7 +176,7 @@ def test_a_part_without_solution_ends_the_search_of_all() -> None:
 def test_an_order_without_its_tree_is_refused() -> None:
     team = fork()
     with pytest.raises(ValueError, match="pseudo-tree"):
-        AFCTree(LocalProblem(parts(team)["RA"]), PriorityOrder(team.order))
+        AFCTree(LocalProblem(agent_problems(team)["RA"]), PriorityOrder(team.order))
 
 
 class Undetected(AFCTree):

@@ -19,7 +19,7 @@ from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.agile_abt import AddLink, AgileABT, Nogood, Ok, Order
 from robochoc.protocols.agile_order import UNKNOWN, Explanation, Proposal, compatible, ordered, proposed, updated
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import told, value
 from tests.support.problems import random_team, team_of
@@ -40,7 +40,7 @@ def triangle(values: int = 2) -> Team:
 
 def begun(team: Team, name: str) -> AgileABT:
     """The protocol object of one robot, started; what it has said is in its outbox."""
-    agile = AgileABT(LocalProblem(parts(team, everywhere=True)[name]), PriorityOrder(team.order))
+    agile = AgileABT(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
     agile.start()
     return agile
 

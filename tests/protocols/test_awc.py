@@ -11,7 +11,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.awc import AWC, AddLink, Kept, Nogood, NogoodList, Ok
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import told, value
 from tests.support.complex_problems import complex_team
@@ -33,7 +33,7 @@ def triangle(values: int = 2) -> Team:
 
 def agent(team: Team, name: str) -> AWC:
     """The protocol object of one robot, started, with nothing left to say."""
-    awc = AWC(LocalProblem(parts(team, everywhere=True)[name]), PriorityOrder(team.order))
+    awc = AWC(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
     awc.start()
     awc.outbox.clear()
     return awc
@@ -45,7 +45,7 @@ def nogood(assignments: Mapping[str, Value]) -> Nogood:
 
 def test_start_takes_the_first_value_and_tells_it_with_priority_0_to_all_neighbours() -> None:
     team = triangle()
-    awc = AWC(LocalProblem(parts(team, everywhere=True)["RB"]), PriorityOrder(team.order))
+    awc = AWC(LocalProblem(agent_problems(team, everywhere=True)["RB"]), PriorityOrder(team.order))
     awc.start()
     assert awc.outbox == [("RA", Ok((1,), 0)), ("RC", Ok((1,), 0))]
 

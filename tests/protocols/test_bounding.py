@@ -9,7 +9,7 @@ import pytest
 
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.outcome import Place, Verdict
+from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import adopt, bnb_adopt
 from robochoc.protocols.bounding import BoundingProtocol, Terminate
@@ -116,7 +116,7 @@ def test_a_robot_alone_takes_its_cheapest_value_in_silence(family: Family) -> No
     robot = alone(family, [3, 1])
     assert robot.assignment == {"A": 2}
     assert robot.outbox == []
-    assert (robot.findings.place, robot.findings.bound) == (Place(None), 1)
+    assert (robot.findings.place, robot.findings.bound) == (PseudoTreeNode(None), 1)
 
 
 @both

@@ -21,10 +21,10 @@ from robochoc.protocols.mgm2 import MGM2
 from robochoc.run.incumbent import best_of
 from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named
-from robochoc.solver.agent_problem import Brief
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.checker import objections
-from robochoc.verification.objective import aside_cost
+from robochoc.verification.objective import withdrawal_cost
 from tests.support.agents import told
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.courses import any_schedule, course_of, domains_of, played, robot_of, started
@@ -145,8 +145,8 @@ def test_who_may_step_aside_does_so_rather_than_break_anything(protocol: type[Cy
     aside = 0
     for seed in range(40):
         team = random_hard_team(chance)
-        price = aside_cost(team)
-        brief = Brief(seed, {"cycles": "25"}, aside=price)
+        price = withdrawal_cost(team)
+        brief = RunParameters(seed, {"cycles": "25"}, aside=price)
         result = Simulation(team, protocol, any_schedule(chance), brief=brief).search()
         assert result.verdict is Verdict.SOLUTION
         found = best_of(CompiledTeam(team), result, price)

@@ -15,14 +15,14 @@ from robochoc.communication.run_result import RunResult
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message
-from robochoc.model.outcome import Place, Verdict
+from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.dfs import Back, Token, TreeMessage, TreeProtocol, Wave
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import Traits
 from robochoc.run.orchestrator import Options, Runtime, solve
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import told
 from tests.support.problems import team_of
@@ -98,15 +98,15 @@ def neighbours_of(team: Team) -> dict[str, set[str]]:
     return met
 
 
-def expected(team: Team) -> dict[str, Place]:
+def expected(team: Team) -> dict[str, PseudoTreeNode]:
     """The tree that a depth-first search without any messages finds."""
     met = neighbours_of(team)
     strength = {name: (len(met[name]), -rank) for rank, name in enumerate(team.order)}
-    places: dict[str, Place] = {}
+    places: dict[str, PseudoTreeNode] = {}
 
     def visit(name: str, parent: str | None) -> None:
         above = tuple(other for other in team.order if other in places and other in met[name] and other != parent)
-        places[name] = Place(parent, above)
+        places[name] = PseudoTreeNode(parent, above)
         while left := [other for other in met[name] if other not in places]:
             visit(max(left, key=strength.__getitem__), name)
 
@@ -116,7 +116,7 @@ def expected(team: Team) -> dict[str, Place]:
     return places
 
 
-def above(places: Mapping[str, Place], name: str) -> Iterator[str]:
+def above(places: Mapping[str, PseudoTreeNode], name: str) -> Iterator[str]:
     """Those on the way from `name` to its root."""
     parent = places[name].parent
     while parent is not None:
@@ -197,12 +197,12 @@ def test_unconnected_parts_have_a_root_each() -> None:
     result, _ = played(graph("ABCDEF", "AB BC DE"), RandomChannels(0))
     places = {name: found.place for name, found in result.findings.items()}
     assert places == {
-        "RA": Place("RB"),
-        "RB": Place(None),
-        "RC": Place("RB"),
-        "RD": Place(None),
-        "RE": Place("RD"),
-        "RF": Place(None),
+        "RA": PseudoTreeNode("RB"),
+        "RB": PseudoTreeNode(None),
+        "RC": PseudoTreeNode("RB"),
+        "RD": PseudoTreeNode(None),
+        "RE": PseudoTreeNode("RD"),
+        "RF": PseudoTreeNode(None),
     }
 
 
@@ -220,7 +220,7 @@ TEAM = graph("ABCDE", "AB BC BD CD DE")
 
 
 def robot(name: str, team: Team = TEAM) -> Greeter:
-    return Greeter(LocalProblem(parts(team, everywhere=True)[name]), PriorityOrder(team.order))
+    return Greeter(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
 
 
 def started(name: str) -> Greeter:
@@ -243,7 +243,7 @@ def test_a_robot_alone_is_its_own_tree_and_says_nothing() -> None:
     greeter.start()
     assert greeter.outbox == []
     assert (greeter.begun, greeter.decided) == (1, 1)
-    assert greeter.findings.place == Place(None)
+    assert greeter.findings.place == PseudoTreeNode(None)
 
 
 def test_a_robot_without_values_ends_the_search() -> None:
@@ -287,7 +287,7 @@ def test_the_token_comes_back_when_all_neighbours_are_in_the_tree() -> None:
     told(greeter, ("RB", Wave(3, "RB")), ("RD", Wave(3, "RD")))
     said = told(greeter, ("RD", Token(["RB", "RD"])))
     assert said[0] == ("RD", Back(["RB", "RD", "RC"]))
-    assert greeter.findings.place == Place("RD", ("RB",))
+    assert greeter.findings.place == PseudoTreeNode("RD", ("RB",))
 
 
 def test_a_robot_begins_when_all_below_it_have_their_places() -> None:

@@ -22,7 +22,7 @@ from robochoc.model.problem import Constraint, Model, Team
 from robochoc.protocols.disfc import AddLink, DisFC, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver import filters
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.filters import allows
@@ -51,7 +51,7 @@ def triangle() -> Team:
 
 
 def unstarted(team: Team, name: str) -> DisFC:
-    return DisFC(LocalProblem(parts(team, everywhere=True)[name]), PriorityOrder(team.order))
+    return DisFC(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
 
 
 def agent(team: Team, name: str) -> DisFC:

@@ -15,7 +15,7 @@ from robochoc.model.message import Message, encode
 from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.protocols.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
 from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
-from robochoc.solver.agent_problem import Brief
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.solver.exact import EXACT
 from tests.support.agents import told
@@ -187,4 +187,4 @@ def test_a_value_that_comes_twice_is_refused() -> None:
 def test_the_limit_is_the_robots_too() -> None:
     """As the run's settings reach them."""
     with pytest.raises(TooLargeError):
-        Simulation(products("AB", "AB"), DPOP, RandomChannels(0), brief=Brief(settings={"memory": "9"})).run()
+        Simulation(products("AB", "AB"), DPOP, RandomChannels(0), brief=RunParameters(settings={"memory": "9"})).run()

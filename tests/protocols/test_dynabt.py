@@ -28,9 +28,9 @@ from robochoc.model.problem import (
 from robochoc.protocols.abt import AddLink, Ok
 from robochoc.protocols.dynabt import DynABT, Nogood
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.explanation import Void, void
+from robochoc.solver.explanation import Invalidated, invalidated_by
 from tests.protocols.test_abt import DIFFERENT, differ, triangle
 from tests.support.agents import told, value
 from tests.support.problems import team_of
@@ -38,7 +38,7 @@ from tests.support.problems import team_of
 
 def agent(team: Team, name: str) -> DynABT:
     """The protocol object of one robot, started, with nothing left to say."""
-    dynabt = DynABT(LocalProblem(parts(team)[name]), PriorityOrder(team.order))
+    dynabt = DynABT(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
     dynabt.start()
     dynabt.outbox.clear()
     return dynabt
@@ -47,7 +47,7 @@ def agent(team: Team, name: str) -> DynABT:
 def change(dynabt: DynABT, old: Team, new: Team) -> None:
     """Tell the robot what the runtime tells it between two epochs; nothing may be said meanwhile."""
     name = dynabt.problem.agent
-    dynabt.change(LocalProblem(parts(new)[name]), PriorityOrder(new.order), void(old, new))
+    dynabt.change(LocalProblem(agent_problems(new)[name]), PriorityOrder(new.order), invalidated_by(old, new))
     assert dynabt.outbox == []
 
 
@@ -311,7 +311,9 @@ def test_a_robot_of_an_old_name_is_a_stranger() -> None:
     told(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
     again = replace(team["RD"], parents=(Parent("RA", (named("A", "D", "N"),)),))
     new = changed(team, [RemoveAgent("RD"), AddAgent(again)])
-    dynabt.change(LocalProblem(parts(new)["RA"]), PriorityOrder(new.order), Void(frozenset(), frozenset({"RD"})))
+    dynabt.change(
+        LocalProblem(agent_problems(new)["RA"]), PriorityOrder(new.order), Invalidated(frozenset(), frozenset({"RD"}))
+    )
     dynabt.resume(quiet=True)
     assert dynabt.outbox == [("RD", Ok((2,)))]
 

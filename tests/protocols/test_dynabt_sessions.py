@@ -14,9 +14,9 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import AddAgent, Team
 from robochoc.run.registry import protocol_named
-from robochoc.run.scenario import Journey
+from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.explanation import Void, void
+from robochoc.solver.explanation import Invalidated, invalidated_by
 from robochoc.verification.checker import objections
 from tests.conformance.test_complex_teams import compiled_by_hand
 from tests.support.changes import random_journey, stages
@@ -31,7 +31,7 @@ def random_schedule(chance: Random) -> Schedule:
 
 def played(team: Team, schedule: Schedule) -> Counter[Verdict]:
     """The verdicts of all epochs that came to their end; each is right."""
-    journey = Journey(team, None, compiled_by_hand, lambda: None)
+    journey = ScenarioRun(team, None, compiled_by_hand, lambda: None)
     seen = Counter[Verdict]()
     with Simulation(journey.compiled(), protocol_named("dynabt"), schedule) as session:
         epochs = list(journey.go(session, lambda _: None))
@@ -70,8 +70,8 @@ def test_the_problem_may_change_again_before_the_search_goes_on() -> None:
             check(now, session.search())
             for event, new in zip(team.scenario, later, strict=True):
                 fresh = frozenset(change.robot.name for change in event.changes if isinstance(change, AddAgent))
-                keys, agents = void(now, new)
-                session.change(Epoch(CompiledTeam(new), Void(keys, agents | fresh), fresh))
+                keys, agents = invalidated_by(now, new)
+                session.change(Epoch(CompiledTeam(new), Invalidated(keys, agents | fresh), fresh))
                 now = new
                 if chance.random() < 0.6 or new is later[-1]:
                     check(now, session.search())

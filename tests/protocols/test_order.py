@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder, PseudoTree
-from robochoc.solver.agent_problem import Part, parts
+from robochoc.solver.agent_problem import AgentProblem, agent_problems
 from robochoc.solver.compile import Compiler
 from robochoc.solver.compiled_team import CompiledTeam
 from tests.support.complex_problems import random_complex_team
@@ -21,10 +21,10 @@ EVERY = settings(max_examples=50, deadline=None)
 complex_teams = st.integers(0, 2**32).map(lambda seed: random_complex_team(Random(seed)))
 
 
-def parts_of(team: Team) -> dict[str, Part]:
+def parts_of(team: Team) -> dict[str, AgentProblem]:
     """What each robot is told of the others, of their tree too."""
     with Compiler() as compiler:
-        return parts(CompiledTeam(team, lambda robot: compiler.compile(robot).domain), tree=True)
+        return agent_problems(CompiledTeam(team, lambda robot: compiler.compile(robot).domain), tree=True)
 
 
 def order_of(team: Team) -> PriorityOrder:

@@ -21,7 +21,7 @@ from robochoc.protocols.abt import ABT, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import objections
@@ -52,7 +52,7 @@ def pair_team(below: Constraint | None, above: Constraint | None, values: int = 
 
 def agent(team: Team, name: str) -> ABT:
     """The protocol object of one robot, started, with nothing left to say."""
-    abt = ABT(LocalProblem(parts(team)[name]), PriorityOrder(team.order))
+    abt = ABT(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
     abt.start()
     abt.outbox.clear()
     return abt
@@ -64,7 +64,7 @@ def agent(team: Team, name: str) -> ABT:
 def test_the_value_goes_up_too_where_a_pkc_is_shared_and_only_there() -> None:
     constraints = [part("AC"), replace(part("BC", name="T"), model=Model.TKC)]
     team = team_of(dict.fromkeys("ABC", (1, 2)), constraints)
-    abt = ABT(LocalProblem(parts(team)["RC"]), PriorityOrder(team.order))
+    abt = ABT(LocalProblem(agent_problems(team)["RC"]), PriorityOrder(team.order))
     abt.start()
     assert abt.outbox == [("RA", Ok((1,)))]
 
@@ -72,7 +72,7 @@ def test_the_value_goes_up_too_where_a_pkc_is_shared_and_only_there() -> None:
 def test_the_value_goes_up_where_only_the_parent_holds_a_part() -> None:
     shown = replace(part("AB", name="T"), model=Model.TKC)
     team = with_part(team_of(dict.fromkeys("AB", (1, 2)), [shown]), "RA", "RB", part("AB", (1, 1)))
-    assert LocalProblem(parts(team)["RB"]).partners == ("RA",)
+    assert LocalProblem(agent_problems(team)["RB"]).partners == ("RA",)
 
 
 def test_a_lower_robot_checks_its_own_part() -> None:
@@ -130,7 +130,7 @@ def test_a_refusal_names_only_the_variables_that_the_part_looks_at() -> None:
     domains = dict.fromkeys(("a", "A", "b", "B"), (1, 2))
     shown = [replace(part(pair, name="T"), model=Model.TKC) for pair in ("ab", "AB")]
     team = complex_team({"RA": ["a", "A"], "RB": ["b", "B"]}, domains, shown)
-    problem = LocalProblem(parts(with_part(team, "RA", "RB", part("AB", (1, 2))))["RA"])
+    problem = LocalProblem(agent_problems(with_part(team, "RA", "RB", part("AB", (1, 2))))["RA"])
     assert problem.refuses(0, "RB", (1, 2)) == {"RA": (None, 1), "RB": (None, 2)}
     assert problem.refuses(0, "RB", (2, 1)) is None
 

@@ -13,7 +13,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.sbt import CPA, SBT, Backtrack
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.problems import random_team, solutions, team_of
 
@@ -33,7 +33,7 @@ def triangle(values: int = 3) -> Team:
 
 def agent(team: Team, name: str) -> SBT:
     """The protocol object of one robot, started."""
-    sbt = SBT(LocalProblem(parts(team)[name]), PriorityOrder(team.order))
+    sbt = SBT(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
     sbt.start()
     return sbt
 

@@ -18,7 +18,7 @@ from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Te
 from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.syncbb import Backtrack, BestPath, Cost, Path, SyncBB, Terminate
-from robochoc.solver.agent_problem import Brief, parts
+from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import told, value
 from tests.support.cost_problems import least_cost, random_cost_team
@@ -45,7 +45,7 @@ def triangle() -> Team:
 
 def agent(team: Team, name: str) -> SyncBB:
     """The protocol object of one robot, started, with nothing left to say."""
-    robot = SyncBB(LocalProblem(parts(team)[name]), PriorityOrder(team.order))
+    robot = SyncBB(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
     robot.start()
     robot.outbox.clear()
     return robot
@@ -62,7 +62,9 @@ def best(bound: Cost, *values: int) -> BestPath:
 
 def test_the_first_robot_makes_the_path_and_the_others_wait() -> None:
     team = triangle()
-    first, second = (SyncBB(LocalProblem(parts(team)[name]), PriorityOrder(team.order)) for name in ("RA", "RB"))
+    first, second = (
+        SyncBB(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order)) for name in ("RA", "RB")
+    )
     first.start()
     second.start()
     assert first.outbox == [("RB", path((1, 0)))]
@@ -155,7 +157,7 @@ def test_an_n_ary_constraint_is_paid_by_its_lowest_robot() -> None:
 
 def test_who_may_step_aside_does_so_last() -> None:
     team = team_of(dict.fromkeys("AB", (1,)), [priced("AB", {(1, 1): INFINITE})])
-    robot = SyncBB(LocalProblem(parts(team, brief=Brief(aside=3))["RB"]), PriorityOrder(team.order))
+    robot = SyncBB(LocalProblem(agent_problems(team, brief=RunParameters(aside=3))["RB"]), PriorityOrder(team.order))
     robot.start()
     aside: Value = (None,)
     assert told(robot, ("RA", path((1, 0)))) == [("RA", Backtrack(BestPath(3, ((1,), aside))))]

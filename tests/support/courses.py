@@ -15,7 +15,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Assignment, Team
 from robochoc.protocols.cycles import CycleProtocol
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import Brief, parts
+from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import Burden, LocalProblem
 
 P = TypeVar("P", bound=CycleProtocol)
@@ -23,7 +23,7 @@ P = TypeVar("P", bound=CycleProtocol)
 
 def robot_of(protocol: type[P], team: Team, name: str, *chances: float) -> P:
     """The protocol object of one robot, not yet started, which draws `chances`, and then 0 for ever."""
-    part = parts(team, everywhere=protocol.traits.everywhere)[name]
+    part = agent_problems(team, everywhere=protocol.traits.everywhere)[name]
     robot = protocol(LocalProblem(part), PriorityOrder(team.order))
     robot.chance = itertools.chain(chances, itertools.repeat(0.0)).__next__
     return robot
@@ -47,7 +47,7 @@ def played(
     team: Team, protocol: type[CycleProtocol], schedule: Schedule, seed: int = 0, **settings: object
 ) -> RunResult:
     """A run of simple robots to its own end."""
-    brief = Brief(seed, {name: str(value) for name, value in settings.items()})
+    brief = RunParameters(seed, {name: str(value) for name, value in settings.items()})
     result = Simulation(team, protocol, schedule, brief=brief).search()
     assert result.verdict in {Verdict.SOLUTION, Verdict.NO_SOLUTION}
     return result
@@ -56,7 +56,7 @@ def played(
 def domains_of(team: Team) -> dict[str, list[int]]:
     """The values that each variable may have by its robot's own constraints; one variable a robot."""
     domains = {}
-    for name, part in parts(team).items():
+    for name, part in agent_problems(team).items():
         (variable,) = team[name].variables
         problem = LocalProblem(part)
         domains[variable.name] = [problem.solution(index)[variable.name] for index in range(len(problem.values))]

@@ -12,7 +12,7 @@ from robochoc.communication.network.local import LOOPBACK
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
 from robochoc.communication.run_result import Progress
-from robochoc.solver.agent_problem import Brief
+from robochoc.solver.agent_problem import RunParameters
 from tests.support.held import CHAIN, Held
 
 
@@ -26,7 +26,7 @@ def main(folder: str, endpoint: str, file: str) -> None:
     identity = authority.master_identity([LOOPBACK])
     with Master(authority, identity, endpoint, Members(CHAIN.order), progress=progress) as master:
         master.gather()
-        result = master.search("held", Held.traits, Brief(settings={"file": file}))
+        result = master.search("held", Held.traits, RunParameters(settings={"file": file}))
         sys.stdout.write(f"{result.verdict}\n")
         master.leave("the run is over")
 

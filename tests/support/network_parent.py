@@ -7,13 +7,13 @@ import sys
 
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.run_result import Progress
-from robochoc.solver.agent_problem import Brief
+from robochoc.solver.agent_problem import RunParameters
 from tests.support.held import CHAIN, Held
 
 
 def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
-    brief = Brief(settings={"file": "/nowhere"})
+    brief = RunParameters(settings={"file": "/nowhere"})
     try:
         with LocalNetwork(CHAIN, Held, brief=brief, progress=tell) as network:
             network.search()

@@ -16,19 +16,19 @@ import zenoh
 
 from robochoc.authority.admission import Household
 from robochoc.communication.network.control_messages import Word
-from robochoc.communication.network.framing import Letters
+from robochoc.communication.network.framing import Framing
 from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.local import LOOPBACK
 from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.robot import Ending, NetworkRobot
-from robochoc.communication.network.settings import Conditions
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.settings import NetworkSettings
+from robochoc.communication.network.transport import Transport
 from robochoc.communication.run_result import RunResult
 from robochoc.journal.events import AnyEvent, Lost, Received, Refused
 from robochoc.model.problem import Team
-from robochoc.solver.agent_problem import Brief
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.faults import wait_until
 from tests.support.held import CHAIN, Held
@@ -43,14 +43,14 @@ def free_endpoint() -> str:
         return f"{LOOPBACK}:{trial.getsockname()[1]}"
 
 
-def put(post: Post, key: str, content: bytes = b"anything") -> None:
+def put(post: Transport, key: str, content: bytes = b"anything") -> None:
     """Put on a key that the post itself would not put on."""
     post._session.put(key, content, congestion_control=zenoh.CongestionControl.BLOCK)  # noqa: SLF001
 
 
 def letter(run: NetworkRun, sender: str, receiver: str, word: Word, number: int = 1, of_run: str = "") -> bytes:
     """A letter of this run as `sender` would write it."""
-    letters = Letters(sender, of_run or run.master.run)
+    letters = Framing(sender, of_run or run.master.run)
     letters._written[receiver] = number - 1  # noqa: SLF001
     return letters.write(receiver, word)
 
@@ -65,7 +65,7 @@ class NetworkRun:
         self,
         folder: Path,
         team: Team = CHAIN,
-        conditions: Conditions = Conditions(),
+        conditions: NetworkSettings = NetworkSettings(),
         *,
         absent: Iterable[str] = (),
         seconds: float | None = 60,
@@ -121,10 +121,10 @@ class NetworkRun:
         self.threads[name] = threading.Thread(target=self._take_part, args=[name, endpoint or self.endpoint])
         self.threads[name].start()
 
-    def post(self, name: str, *, endpoint: str = "", patience_s: float = 10) -> Post:
+    def post(self, name: str, *, endpoint: str = "", patience_s: float = 10) -> Transport:
         """A connection of somebody who has an identity of `name` from the household."""
         place, identity = endpoint or self.endpoint, self.household.identity(name)
-        return Post(place, identity, watch=(), patience_s=patience_s, lease_ms=self.conditions.lease_ms)
+        return Transport(place, identity, watch=(), patience_s=patience_s, lease_ms=self.conditions.lease_ms)
 
     def let_go(self) -> RunResult:
         """Let the team search to the end, and return what came of it."""
@@ -198,7 +198,7 @@ class NetworkRun:
             while not self._given_up and time.monotonic() < deadline and not self.master.members.closed:
                 self.master.gather(time.monotonic() + SLICE_S)
             if self.master.members.closed:
-                brief = Brief(settings={"file": str(self._gate)})
+                brief = RunParameters(settings={"file": str(self._gate)})
                 self.result = self.master.search("held", Held.traits, brief, self._seconds)
                 if not self.result.lost and self.result.assignments:
                     self.held = self.master.checked(self.result.assignments)

@@ -21,17 +21,17 @@ from robochoc.communication.network.control_messages import (
     Welcome,
     Word,
 )
-from robochoc.communication.network.framing import MASTER, Letters
+from robochoc.communication.network.framing import MASTER, Framing
 from robochoc.communication.network.inbox import Arrived, Item
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.robot import Ending, NetworkRobot
-from robochoc.communication.network.search_state import Tally
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.search_state import SearchState
+from robochoc.communication.network.transport import Transport
 from robochoc.communication.run_result import RunResult
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Robot, Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, Brief
+from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
 
 RUN = "run"
@@ -51,7 +51,7 @@ class Scripted:
         self.sent: list[tuple[str, bytes]] = []
         self._name = name
         self._script = script
-        self._letters = {MASTER: Letters(MASTER, RUN)}
+        self._letters = {MASTER: Framing(MASTER, RUN)}
 
     def send(self, receiver: str, content: bytes) -> None:
         if receiver != MASTER:
@@ -66,7 +66,7 @@ class Scripted:
 
     def letter(self, word: Word, sender: str = MASTER) -> Arrived:
         """The next letter of `sender` to the robot."""
-        letters = self._letters.setdefault(sender, Letters(sender, RUN))
+        letters = self._letters.setdefault(sender, Framing(sender, RUN))
         return Arrived(sender, letters.write(self._name, word))
 
     def heard_of(self, kind: type[Word]) -> list[Word]:
@@ -83,20 +83,20 @@ class Office:
         protocol: type[Protocol],
         identities: dict[str, Identity] | None = None,
         filters: Sequence[str] = (),
-        brief: Brief = NO_BRIEF,
+        brief: RunParameters = NO_BRIEF,
         traitor: str = "",
     ) -> None:
         self.traitor = traitor
         self.inboxes: dict[str, SimpleQueue[Item]] = {name: SimpleQueue() for name in (*team.order, MASTER)}
         self.members = Members(team.order)
-        self.tally = Tally()
+        self.tally = SearchState()
         self.objections: list[Objection] = []
         self.failures: dict[str, Failed] = {}
         self._protocol = protocol
         self._filters = tuple(filters)
         self._brief = brief
         self._searching = False
-        self._letters = Letters(MASTER, RUN)
+        self._letters = Framing(MASTER, RUN)
         unproven = cast("Identity", None)
         self._robots = {
             robot.name: Stepped(robot, (identities or {}).get(robot.name, unproven), Desk(self, robot.name), protocol)
@@ -111,7 +111,7 @@ class Office:
 
     def search(self) -> RunResult:
         """One search, until all is quiet."""
-        tally = self.tally = Tally(
+        tally = self.tally = SearchState(
             self.tally.epoch + 1, self.members.order, None, self.members.declared(self._protocol.traits)
         )
         tasks = self.members.tasks(tally.epoch, self._protocol.__name__, self._protocol.traits, self._brief)
@@ -211,7 +211,7 @@ class Stepped(NetworkRobot):
     """A robot whose loop is turned by hand."""
 
     def __init__(self, robot: Robot, identity: Identity, desk: Desk, protocol: type[Protocol]) -> None:
-        super().__init__(CompiledRobot(robot), identity, cast("Post", desk), lambda _name: protocol)
+        super().__init__(CompiledRobot(robot), identity, cast("Transport", desk), lambda _name: protocol)
 
     def begin(self) -> None:
         self._register()

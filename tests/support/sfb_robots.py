@@ -8,7 +8,7 @@ from robochoc.model.message import Message
 from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.sfb import SFB, CPAs, SFBSettings
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import told
 from tests.support.trees import Costs, priced
@@ -25,7 +25,7 @@ def team(costs: Costs) -> Team:
 def agents(problem: Team, settings: SFBSettings | None = None) -> dict[str, SFB]:
     """The protocol objects of all robots, not started."""
     order = PriorityOrder(problem.order)
-    found = {name: SFB(LocalProblem(part), order) for name, part in parts(problem, everywhere=True).items()}
+    found = {name: SFB(LocalProblem(part), order) for name, part in agent_problems(problem, everywhere=True).items()}
     for robot in found.values():
         robot.settings = settings or robot.settings
     return found

@@ -11,7 +11,7 @@ from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.bounding import Context
 from robochoc.protocols.dfs import TreeProtocol
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of
@@ -37,7 +37,7 @@ def priced(names: str, costs: Costs, values: Mapping[str, int] = {}) -> Team:
 
 def unplaced(protocol: type[P], team: Team, name: str) -> P:
     """The protocol object of one robot, before it has started."""
-    return protocol(LocalProblem(parts(team, everywhere=True)[name]), PriorityOrder(team.order))
+    return protocol(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
 
 
 def placed(

@@ -115,7 +115,7 @@ def master(
     sniffable: bool,
     authority: Path | None,
     team: Path | None,
-    **given: Any,  # noqa: ANN401 - the fields of `Plan` and `Conditions`, by their names
+    **given: Any,  # noqa: ANN401 - the fields of `Plan` and `NetworkSettings`, by their names
 ) -> None:
     """Listen for robots, and have them solve their problem together once all are there.
 
@@ -144,7 +144,7 @@ def master(
 def _plan(authority: Path | None, team: Path | None, given: dict[str, Any]) -> Plan:
     from robochoc.authority.authority import default_folder
     from robochoc.communication.filters import UnknownFilterError, filter_named
-    from robochoc.communication.network.settings import Conditions
+    from robochoc.communication.network.settings import NetworkSettings
     from robochoc.formats import robot_names
     from robochoc.run.networked.lead import Plan
     from robochoc.run.options import Withdrawal
@@ -154,7 +154,7 @@ def _plan(authority: Path | None, team: Path | None, given: dict[str, Any]) -> P
             filter_named(name)
     except UnknownFilterError as unknown:
         raise click.UsageError(f"--filter: {unknown}") from None
-    conditions = Conditions(
+    conditions = NetworkSettings(
         filters=given.pop("filters"),
         private=given.pop("private"),
         patience_s=given.pop("patience_s"),

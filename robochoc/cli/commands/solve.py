@@ -34,7 +34,7 @@ from robochoc.cli.options.solve import (
 from robochoc.cli.reports.closed_loop import flight_told, told_of
 from robochoc.cli.reports.failures import LIMIT, Failure, failures_told, worst
 from robochoc.cli.reports.live_sniffer import Watch, check_chosen, watching
-from robochoc.run.defaults import MINIMISES, SATISFIES, suits
+from robochoc.run.defaults import MINIMISES, SATISFIES, default_protocol
 
 if TYPE_CHECKING:
     from robochoc.journal.journal import Header, Recorder
@@ -276,7 +276,7 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
         with failures_told(folder):
             team = read_team(folder)
             check_chosen(products.watching, team)
-            protocol = wanted.protocol or suits(team.kind)
+            protocol = wanted.protocol or default_protocol(team.kind)
             options = replace(options, protocol=protocol, order=order_for(team, wanted.order))
             header = partial(_header, team, options)
             objective = None if wanted.ros.situation else _objective(team, options)
@@ -346,12 +346,12 @@ def _header(team: Team, options: Options) -> Header:
 def _objective(team: Team, options: Options) -> Callable[[], Objective] | None:
     """What the journal weighs decisions by; None where nothing is minimised, or the problem changes."""
     from robochoc.run.orchestrator import Withdrawal
-    from robochoc.verification.objective import Objective, aside_cost
+    from robochoc.verification.objective import Objective, withdrawal_cost
 
     fewest = options.withdraw is Withdrawal.FEWEST
     if team.dynamic or not (fewest or team.kind == "DisWCSP"):
         return None
-    return lambda: Objective(team, aside_cost(team) if fewest else None)
+    return lambda: Objective(team, withdrawal_cost(team) if fewest else None)
 
 
 def _tell(team: Team, outcome: Outcome, wanted: Wanted) -> None:

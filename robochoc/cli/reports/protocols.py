@@ -114,7 +114,13 @@ def _row(offer: Offer) -> Row:
 def _judge() -> Row:
     """The central judge, with the traits that a protocol of its powers would have."""
     traits = Traits(paper="no protocol: ACE decides all files merged", costs=True, partially_known=True, privacy="none")
-    return Row(CENTRAL, f"{central.Judge.__module__}:Judge", f"robochoc {__version__}", traits, module=central.__name__)
+    return Row(
+        CENTRAL,
+        f"{central.CentralSolver.__module__}:CentralSolver",
+        f"robochoc {__version__}",
+        traits,
+        module=central.__name__,
+    )
 
 
 def _object(row: Row, *, explain: bool) -> dict[str, object]:

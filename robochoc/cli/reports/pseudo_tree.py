@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.tree import Tree
 
 from robochoc.formats import on_one_line
-from robochoc.model.outcome import Outcome, Place
+from robochoc.model.outcome import Outcome, PseudoTreeNode
 from robochoc.model.priorities import natural
 
 UNBROKEN = 1000
@@ -29,7 +29,7 @@ def explained(outcome: Outcome) -> str:
     return "\n".join([head, *(line for root in roots for line in _drawn(root, places, below))])
 
 
-def _children(places: Mapping[str, Place]) -> dict[str | None, list[str]]:
+def _children(places: Mapping[str, PseudoTreeNode]) -> dict[str | None, list[str]]:
     """Who stands right below each robot, in natural order."""
     below: dict[str | None, list[str]] = {}
     for name in sorted(places, key=natural):
@@ -45,7 +45,7 @@ def _from_the_roots(below: Mapping[str | None, list[str]]) -> list[str]:
     return found
 
 
-def _depth(places: Mapping[str, Place], below: Mapping[str | None, list[str]]) -> int:
+def _depth(places: Mapping[str, PseudoTreeNode], below: Mapping[str | None, list[str]]) -> int:
     """Edges on the longest way from a root to a leaf."""
     depths: dict[str | None, int] = {None: -1}
     for name in _from_the_roots(below):
@@ -53,7 +53,7 @@ def _depth(places: Mapping[str, Place], below: Mapping[str | None, list[str]]) -
     return max(depths.values())
 
 
-def _width(places: Mapping[str, Place], below: Mapping[str | None, list[str]]) -> int:
+def _width(places: Mapping[str, PseudoTreeNode], below: Mapping[str | None, list[str]]) -> int:
     """The largest separator: robots above that a robot, and all below it, have to agree with (Dechter 2003, 4.1)."""
     separators: dict[str, set[str]] = {}
     for name in reversed(_from_the_roots(below)):
@@ -62,7 +62,7 @@ def _width(places: Mapping[str, Place], below: Mapping[str | None, list[str]]) -
     return max(map(len, separators.values()))
 
 
-def _drawn(root: str, places: Mapping[str, Place], below: Mapping[str | None, list[str]]) -> list[str]:
+def _drawn(root: str, places: Mapping[str, PseudoTreeNode], below: Mapping[str | None, list[str]]) -> list[str]:
     trees = {root: Tree(_labelled(root, places))}
     waiting = [root]
     for name in waiting:
@@ -74,6 +74,6 @@ def _drawn(root: str, places: Mapping[str, Place], below: Mapping[str | None, li
     return [f"    {line.rstrip()}" for line in page.getvalue().splitlines()]
 
 
-def _labelled(name: str, places: Mapping[str, Place]) -> str:
+def _labelled(name: str, places: Mapping[str, PseudoTreeNode]) -> str:
     above = ", ".join(places[name].pseudo_parents)
     return escape(on_one_line(f"{name} [{above}]" if above else name))

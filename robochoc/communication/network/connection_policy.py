@@ -16,7 +16,7 @@ Reach = Mapping[str, tuple[str, ...]]
 """Who may take part, and to whom each may write besides the master."""
 
 
-class Gate:
+class ConnectionPolicy:
     """The router at `endpoint`, with rules that follow `admission`. Whoever opens it closes it.
 
     `ways` are the team's, if it is known before anybody comes: then the router need not be opened anew for it.

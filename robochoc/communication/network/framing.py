@@ -70,7 +70,7 @@ class Opened(NamedTuple):
     word: Word
 
 
-class Letters:
+class Framing:
     """The letters that `name` writes and reads; `run` is empty until there is one."""
 
     def __init__(self, name: str, run: str = "") -> None:

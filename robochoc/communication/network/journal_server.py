@@ -16,7 +16,7 @@ from typing import Annotated
 import msgspec
 
 from robochoc.communication.network.control_messages import Sniff, Sniffable
-from robochoc.communication.network.master_events import Chronicle
+from robochoc.communication.network.master_events import MasterEvents
 from robochoc.journal.entries import JournalError
 
 SNIFF = "sniff"
@@ -154,13 +154,13 @@ def _question(content: bytes) -> Question:
         raise NotAnsweredError(f"it is malformed: {error}") from None
 
 
-class PublicationDesk:
+class JournalServer:
     """Where the master is asked for the journal of its `run`: by letter who may have it, then for piece after piece.
 
     `publication` is None where it gives none out. `may` says who has the right now.
     """
 
-    def __init__(self, run: str, may: Callable[[str], bool], chronicle: Chronicle) -> None:
+    def __init__(self, run: str, may: Callable[[str], bool], chronicle: MasterEvents) -> None:
         self.publication: Publication | None = None
         self._run = run
         self._may = may

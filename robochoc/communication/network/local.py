@@ -27,7 +27,7 @@ from robochoc.communication.network.members import Members, reach
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot_process import START_S, Given, robot_process
 from robochoc.communication.network.router import RouterError
-from robochoc.communication.network.settings import Conditions
+from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.processes.robot_link import fate_of
 from robochoc.communication.resources import require_descriptors, signals_held
 from robochoc.communication.run_result import Progress, RunResult
@@ -36,7 +36,7 @@ from robochoc.journal.events import Observer
 from robochoc.model.change import still_showing
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, Brief
+from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
 
@@ -69,8 +69,8 @@ class LocalNetwork(Session):
         *,
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
-        conditions: Conditions = Conditions(),
-        brief: Brief = NO_BRIEF,
+        conditions: NetworkSettings = NetworkSettings(),
+        brief: RunParameters = NO_BRIEF,
     ) -> None:
         super().__init__(team)
         team = self.compiled.team

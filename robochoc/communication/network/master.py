@@ -21,7 +21,7 @@ from robochoc.authority.admission import Admission
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Events, Failed, OfEpoch, Pause, Wave
 from robochoc.communication.network.access import ALL, journal_key
-from robochoc.communication.network.connection_policy import Gate
+from robochoc.communication.network.connection_policy import ConnectionPolicy
 from robochoc.communication.network.control_messages import (
     Ask,
     Bye,
@@ -42,25 +42,25 @@ from robochoc.communication.network.control_messages import (
     Word,
 )
 from robochoc.communication.network.facilitator import DirectoryFacilitator
-from robochoc.communication.network.framing import MASTER, FrameRefusedError, Letters
+from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing
 from robochoc.communication.network.gaps import TO_MASTER, Gaps
 from robochoc.communication.network.inbox import Arrived, Inbox, Missed, Presence, Woken
-from robochoc.communication.network.journal_server import Publication, PublicationDesk
-from robochoc.communication.network.master_events import Chronicle
+from robochoc.communication.network.journal_server import JournalServer, Publication
+from robochoc.communication.network.master_events import MasterEvents
 from robochoc.communication.network.members import Member, Members, RegistrationRefusedError
 from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.requests import Requests
 from robochoc.communication.network.router import Refusal
-from robochoc.communication.network.search_state import Tally
-from robochoc.communication.network.settings import Conditions
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.search_state import SearchState
+from robochoc.communication.network.settings import NetworkSettings
+from robochoc.communication.network.transport import Transport
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import over
 from robochoc.journal.events import Observer
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.traits import Traits
-from robochoc.solver.agent_problem import Brief
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 
@@ -83,7 +83,7 @@ class Master:
         identity: Identity,
         endpoint: str,
         members: Members,
-        conditions: Conditions = Conditions(),
+        conditions: NetworkSettings = NetworkSettings(),
         *,
         observer: Observer | None = None,
         watched: bool = False,
@@ -92,17 +92,17 @@ class Master:
         self.endpoint = endpoint
         self.run = secrets.token_hex(8)
         self.members = members
-        self.tally = Tally()
-        self._identity, self._conditions = identity, conditions
-        self._watched, self._progress = watched, progress
+        self.tally = SearchState()
+        self._identity, self._conditions, self._watched, self._progress = identity, conditions, watched, progress
         self._shown = self._looked = self._read_registry = 0.0
         self._began = time.monotonic()
-        self._letters = Letters(MASTER, self.run)
+        self._letters = Framing(MASTER, self.run)
         self._facilitator = DirectoryFacilitator(endpoint, conditions.protocol)
-        self.chronicle = Chronicle(observer)
+        self.chronicle = MasterEvents(observer)
         told, listen = self._note_refusal if observer else None, conditions.listen or endpoint
-        self._gate = Gate(admission, identity, listen, told, conditions.lease_ms, members.ways, conditions.scratch)
-        self._desk = PublicationDesk(self.run, self._gate.may_sniff, self.chronicle)
+        lease_ms, scratch = conditions.lease_ms, conditions.scratch
+        self._gate = ConnectionPolicy(admission, identity, listen, told, lease_ms, members.ways, scratch)
+        self._desk = JournalServer(self.run, self._gate.may_sniff, self.chronicle)
         self._requests = Requests(self._desk, self._facilitator, self._tell, self.chronicle.refuse)
         self._dead: dict[str, str] = {}
         self._gaps = Gaps(members, self.chronicle.refuse, self._lose)
@@ -112,7 +112,9 @@ class Master:
         try:
             self._gate.open()
             inbox, lease_ms = Inbox(self._gate.share_of), self._conditions.lease_ms
-            self._post = Post(self.endpoint, self._identity, heard=self._gate.admitted, inbox=inbox, lease_ms=lease_ms)
+            self._post = Transport(
+                self.endpoint, self._identity, heard=self._gate.admitted, inbox=inbox, lease_ms=lease_ms
+            )
             if self._desk.publication:
                 self._post.answer(journal_key(ALL), self._desk.answer)
         except BaseException:
@@ -153,7 +155,7 @@ class Master:
         self,
         protocol: str,
         traits: Traits,
-        brief: Brief,
+        brief: RunParameters,
         timeout: float | None = None,
         messages: int | None = None,
     ) -> RunResult:
@@ -166,7 +168,8 @@ class Master:
         self._gaps.begin()
         deadline = None if timeout is None else began + timeout
         self._gate.open_ways(self.members.reach(beyond=traits.beyond))
-        tally = self.tally = Tally(self.tally.epoch + 1, self.members.order, messages, self.members.declared(traits))
+        epoch, declared = self.tally.epoch + 1, self.members.declared(traits)
+        tally = self.tally = SearchState(epoch, self.members.order, messages, declared)
         for name, task in self.members.tasks(tally.epoch, protocol, traits, brief).items():
             self._tell(name, task)
         self._wait_until(lambda: tally.broken_off or tally.ready, deadline)
@@ -209,8 +212,6 @@ class Master:
         """Somebody who can see it says that the robot's process has ended. May be called from any thread."""
         self._dead[name] = why
         self._post.wake()
-
-    # The loop
 
     def _wait_until(self, done: Callable[[], bool], deadline: float | None) -> None:
         """Serve everybody until `done()` or the deadline; raises `RobotsLostError` as soon as one is lost for good."""
@@ -262,7 +263,7 @@ class Master:
                 self._tell(subscriber, told)
             self._follow_registry()
 
-    def _ask_around(self, tally: Tally, now: float) -> None:
+    def _ask_around(self, tally: SearchState, now: float) -> None:
         """Begin a wave when it could show that all is quiet, or when somebody waits for news."""
         counters, missing = tally.counters, tally.missing(now, self._conditions.patience_s)
         wanted = tally.wave_due
@@ -276,7 +277,7 @@ class Master:
         elif wanted:
             self._tell_all(Wave(counters.begin_wave()))
 
-    def _collect(self, tally: Tally) -> None:
+    def _collect(self, tally: SearchState) -> None:
         """Say that the search is over, and collect everybody's account. Raises `RobotsLostError` when it was stuck."""
         self._tell_all(Pause())
         self._wait_until(lambda: not tally.silent, time.monotonic() + LAST_WORDS_S)
@@ -285,8 +286,6 @@ class Master:
         doubts = self.chronicle.doubted(tally.doubts_about_counts)
         if tally.stuck:
             raise RobotsLostError({MASTER: tally.stuck + doubts})
-
-    # Letters
 
     def _tell(self, name: str, word: ToRobot) -> None:
         self._post.send(name, self._letters.write(name, word))
@@ -324,9 +323,8 @@ class Master:
             case Events(told):
                 self.chronicle.told(name, told)
             case Failed(why, unsupported, elsewhere):
-                self._note_failure(
-                    name, why, (TooLargeError if elsewhere else UnsupportedError) if unsupported else None
-                )
+                refusal = TooLargeError if elsewhere else UnsupportedError
+                self._note_failure(name, why, refusal if unsupported else None)
             case Objection(who, what, why):
                 self.chronicle.refuse(who, what, f"{why} ({name} says so)")
             case Gap():
@@ -334,7 +332,7 @@ class Master:
             case Bye():
                 member.left = True
             case _:
-                raise AssertionError(word)  # `Letters` decodes nothing else
+                raise AssertionError(word)  # `Framing` decodes nothing else
 
     def _note_failure(self, name: str, why: str, refusal: type[UnsupportedError] | None = None) -> None:
         """The robot cannot go on (if there is a `why`); a `refusal` ends the run."""

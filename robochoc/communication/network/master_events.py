@@ -14,7 +14,7 @@ from robochoc.communication.network.search_state import is_of
 from robochoc.journal.events import AnyEvent, Granted, Lost, Observer, Refused, Registered
 
 
-class Chronicle:
+class MasterEvents:
     """Tells `observer`, if there is one. Refusals and grants may come from any thread."""
 
     def __init__(self, observer: Observer | None) -> None:

@@ -23,7 +23,7 @@ from robochoc.communication.network.profile import (
 )
 from robochoc.model.problem import Robot
 from robochoc.protocols.traits import Traits
-from robochoc.solver.agent_problem import Brief
+from robochoc.solver.agent_problem import RunParameters
 
 
 def reach(profiles: Mapping[str, Profile], *, beyond: bool) -> dict[str, tuple[str, ...]]:
@@ -253,7 +253,7 @@ class Members:
         """To whom each may write: everybody, if the protocol goes beyond those it may share constraints with."""
         return reach(self.profiles, beyond=beyond)
 
-    def tasks(self, epoch: int, protocol: str, traits: Traits, brief: Brief) -> dict[str, Task]:
+    def tasks(self, epoch: int, protocol: str, traits: Traits, brief: RunParameters) -> dict[str, Task]:
         """What each robot is told for a search, in priority order."""
         order = self.order
         shown = {name: self.robots[name].robot for name in order}
@@ -285,7 +285,7 @@ class Members:
             name: {variable.name: variable.domain for variable in member.robot.variables}
             for name, member in self.robots.items()
         }
-        dearest = {name: member.profile.dearest for name, member in self.robots.items()}
+        dearest = {name: member.profile.max_cost for name, member in self.robots.items()}
         return Declared(traits, shown, dearest)
 
     def neighbourhood(self, name: str, values: Mapping[str, Mapping[str, int]]) -> dict[str, int]:

@@ -15,7 +15,7 @@ from robochoc.formats.extension import MAX_VALUES
 from robochoc.formats.names import is_name
 from robochoc.model.priorities import CycleError, priority_order
 from robochoc.model.problem import Child, Constraint, Domain, Kind, Parent, Robot, Variable
-from robochoc.solver.encoding import dearest
+from robochoc.solver.encoding import max_cost
 
 Ranges = tuple[tuple[int, int], ...]
 """A domain: first and last value of each range, ascending."""
@@ -38,7 +38,7 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
 
     `variables` are its interface variables with their domains. `looks_at` names, by child, the child's variables that
     this robot's parts of partially known constraints look at; `wants` are the others' variables in the constraints that
-    it holds towards its parents. `dearest` is the most that the constraints it holds can
+    it holds towards its parents. `max_cost` is the most that the constraints it holds can
     charge together, short of being broken. `topics` are where it publishes its decision.
     """
 
@@ -49,7 +49,7 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     variables: dict[str, Ranges]
     looks_at: dict[str, tuple[str, ...]]
     weight: int
-    dearest: float
+    max_cost: float
     topics: tuple[str, ...]
     wants: tuple[str, ...] = ()
 
@@ -78,7 +78,7 @@ def profile_of(robot: Robot) -> Profile:
             if child.constraints
         },
         weight=robot.weight,
-        dearest=sum(dearest(constraint) for constraint in (*robot.private, *robot.shared, *parts)),
+        max_cost=sum(max_cost(constraint) for constraint in (*robot.private, *robot.shared, *parts)),
         topics=tuple(topic.name for topic in robot.topics),
         wants=tuple(dict.fromkeys(name for one in robot.shared for name in one.variables if name not in own)),
     )
@@ -119,8 +119,8 @@ def silhouette(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
     strangers = profile.looks_at.keys() - set(profile.children)
     if strangers:  # the master would have them show what is none of its business
         raise ProfileError(f"it looks at variables of {min(strangers)[:LONGEST_NAME]}, which is no child of it")
-    if not (0 <= profile.dearest <= LARGEST_DEAREST and 1 <= profile.weight <= LARGEST_WEIGHT):
-        raise ProfileError(f"costs of {profile.dearest:g} and a weight of {profile.weight} cannot be")
+    if not (0 <= profile.max_cost <= LARGEST_DEAREST and 1 <= profile.weight <= LARGEST_WEIGHT):
+        raise ProfileError(f"costs of {profile.max_cost:g} and a weight of {profile.weight} cannot be")
     shown = {**profile.variables, **also}
     return Robot(
         name=profile.name,

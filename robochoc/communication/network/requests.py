@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from robochoc.communication.network.control_messages import Ask, Sniff, Sniffable, Told
 from robochoc.communication.network.facilitator import DirectoryFacilitator, TooManyRequestsError
-from robochoc.communication.network.journal_server import PublicationDesk
+from robochoc.communication.network.journal_server import JournalServer
 
 
 class Requests:
@@ -14,7 +14,7 @@ class Requests:
 
     def __init__(
         self,
-        desk: PublicationDesk,
+        desk: JournalServer,
         facilitator: DirectoryFacilitator,
         tell: Callable[[str, Told | Sniffable], None],
         refuse: Callable[[str, str, str], None],

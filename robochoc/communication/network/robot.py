@@ -44,14 +44,14 @@ from robochoc.communication.network.control_messages import (
     Welcome,
     Word,
 )
-from robochoc.communication.network.framing import MASTER, FrameRefusedError, Letters, Opened
+from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing, Opened
 from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
 from robochoc.communication.network.manner import AS_USUAL, Manner
 from robochoc.communication.network.profile import among, profile_of, ranges_of
 from robochoc.communication.network.quotas import Kept
 from robochoc.communication.network.refusals import Refusals
 from robochoc.communication.network.searcher import Searcher, Surroundings
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.transport import Transport
 from robochoc.model.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
@@ -94,7 +94,7 @@ class NetworkRobot:
         self,
         own: CompiledRobot,
         identity: Identity,
-        post: Post,
+        post: Transport,
         protocol_named: Callable[[str], type[Protocol]],
         manner: Manner = AS_USUAL,
     ) -> None:
@@ -104,7 +104,7 @@ class NetworkRobot:
         self._post = post
         self._protocol_named = protocol_named
         self._manner = manner
-        self._letters = Letters(own.robot.name)
+        self._letters = Framing(own.robot.name)
         self._visit = secrets.token_hex(_VISIT_BYTES)
         self._ring: KeyRing | None = None
         self._filters: FilterStack | None = None

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from robochoc.authority.identity import Identity, IdentityTexts
 from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.robot import NetworkRobot
-from robochoc.communication.network.transport import CannotConnectError, Post
+from robochoc.communication.network.transport import CannotConnectError, Transport
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.system.orphans import signal_when_orphaned
@@ -55,7 +55,7 @@ def robot_process(given: Given) -> None:
         os.setpriority(os.PRIO_PROCESS, 0, max(wanted, os.getpriority(os.PRIO_PROCESS, 0)))
 
     try:
-        with Post(given.endpoint, identity, watch=(), patience_s=START_S, lease_ms=given.lease_ms) as post:
+        with Transport(given.endpoint, identity, watch=(), patience_s=START_S, lease_ms=given.lease_ms) as post:
             manner = Manner(given.patience_s, place=take_place)
             NetworkRobot(given.own, identity, post, lambda _name: given.protocol, manner).run()
     except CannotConnectError as error:

@@ -34,7 +34,7 @@ _TOLD = 3
 """So many doubts are told in words."""
 
 
-class Tally:
+class SearchState:
     """The search `epoch` of the robots in `order`. `enough` is the limit on messages, if there is one.
 
     `declared` is what the master knows of the robots, against which their words are held. `lost` says why, by name,

@@ -38,7 +38,7 @@ from robochoc.model.outcome import Metrics
 from robochoc.model.problem import INFINITE, Constraint, Kind, Model
 from robochoc.protocols.findings import NOTHING, Findings
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import Brief, Part
+from robochoc.solver.agent_problem import AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.explanation import Known, held
@@ -161,7 +161,7 @@ class Searcher:
         self._around.place(self._task.order.index(self._robot.name), len(self._task.order))
         self._around.say(Ready(self.epoch))
 
-    def _part(self) -> Part:
+    def _part(self) -> AgentProblem:
         task = self._task
         try:
             known = {sender: [self._known(sender, record) for record in told] for sender, told in self._copies.items()}
@@ -170,9 +170,9 @@ class Searcher:
             raise UnsupportedError(f"{self._robot.name} was told what cannot be: {bad}") from None
         self._learnt = {sender: [one.constraint for one in told] for sender, told in known.items()}
         copies = [one for told in known.values() for one in told]
-        brief = Brief(task.seed, task.settings, task.aside)
+        brief = RunParameters(task.seed, task.settings, task.aside)
         copied = _sorted(copies, task.order)
-        return Part(self._own, task.order, task.interfaces, copied, domains, task.links, task.secretive, brief)
+        return AgentProblem(self._own, task.order, task.interfaces, copied, domains, task.links, task.secretive, brief)
 
     def _known(self, sender: str, record: SharedRecord) -> Known:
         """The constraint that `sender` holds: only a child can, over variables that are there, mine among them."""

@@ -11,7 +11,7 @@ LEASE_MS = 10_000
 
 
 @dataclass(frozen=True)
-class Conditions:
+class NetworkSettings:
     """What the master is told besides the problem.
 
     `filters` are the channel filters that messages go through. In a `private` run nobody tells its values. A robot may

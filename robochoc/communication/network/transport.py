@@ -54,7 +54,7 @@ Answering = Callable[[str, bytes], bytes | None]
 """The answer to somebody's question; None: it gets none."""
 
 
-class Post:
+class Transport:
     """The connection of `identity` with the router at `endpoint` (`HOST:PORT`); a context manager.
 
     It knows of the lives of those in `watch`, and gets the letters of those in `heard` (more: `hear`) into `inbox`.

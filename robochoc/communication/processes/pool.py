@@ -28,7 +28,7 @@ _FDS_PER_ROBOT = 4
 _FDS_SPARE = 128
 
 
-class Crew:
+class ProcessPool:
     """The processes of a team. `robots` are those that are there, by name.
 
     Whoever died is told of by `ended`; whoever is dismissed ends by itself, soon.

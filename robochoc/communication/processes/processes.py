@@ -32,7 +32,7 @@ from robochoc.communication.control import (
     Wave,
     sealed,
 )
-from robochoc.communication.processes.pool import Crew, StartMethod
+from robochoc.communication.processes.pool import ProcessPool, StartMethod
 from robochoc.communication.processes.robot_link import Condition, RobotLink, RobotsLostError
 from robochoc.communication.processes.robot_process import Beginning
 from robochoc.communication.processes.stopped import Stopped
@@ -44,7 +44,7 @@ from robochoc.journal.events import AnyEvent, Lost, Observer, Registered
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, Brief, Part
+from robochoc.solver.agent_problem import NO_BRIEF, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 
@@ -77,7 +77,7 @@ class ProcessesRun(Session):
         start_method: StartMethod = "fork",
         survive: bool = False,
         patience_s: float | None = None,
-        brief: Brief = NO_BRIEF,
+        brief: RunParameters = NO_BRIEF,
     ) -> None:
         super().__init__(team)
         self._protocol = protocol
@@ -85,7 +85,7 @@ class ProcessesRun(Session):
         self._progress = progress
         self._survive = survive
         self._stopped = Stopped(patience_s)
-        self._crew = Crew(start_method)
+        self._crew = ProcessPool(start_method)
         self._shown = self._looked = 0.0
         self._began = time.monotonic()
         self._number = 0
@@ -178,7 +178,7 @@ class ProcessesRun(Session):
                 self._start(part)
                 self._see_ends()
 
-    def _start(self, part: Part) -> None:
+    def _start(self, part: AgentProblem) -> None:
         observed = self._observer is not None
         try:
             self._crew.start(Beginning(part, self._protocol, self._number, observed))

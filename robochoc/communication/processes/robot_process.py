@@ -50,7 +50,7 @@ from robochoc.communication.resources import own_memory
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.message import Envelope
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import Part
+from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 
 IDLE_S = 0.002
@@ -70,7 +70,7 @@ _libc = ctypes.CDLL(None)
 class Beginning(NamedTuple):
     """With what a robot begins: its part of the problem, the protocol, the epoch, and whether it is observed."""
 
-    part: Part
+    part: AgentProblem
     protocol: type[Protocol]
     epoch: int
     observed: bool

@@ -20,7 +20,7 @@ from robochoc.model.message import Envelope
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, Brief, Part
+from robochoc.solver.agent_problem import NO_BRIEF, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 
 PROGRESS_EVERY = 256
@@ -41,7 +41,7 @@ class Simulation(Session):
         *,
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
-        brief: Brief = NO_BRIEF,
+        brief: RunParameters = NO_BRIEF,
     ) -> None:
         super().__init__(team)
         self._protocol = protocol
@@ -95,7 +95,7 @@ class Simulation(Session):
     def close(self) -> None:
         """Nothing to leave behind."""
 
-    def _host(self, part: Part) -> Host:
+    def _host(self, part: AgentProblem) -> Host:
         host = Host.of(self._protocol, part)
         if self._observer:
             host.observe(self._observer, lambda: self._time(host.checks), self._time)

@@ -2,7 +2,7 @@
 
 The step, `DT`, was chosen by measurement. A flight of 4.7 m in a wind of 3 m/s differs by at most 0.5 mm from one with
 ten times as many steps between the same commands, and a body that tumbles freely at one turn a second for 10 s keeps
-the energy of its spin to 3e-5 (`tests/test_ros_bodies.py`). Half the step takes twice the time.
+the energy of its spin to 3e-5 (`tests/unit/flight/test_bodies.py`). Half the step takes twice the time.
 """
 
 from __future__ import annotations

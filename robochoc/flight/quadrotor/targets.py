@@ -19,7 +19,7 @@ from robochoc.flight.routes.spacing import SLACK_M
 
 MARGIN_M = 0.1
 """Plans keep so much more than the distance. Tracking takes 1 cm of it in calm air, and 6 cm where a drone takes off
-into a wind of 5 m/s (`tests/test_ros_bodies.py`); two drones may use it up towards each other."""
+into a wind of 5 m/s (`tests/unit/flight/test_bodies.py`); two drones may use it up towards each other."""
 _ALL_BUT = 0.999
 """Of what starts and goals leave: rounding must not make a plan impossible."""
 _STAGGER_S = 2.0

@@ -9,9 +9,9 @@ from queue import Empty
 
 from robochoc.authority.identity import Identity
 from robochoc.communication.network.control_messages import Ask, Told
-from robochoc.communication.network.framing import MASTER, FrameRefusedError, Letters
+from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing
 from robochoc.communication.network.inbox import Arrived
-from robochoc.communication.network.transport import CannotConnectError, Post
+from robochoc.communication.network.transport import CannotConnectError, Transport
 from robochoc.run.networked.address import Address
 from robochoc.services.communicative_acts import Performative
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
@@ -69,7 +69,7 @@ def search_words(place: Address, slots: Sequence[str], at_most: int | None = Non
 
 def consult(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> str:
     """What the directory answers to `words`, in SL0. Raises `CannotConnectError` and `NoAnswerError`."""
-    with Post(str(place), identity, watch=(), patience_s=patience_s) as post:
+    with Transport(str(place), identity, watch=(), patience_s=patience_s) as post:
         return _Asking(place, identity, post).asked(words, Performative.INFORM)
 
 
@@ -78,7 +78,7 @@ def watch(place: Address, identity: Identity, words: str, patience_s: float = 10
 
     It ends with `NoAnswerError` when the master is gone for `patience_s`. Raises `CannotConnectError` as well.
     """
-    with Post(str(place), identity, watch=(), patience_s=patience_s) as post:
+    with Transport(str(place), identity, watch=(), patience_s=patience_s) as post:
         asking = _Asking(place, identity, post)
         asking.asked(words, Performative.AGREE, subscribe=True)
         heard = time.monotonic()
@@ -94,11 +94,11 @@ def watch(place: Address, identity: Identity, words: str, patience_s: float = 10
 class _Asking:
     """One who asks; answers to others' questions, and to earlier ones, are none."""
 
-    def __init__(self, place: Address, identity: Identity, post: Post) -> None:
+    def __init__(self, place: Address, identity: Identity, post: Transport) -> None:
         self._place = place
         self._name = identity.name
         self._post = post
-        self._letters = Letters(identity.name)
+        self._letters = Framing(identity.name)
         self._number = secrets.randbits(_NUMBER_BITS)
         self._early: list[Told] = []
 
@@ -149,7 +149,7 @@ def about(answer: str) -> str:
     return searched_in(answer).name
 
 
-def _told(letters: Letters, item: Arrived) -> Told | None:
+def _told(letters: Framing, item: Arrived) -> Told | None:
     try:
         word = letters.read(item.sender, item.content).word
     except FrameRefusedError:

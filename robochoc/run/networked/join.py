@@ -11,11 +11,11 @@ from robochoc.authority.enrolment import EnrolmentError, NobodyThereError, enrol
 from robochoc.authority.identity import Identity, IdentityError, default_folder
 from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.robot import Ending, NetworkRobot
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.transport import Transport
 from robochoc.formats import check_robot
 from robochoc.model.problem import Robot
 from robochoc.run.networked.address import Address
-from robochoc.run.registry import spoken
+from robochoc.run.registry import protocol_by_name
 from robochoc.solver.compile import Compiler
 from robochoc.solver.compiled_team import CompiledRobot
 
@@ -68,5 +68,5 @@ def join(robot: Robot, place: Address, identity: Identity, manner: Manner, compi
     manner = replace(manner, compiled=lambda shown: compiler.compile(shown).domain)
     own = CompiledRobot(robot, manner.compiled)
     manner.stage(f"looking for the master at {place}")
-    with Post(str(place), identity, watch=(), patience_s=manner.patience_s) as post:
-        return NetworkRobot(own, identity, post, spoken, manner).run()
+    with Transport(str(place), identity, watch=(), patience_s=manner.patience_s) as post:
+        return NetworkRobot(own, identity, post, protocol_by_name, manner).run()

@@ -22,19 +22,19 @@ from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.router import RouterError
-from robochoc.communication.network.settings import Conditions
+from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.journal.events import Began, Observer
 from robochoc.model.outcome import ALL_ROBOTS, Outcome, Verdict
 from robochoc.model.problem import Domain, Kind, Team, Variable
 from robochoc.protocols.traits import Traits
-from robochoc.run.defaults import FIRST_FIT, MINIMISES, SATISFIES, suits
+from robochoc.run.defaults import FIRST_FIT, MINIMISES, SATISFIES, default_protocol
 from robochoc.run.incumbent import bound_of, joined, tree_of
 from robochoc.run.networked.address import LOOPBACK, Address
 from robochoc.run.options import Withdrawal
-from robochoc.run.registry import spoken
-from robochoc.solver.agent_problem import Brief
+from robochoc.run.registry import protocol_by_name
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import RefutedError
 
@@ -67,7 +67,7 @@ class Plan:
     gather_s: float | None = None
     timeout: float | None = None
     messages: int | None = None
-    conditions: Conditions = Conditions()
+    conditions: NetworkSettings = NetworkSettings()
 
 
 class TeamIncompleteError(Exception):
@@ -168,10 +168,10 @@ class _Lead:
             raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; awaited: {names}")
         self._deadline = None if plan.timeout is None else time.monotonic() + plan.timeout
         kind = self._team().kind
-        protocol = plan.protocol or suits(kind)
+        protocol = plan.protocol or default_protocol(kind)
         _check_settings(protocol, plan.settings)
         self._outcome = replace(self._outcome, protocol=protocol)
-        traits = spoken(protocol).traits
+        traits = protocol_by_name(protocol).traits
         at_once = plan.withdraw is Withdrawal.FEWEST and traits.costs
         result = self._search(protocol, traits, self._brief(aside=at_once))
         outcome = self._answered(result, traits, aside=at_once)
@@ -180,10 +180,10 @@ class _Lead:
         fewest = plan.withdraw is Withdrawal.FEWEST
         second = MINIMISES if fewest else FIRST_FIT
         self._outcome = replace(self._outcome, metrics=outcome.metrics, witness=outcome.witness, placed_by=second)
-        traits = spoken(second).traits
+        traits = protocol_by_name(second).traits
         return self._answered(self._search(second, traits, self._brief(aside=fewest)), traits, aside=True)
 
-    def _search(self, protocol: str, traits: Traits, brief: Brief) -> RunResult:
+    def _search(self, protocol: str, traits: Traits, brief: RunParameters) -> RunResult:
         """Search until robots stop getting lost; without `survive` the first loss raises `RobotsLostError`."""
         plan, master = self._plan, self._master
         while True:
@@ -265,11 +265,11 @@ class _Lead:
         minimal = traits.costs and traits.complete and (aside or self._team().kind is Kind.DISWCSP)
         return Verdict.OPTIMAL if minimal else Verdict.SOLUTION
 
-    def _brief(self, *, aside: bool) -> Brief:
+    def _brief(self, *, aside: bool) -> RunParameters:
         """What robots are told; to step aside costs more than all that constraints can charge together."""
-        dearest = sum(member.profile.dearest for member in self._master.members.robots.values())
+        dearest = sum(member.profile.max_cost for member in self._master.members.robots.values())
         own = self._outcome.placed_by is None
-        return Brief(self._plan.seed, self._plan.settings if own else {}, 1 + dearest if aside else None)
+        return RunParameters(self._plan.seed, self._plan.settings if own else {}, 1 + dearest if aside else None)
 
     def _limit(self, witness: str | None) -> str:
         """Return why there is no verdict, and who is to blame for it, as far as that can be told."""
@@ -325,7 +325,7 @@ def _check_settings_early(plan: Plan) -> None:
 
 def _check_settings(protocol: str, settings: Mapping[str, str]) -> None:
     try:
-        settings_of(spoken(protocol), settings)
+        settings_of(protocol_by_name(protocol), settings)
     except SettingsError as wrong:
         raise UnsupportedError(f"--set: {wrong} (protocol {protocol})") from None
 

@@ -11,7 +11,7 @@ from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.abt import ABT, AddLink, Nogood, Ok
 from robochoc.protocols.first_fit import Placed
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.problems import team_of
 
@@ -25,7 +25,7 @@ def chain() -> Team:
 
 def host(name: str) -> Host:
     team = chain()
-    problem = LocalProblem(parts(team)[name])
+    problem = LocalProblem(agent_problems(team)[name])
     return Host(ABT(problem, PriorityOrder(team.order)))
 
 
@@ -57,7 +57,7 @@ class Chatty(ABT):
 
 def chatty() -> Host:
     team = chain()
-    return Host(Chatty(LocalProblem(parts(team)["RB"]), PriorityOrder(team.order)))
+    return Host(Chatty(LocalProblem(agent_problems(team)["RB"]), PriorityOrder(team.order)))
 
 
 def test_a_message_carries_the_clock_of_when_it_was_said() -> None:

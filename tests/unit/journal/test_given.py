@@ -14,8 +14,8 @@ from robochoc.journal.given import GivenProblemError, TeamReader, TeamWriter, br
 from robochoc.model.change import without
 from robochoc.model.orders import Order, OrderError, in_order
 from robochoc.model.problem import Constraint, Domain, Kind, Relation, Robot, Semantics, Team, Variable
-from robochoc.solver.agent_problem import Brief
-from robochoc.solver.explanation import void
+from robochoc.solver.agent_problem import RunParameters
+from robochoc.solver.explanation import invalidated_by
 from tests.support.changes import random_journey, stages
 from tests.support.complex_changes import random_complex_journey
 from tests.support.complex_problems import random_complex_team
@@ -96,8 +96,8 @@ def test_only_what_is_new_is_told() -> None:
 
 
 def test_what_stands_beside_the_problem_comes_back() -> None:
-    team, brief = queens3d(2), Brief(7, {"cycles": "3"}, 12)
-    stale = void(team, without(team, ["Robot1.1"]))
+    team, brief = queens3d(2), RunParameters(7, {"cycles": "3"}, 12)
+    stale = invalidated_by(team, without(team, ["Robot1.1"]))
     given = through(TeamWriter().given(team, brief, stale, fresh=["Robot2.1"], quiet=False))
     assert (brief_of(given), void_of(given), given.fresh, given.quiet) == (brief, stale, ("Robot2.1",), False)
     assert isinstance(given.aside, int)

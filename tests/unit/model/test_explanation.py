@@ -24,14 +24,14 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
-from robochoc.solver.explanation import domain_key, void
+from robochoc.solver.explanation import domain_key, invalidated_by
 from tests.protocols.test_abt import differ, triangle
 from tests.support.problems import team_of
 from tests.unit.model.test_change import named, newcomer
 
 
 def told(old: Team, new: Team) -> tuple[set[str], set[str]]:
-    keys, agents = void(old, new)
+    keys, agents = invalidated_by(old, new)
     return set(keys), set(agents)
 
 
@@ -80,7 +80,7 @@ def test_a_domain_grows_with_other_private_constraints_and_other_variables() -> 
     other = replace(one, private=(replace(private, definition=PREDEFINED["le"]),))
     more = replace(free, variables=(*one.variables, Variable("A3", bits)))
     for old, new, grown in ((one, free, True), (free, one, False), (one, other, True), (free, more, True)):
-        assert void(Team("t", (old,)), Team("t", (new,))).keys == ({domain_key("RA")} if grown else set())
+        assert invalidated_by(Team("t", (old,)), Team("t", (new,))).keys == ({domain_key("RA")} if grown else set())
 
 
 def test_who_shows_other_variables_means_something_else() -> None:
@@ -91,7 +91,7 @@ def test_who_shows_other_variables_means_something_else() -> None:
     more = changed(team, [AddConstraint("RB", "RA", differ("W", "B"))])
     assert told(team, more) == (set(), {"RA"})
     alone = without(team, ["RB"])
-    assert void(team, alone).agents == {"RA", "RB"}
+    assert invalidated_by(team, alone).agents == {"RA", "RB"}
 
 
 def test_parts_of_partially_known_constraints_have_keys_of_their_own() -> None:
@@ -100,4 +100,4 @@ def test_parts_of_partially_known_constraints_have_keys_of_their_own() -> None:
     held = replace(above, children=(Child("RB", ("A",), (part,)),))
     empty = replace(above, children=(Child("RB", ("A",)),))
     below = replace(below, children=())
-    assert void(Team("t", (held, below)), Team("t", (empty, below))).keys == {"RA>RB:P"}
+    assert invalidated_by(Team("t", (held, below)), Team("t", (empty, below))).keys == {"RA>RB:P"}

@@ -33,9 +33,9 @@ from robochoc.protocols.dynabt import DynABT
 from robochoc.replay import CannotReplayError, Means, Replayed, replay
 from robochoc.run.orchestrator import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_names
-from robochoc.run.scenario import Announcer, Journey
+from robochoc.run.scenario import Announcer, ScenarioRun
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.agent_problem import Brief
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from tests.support.golden import odd_team
 from tests.support.problems import random_team
@@ -159,7 +159,7 @@ def test_robots_are_lost_and_come_back(spares: int, tmp_path: Path) -> None:
     write_team(odd_team(), tmp_path / "team")
     team = read_team(tmp_path / "team")
     Meteor.flag = tmp_path / "hit"
-    journey = Journey(team, None, CompiledTeam, lambda: None, spares=spares, brief=Brief(0, {}))
+    journey = ScenarioRun(team, None, CompiledTeam, lambda: None, spares=spares, brief=RunParameters(0, {}))
     recorder = Recorder(Header(team="team", protocol="dynabt", runtime="processes", seed=0))
     announce = Announcer(recorder)
     with ProcessesRun(journey.compiled(), Meteor, observer=recorder, survive=True) as session:

@@ -25,7 +25,7 @@ from robochoc.model.problem import (
     RemoveValue,
     Team,
 )
-from robochoc.run.scenario import Journey
+from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
 from tests.protocols.test_abt import triangle
 from tests.unit.model.test_change import named
@@ -73,8 +73,8 @@ def team(tmp_path: Path) -> Team:
     return read_team(tmp_path / "team")
 
 
-def travel(team: Team, losses: Sequence[str], spares: int = 0) -> tuple[Journey, Losing, list[Team]]:
-    journey = Journey(team, None, CompiledTeam, lambda: None, spares=spares)
+def travel(team: Team, losses: Sequence[str], spares: int = 0) -> tuple[ScenarioRun, Losing, list[Team]]:
+    journey = ScenarioRun(team, None, CompiledTeam, lambda: None, spares=spares)
     session = Losing(journey.team, losses)
     return journey, session, [played.team for played in journey.go(session, lambda _: None)]
 

@@ -16,7 +16,7 @@ from robochoc.model.problem import (
 )
 from robochoc.run.orchestrator import solve
 from robochoc.run.registry import protocol_named
-from robochoc.solver.central import Judge, Judgement
+from robochoc.solver.central import CentralSolver, Judgement
 from robochoc.verification.checker import objections
 from tests.conformance.test_complex_teams import compiled_by_hand
 from tests.support.complex_problems import random_complex_team
@@ -62,11 +62,11 @@ def test_judge_and_checker_see_the_files(monkeypatch: pytest.MonkeyPatch) -> Non
     team = graph_team(["AB", "BC", "AC"])
     seen = []
 
-    def judged(_judge: Judge, merged: Team, **_: object) -> Judgement:
+    def judged(_judge: CentralSolver, merged: Team, **_: object) -> Judgement:
         seen.append(merged)
         return Judgement(Verdict.NO_SOLUTION)
 
-    monkeypatch.setattr(Judge, "judge", judged)
+    monkeypatch.setattr(CentralSolver, "judge", judged)
     assert solve(team, replace(SIMULATED, order=Order.DFS, verify=True)).verified
     solve(team, replace(SIMULATED, order=Order.RANDOM, seed=1, protocol="central"))
     assert [one is team for one in seen] == [True, True]

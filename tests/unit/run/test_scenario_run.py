@@ -33,9 +33,9 @@ from robochoc.model.problem import (
 )
 from robochoc.protocols.dynabt import DynABT
 from robochoc.run.orchestrator import Options, Runtime, solve
-from robochoc.run.scenario import Journey, Played
+from robochoc.run.scenario import Played, ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.explanation import void
+from robochoc.solver.explanation import invalidated_by
 from tests.conformance.test_epochs import differ
 from tests.support.problems import team_of
 
@@ -77,11 +77,11 @@ def event(*changes: Change) -> Event:
     return Event(changes)
 
 
-def journey_of(team: Team, *, spares: int = 0, messages: int | None = None) -> Journey:
-    return Journey(team, None, CompiledTeam, lambda: None, messages=messages, spares=spares)
+def journey_of(team: Team, *, spares: int = 0, messages: int | None = None) -> ScenarioRun:
+    return ScenarioRun(team, None, CompiledTeam, lambda: None, messages=messages, spares=spares)
 
 
-def travel(journey: Journey, session: Scripted) -> list[Played]:
+def travel(journey: ScenarioRun, session: Scripted) -> list[Played]:
     return list(journey.go(session, lambda _: None))
 
 
@@ -181,8 +181,8 @@ def test_two_changes_in_a_row_tell_a_new_child() -> None:
     less = changed(linked, [RemoveAgent("RZ")])
     session = Simulation(team, DynABT, Concurrent(0))
     session.search()
-    session.change(Epoch(CompiledTeam(linked), void(team, linked)))  # and before the search goes on
-    session.change(Epoch(CompiledTeam(less), void(linked, less)))
+    session.change(Epoch(CompiledTeam(linked), invalidated_by(team, linked)))  # and before the search goes on
+    session.change(Epoch(CompiledTeam(less), invalidated_by(linked, less)))
     result = session.search()
     assert result.verdict is Verdict.SOLUTION
     assert result.assignments["RA"]["A"] != result.assignments["RB"]["B"]

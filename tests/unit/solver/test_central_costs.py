@@ -24,11 +24,11 @@ from robochoc.run.orchestrator import Options, RefutedError, Runtime, Withdrawal
 from robochoc.run.second_opinion import contradiction
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_words import Solved
-from robochoc.solver.central import Judge, Judgement
+from robochoc.solver.central import CentralSolver, Judgement
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.failures import SolverLostError
 from robochoc.verification.checker import objections
-from robochoc.verification.objective import aside_cost
+from robochoc.verification.objective import withdrawal_cost
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import (
     cost_of,
@@ -134,7 +134,7 @@ def test_counting_is_for_problems_without_costs() -> None:
 def test_an_answer_that_does_not_cost_what_the_judge_says_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     team = coloring(3, 2, 2)
     wrong = Judgement(Verdict.OPTIMAL, dict.fromkeys(team.variables, 1), cost=1, bound=1)
-    monkeypatch.setattr(Judge, "judge", lambda *_, **__: wrong)
+    monkeypatch.setattr(CentralSolver, "judge", lambda *_, **__: wrong)
     with pytest.raises(SolverLostError, match="costs 3, and it says 1"):
         solve(team, CENTRAL)
 
@@ -142,7 +142,7 @@ def test_an_answer_that_does_not_cost_what_the_judge_says_is_none(monkeypatch: p
 def test_a_search_that_broke_off_proves_no_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(AceProcess, "_hear", lambda *_: Solved(found=1, complete=False, solutions=b"\0" * 4 * 6))
     with pytest.raises(SolverLostError, match="stopped before"):
-        Judge(always_ace=True).judge(coloring(3, 2, 2))
+        CentralSolver(always_ace=True).judge(coloring(3, 2, 2))
 
 
 # --- the fewest aside -------------------------------------------------------------------------------------------------
@@ -151,7 +151,7 @@ def test_a_search_that_broke_off_proves_no_optimum(monkeypatch: pytest.MonkeyPat
 def least_total(team: Team) -> float:
     """What the cheapest choice of robots that step aside costs, and the cheapest answer of the others."""
     best = INFINITE
-    price = aside_cost(team)
+    price = withdrawal_cost(team)
     for flying in itertools.product((True, False), repeat=len(team.robots)):
         there = [robot for robot, flies in zip(team.robots, flying, strict=True) if flies]
         own = {variable.name: variable.domain for robot in there for variable in robot.variables}
@@ -195,7 +195,7 @@ def test_among_the_fewest_aside_costs_are_least(batch: int, solver: AceProcess) 
         away = sum(team[name].weight for name in outcome.withdrawn)
         assert outcome.verdict is Verdict.OPTIMAL
         assert outcome.cost is not None
-        assert away * aside_cost(team) + outcome.cost == least_total(team), team
+        assert away * withdrawal_cost(team) + outcome.cost == least_total(team), team
         aside += bool(away)
     assert aside > 2
 

@@ -23,8 +23,8 @@ from robochoc.protocols.traits import Traits
 from robochoc.replay.rebuild import Cast, Means
 from robochoc.replay.steps import Run
 from robochoc.run.orchestrator import Options, Runtime, solve
-from robochoc.run.scenario import Journey
-from robochoc.solver.agent_problem import NO_BRIEF, parts
+from robochoc.run.scenario import ScenarioRun
+from robochoc.solver.agent_problem import NO_BRIEF, agent_problems
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, as_compiled
 from robochoc.solver.domain import CompiledDomain, compiled_domain
 from robochoc.solver.encoding import UnsupportedError
@@ -60,7 +60,7 @@ def test_every_form_of_a_team_lines_up_with_its_domains() -> None:
     for _ in range(8):
         team = loose_team("abt", chance)
         for order in every_order(team, chance):
-            journey = Journey(team, order if isinstance(order, tuple) else None, CompiledTeam, lambda: None)
+            journey = ScenarioRun(team, order if isinstance(order, tuple) else None, CompiledTeam, lambda: None)
             assert lined_up(journey.compiled())
             assert journey.compiled().team == journey.arranged()
         assert lined_up(CompiledTeam(favourable(team)))
@@ -105,7 +105,7 @@ def test_a_robot_with_other_links_is_compiled_again_only_if_it_shows_something_e
 def test_only_those_who_are_asked_for_are_compiled() -> None:
     some = CompiledTeam(turned_interface(), only={"B"})
     assert list(some.robots) == ["B"]
-    assert list(parts(some)) == ["B"]
+    assert list(agent_problems(some)) == ["B"]
     assert as_compiled(some) is some
 
 

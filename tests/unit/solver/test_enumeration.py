@@ -19,7 +19,7 @@ from robochoc.run.orchestrator import Options, Runtime, solve
 from robochoc.solver import ace as front
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.cache import SolutionCache
-from robochoc.solver.central import Judge
+from robochoc.solver.central import CentralSolver
 from robochoc.solver.compile import Compiler, Limits, Source
 from robochoc.solver.domain import TooManySolutionsError
 from robochoc.solver.encoding import Codes, Network, Table
@@ -273,7 +273,7 @@ def test_meetings_start_no_process() -> None:
         team = meetings(chance, slots=chance.choice((3, 4, 8)))
         outcome = solve(team, Options(runtime=Runtime.SIMULATOR, cache=False, verify=True))
         assert outcome.verified, outcome
-        assert Judge().judge(team).verdict is outcome.verdict
+        assert CentralSolver().judge(team).verdict is outcome.verdict
         seen[outcome.verdict] += 1
     assert min(seen[Verdict.SOLUTION], seen[Verdict.NO_SOLUTION]) > 1, seen
 
@@ -283,8 +283,8 @@ def test_ace_judges_meetings_alike(batch: int, ace: AceProcess) -> None:
     chance = Random(f"meetings judged {batch}")
     for _ in range(20 if batch else 5):
         team = meetings(chance, slots=chance.choice((3, 4, 8)))
-        ours = Judge().judge(team)
-        theirs = Judge(solver=ace).judge(team)
+        ours = CentralSolver().judge(team)
+        theirs = CentralSolver(solver=ace).judge(team)
         assert ours.verdict is theirs.verdict
 
 

@@ -11,7 +11,7 @@ import pytest
 from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, Constraint, Relation, Robot, Semantics, Team
 from robochoc.solver import compiled
-from robochoc.solver.agent_problem import Brief, Part, parts
+from robochoc.solver.agent_problem import AgentProblem, RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain
@@ -25,7 +25,7 @@ ONE = Relation("R", 2, Semantics.SUPPORTS, ((1, 1),))
 
 def test_all_broken_constraints_are_told_not_only_the_first() -> None:
     constraints = [Constraint("C", EQUAL, pair, pair) for pair in (("A", "D"), ("B", "D"), ("C", "D"))]
-    problem = LocalProblem(parts(team_of(dict.fromkeys("ABCD", (1, 2)), constraints))["RD"])
+    problem = LocalProblem(agent_problems(team_of(dict.fromkeys("ABCD", (1, 2)), constraints))["RD"])
     view: dict[str, Value] = {"RA": (2,), "RB": (1,), "RC": (2,)}
     assert problem.conflicts(0, view) == [({"RA": (2,)}, "RD<RA:C"), ({"RC": (2,)}, "RD<RC:C")]
     assert problem.conflicts(1, view) == [({"RB": (1,)}, "RD<RB:C")]
@@ -34,14 +34,14 @@ def test_all_broken_constraints_are_told_not_only_the_first() -> None:
 def test_two_constraints_with_one_robot_are_both_told() -> None:
     names = ("A", "B")
     constraints = [Constraint("C1", EQUAL, names, names), Constraint("C2", ONE, names, names)]
-    problem = LocalProblem(parts(team_of(dict.fromkeys("AB", (1, 2)), constraints))["RB"])
+    problem = LocalProblem(agent_problems(team_of(dict.fromkeys("AB", (1, 2)), constraints))["RB"])
     assert [key for _, key in problem.conflicts(1, {"RA": (1,)})] == ["RB<RA:C1", "RB<RA:C2"]
     assert [key for _, key in problem.conflicts(1, {"RA": (2,)})] == ["RB<RA:C2"]
 
 
 def test_each_known_constraint_is_a_check_and_unknown_ones_are_passed_over() -> None:
     constraints = [Constraint("C", EQUAL, pair, pair) for pair in (("A", "C"), ("B", "C"))]
-    problem = LocalProblem(parts(team_of(dict.fromkeys("ABC", (1, 2)), constraints))["RC"])
+    problem = LocalProblem(agent_problems(team_of(dict.fromkeys("ABC", (1, 2)), constraints))["RC"])
     assert problem.conflicts(0, {}) == []
     assert problem.checks == 0
     problem.conflicts(0, {"RA": (1,)})
@@ -59,7 +59,7 @@ def test_conflicts_are_those_of_the_files(batch: int) -> None:
         team = random_team(chance)
         given = {name: chance.choice(sorted(v.domain)) for name, v in team.variables.items()}
         shared = [c for r in team.robots for parent in r.parents for c in parent.constraints]
-        for name, part in parts(team, everywhere=True).items():
+        for name, part in agent_problems(team, everywhere=True).items():
             problem = LocalProblem(part)
             if not team[name].interface:
                 continue
@@ -81,7 +81,7 @@ def test_burdens_are_broken_constraints_and_what_the_others_charge() -> None:
         Constraint("C", soft, ("B", "C"), ("B", "C")),
         Constraint("P", prices, ("C",), ("C",)),
     ]
-    problem = LocalProblem(parts(team_of(dict.fromkeys("ABC", (1, 2)), constraints))["RC"])
+    problem = LocalProblem(agent_problems(team_of(dict.fromkeys("ABC", (1, 2)), constraints))["RC"])
     assert problem.burdens({}) == [(0, 7), (0, 0)]
     assert problem.checks == 0
     assert problem.burdens({"RA": (1,), "RB": (1,)}) == [(0, 10), (1, 0)]
@@ -97,7 +97,7 @@ def test_burdens_are_costs_where_nothing_is_broken(batch: int) -> None:
     for _ in range(40):
         team = random_cost_team(chance)
         given = {name: chance.choice(sorted(v.domain)) for name, v in team.variables.items()}
-        for part in parts(team, everywhere=True).values():
+        for part in agent_problems(team, everywhere=True).values():
             problem = LocalProblem(part)
             view = {name: value for name, value in _view(team, given).items() if chance.random() < 0.8}
             costs = problem.costs(view)
@@ -117,7 +117,7 @@ def test_the_first_conflict_is_the_one_that_is_explained(batch: int, monkeypatch
     chance = Random(f"explained {batch}")
     for _ in range(30):
         team = random_complex_team(chance)
-        for part in parts(_any_domains(team, chance), everywhere=True).values():
+        for part in agent_problems(_any_domains(team, chance), everywhere=True).values():
             monkeypatch.setattr(compiled, "LARGE", chance.choice((1, 1000)))
             _compare(part, chance)
 
@@ -129,7 +129,7 @@ def test_what_a_robot_adds_is_the_difference_that_it_makes(batch: int) -> None:
     seen = Counter[str]()
     for _ in range(40):
         team = random_complex_cost_team(chance)
-        for part in parts(_any_domains(team, chance), everywhere=True).values():
+        for part in agent_problems(_any_domains(team, chance), everywhere=True).values():
             problem, again = LocalProblem(part), LocalProblem(part)
             view: dict[str, Value] = {}
             costs = problem.costs(view)
@@ -157,7 +157,7 @@ def test_the_least_is_what_the_cheapest_values_of_the_others_cost(batch: int, mo
         team = random_cost_team(chance)
         shared = [c for robot in team.robots for parent in robot.parents for c in parent.constraints]
         robots = {name for name in team.order if chance.random() < 0.6}
-        for name, part in parts(team, everywhere=True).items():
+        for name, part in agent_problems(team, everywhere=True).items():
             problem = LocalProblem(part)
             (own,) = (variable.name for variable in team[name].variables)
             least = problem.least(robots - {name})
@@ -185,11 +185,15 @@ def test_the_least_is_what_the_cheapest_values_of_the_others_cost(batch: int, mo
 
 def test_nothing_is_sure_to_be_charged_where_robots_may_step_aside() -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [Constraint("C", ONE, ("A", "B"), ("A", "B"))])
-    assert LocalProblem(parts(team, everywhere=True)["RA"]).least({"RB"}) == [0, INFINITE]
-    assert LocalProblem(parts(team, brief=Brief(aside=1), everywhere=True)["RA"]).least({"RB"}) == [0, 0, 0]
+    assert LocalProblem(agent_problems(team, everywhere=True)["RA"]).least({"RB"}) == [0, INFINITE]
+    assert LocalProblem(agent_problems(team, brief=RunParameters(aside=1), everywhere=True)["RA"]).least({"RB"}) == [
+        0,
+        0,
+        0,
+    ]
 
 
-def _compare(part: Part, chance: Random) -> None:
+def _compare(part: AgentProblem, chance: Random) -> None:
     problem = LocalProblem(part)
     for index in range(len(problem.values)):
         view = {

@@ -15,12 +15,12 @@ from robochoc.communication.run_result import RunResult
 from robochoc.journal.events import AnyEvent, Decided, Heard, Improved
 from robochoc.journal.journal import improvements
 from robochoc.model.expression import Type, parse
-from robochoc.model.outcome import Metrics, Outcome, Place, Verdict
+from robochoc.model.outcome import Metrics, Outcome, PseudoTreeNode, Verdict
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
 from robochoc.protocols.findings import Best, Findings, Trail
 from robochoc.run.incumbent import best_of, bound_of, course, tree_of
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.verification.objective import Objective, aside_cost
+from robochoc.verification.objective import Objective, withdrawal_cost
 from tests.support.cost_problems import cost_of, random_complex_cost_team, random_cost_team, with_costs
 from tests.support.problems import team_of
 
@@ -83,8 +83,8 @@ def test_stepping_aside_costs_more_than_all_that_can_be_paid_without() -> None:
     soft = Constraint("S", predicate, ("A",), ("A",), cost=5)
     hard = Constraint("H", predicate, ("B",), ("B",))
     team = with_costs(team_of({"A": (1,), "B": (1,)}, [soft, hard, *PAIR.constraints()]))
-    assert aside_cost(team) == 1 + 5 + 7
-    assert aside_cost(team_of({"B": (1,)}, [hard])) == 1
+    assert withdrawal_cost(team) == 1 + 5 + 7
+    assert withdrawal_cost(team_of({"B": (1,)}, [hard])) == 1
 
 
 # The best that robots tell of
@@ -213,11 +213,11 @@ def test_what_is_not_proven_says_so() -> None:
 
 def test_a_tree_is_drawn_with_its_depth_and_width() -> None:
     places = {
-        "R1": Place(None),
-        "R2": Place("R1"),
-        "R3": Place("R2", ("R1",)),
-        "R10": Place("R2"),
-        "S": Place(None),
+        "R1": PseudoTreeNode(None),
+        "R2": PseudoTreeNode("R1"),
+        "R3": PseudoTreeNode("R2", ("R1",)),
+        "R10": PseudoTreeNode("R2"),
+        "S": PseudoTreeNode(None),
     }
     assert tree_of({name: Findings(place=place) for name, place in places.items()} | {"T": Findings()}) == places
     outcome = Outcome("team", "dpop", "simulator", 0, Verdict.OPTIMAL, tree=places)

@@ -15,7 +15,7 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import parts
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.verification.checker import objections
 
@@ -23,7 +23,7 @@ from robochoc.verification.checker import objections
 def agents(team: Team) -> dict[str, Breakout]:
     """The protocol objects of all robots, by name, not yet started."""
     order = PriorityOrder(team.order)
-    known = parts(team, everywhere=Breakout.traits.everywhere)
+    known = agent_problems(team, everywhere=Breakout.traits.everywhere)
     return {name: Breakout(LocalProblem(part), order) for name, part in known.items()}
 
 
