@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -34,7 +35,7 @@ EPOCHS = (Epoch(Verdict.SOLUTION, SIX, assignment={"V1": 1}), Epoch(Verdict.SOLU
         ({"epochs": EPOCHS}, "solution for all 3 robots"),
     ],
 )
-def test_the_headline_says_what_happened(changed: dict[str, object], headline: str) -> None:
+def test_the_headline_says_what_happened(changed: dict[str, Any], headline: str) -> None:
     assert describe_outcome(replace(SOLVED, **changed), 16) == headline
 
 
