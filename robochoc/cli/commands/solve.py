@@ -112,7 +112,7 @@ if TYPE_CHECKING:
     metavar="NAME|FILE",
     help=(
         "Simulator only, instead of --delay: simulate time in seconds, computing and radio, by a channel model: wlan,"
-        " wpan, wman, wwan, or a TOML file (docs/channels.md)."
+        " wpan, wman, wwan, or a TOML file (docs/guides/channels.md)."
     ),
 )
 @click.option(
@@ -185,7 +185,7 @@ if TYPE_CHECKING:
     "--journal",
     type=OutputFile(),
     metavar="FILE",
-    help="Write down every message and decision while the run goes on, in a compact file (docs/journal.md).",
+    help="Write down every message and decision while the run goes on, in a compact file (docs/guides/journal.md).",
 )
 @click.option("--serve", is_flag=True, help="Show the 3D scene live on this machine until Ctrl-C.")
 @click.option(

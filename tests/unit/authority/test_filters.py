@@ -309,7 +309,7 @@ def test_a_filter_that_fails_has_not_opened(three: dict[str, KeyRing]) -> None:
 
 
 def test_the_filter_in_the_docs_works(three: dict[str, KeyRing], tmp_path: Path) -> None:
-    text = (ROOT / "docs" / "security.md").read_text()
+    text = (ROOT / "docs" / "guides" / "security.md").read_text()
     (tmp_path / "packed.py").write_text(text.partition("```python\n")[2].partition("```")[0])
     packed = runpy.run_path(str(tmp_path / "packed.py"))["Packed"]
     sealing, opening = (FilterStack(three[name], [packed, Sealed]) for name in "AB")
