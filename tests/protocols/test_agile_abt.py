@@ -28,7 +28,7 @@ from tests.support.small_teams import differ, triangle
 
 def begun(team: Team, name: str) -> AgileABT:
     """The protocol object of one robot, started; what it has said is in its outbox."""
-    agile = AgileABT(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
+    agile = AgileABT(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
     agile.start()
     return agile
 

@@ -27,10 +27,10 @@ def change(dynabt: DynABT, old: Team, new: Team) -> None:
     assert dynabt.outbox == []
 
 
-def after(dynabt: DynABT, team: Team, *changes: Change, quiet: bool = True) -> list[tuple[str, Message]]:
+def after(dynabt: DynABT, team: Team, *changes: Change, lossless: bool = True) -> list[tuple[str, Message]]:
     """Return what the robot sends when it goes on after `changes`."""
     change(dynabt, team, changed(team, changes))
-    dynabt.resume(quiet=quiet)
+    dynabt.resume(lossless=lossless)
     said = list(dynabt.outbox)
     dynabt.outbox.clear()
     return said

@@ -41,7 +41,7 @@ def authority() -> None:
     """The Authority: it says who may take part, and certifies the keys of those who may.
 
     Its folder holds the key that signs all certificates: whoever has it decides who takes part. Keep it where the
-    master runs, and nowhere else. What protects from what: docs/security.md.
+    master runs, and nowhere else. What protects from what: docs/guides/security.md.
 
     \b
     robochoc authority init

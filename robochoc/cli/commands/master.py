@@ -98,7 +98,7 @@ if TYPE_CHECKING:
     "--journal",
     type=OutputFile(),
     metavar="FILE",
-    help="Write down every event while the run goes on, in a compact file (docs/journal.md).",
+    help="Write down every event while the run goes on, in a compact file (docs/guides/journal.md).",
 )
 @click.option(
     "--sniffable",

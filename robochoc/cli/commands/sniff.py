@@ -51,7 +51,8 @@ def sniff(
     """Show the conversations in JOURNAL on a page of this machine, until Ctrl-C: who said what, and why.
 
     JOURNAL is what 'robochoc solve --journal' writes; while it is still written, the page follows it. With --master
-    it is what a master on another machine gives out of its run, to those who may sniff: docs/several-machines.md.
+    it is what a master on another machine gives out of its run, to those who may sniff:
+    docs/guides/several-machines.md.
     """
     elsewhere = asks_master(journal, folder, asked)
     if elsewhere or journal is None:

@@ -112,7 +112,7 @@ if TYPE_CHECKING:
     metavar="NAME|FILE",
     help=(
         "Simulator only, instead of --delay: simulate time in seconds, computing and radio, by a channel model: wlan,"
-        " wpan, wman, wwan, or a TOML file (docs/channels.md)."
+        " wpan, wman, wwan, or a TOML file (docs/guides/channels.md)."
     ),
 )
 @click.option(
@@ -185,7 +185,7 @@ if TYPE_CHECKING:
     "--journal",
     type=OutputFile(),
     metavar="FILE",
-    help="Write down every message and decision while the run goes on, in a compact file (docs/journal.md).",
+    help="Write down every message and decision while the run goes on, in a compact file (docs/guides/journal.md).",
 )
 @click.option("--serve", is_flag=True, help="Show the 3D scene live on this machine until Ctrl-C.")
 @click.option(
@@ -296,11 +296,9 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     for line in told_of(loop) if loop and not wanted.as_json else ():
         click.echo(line, err=True)
     if products.html or products.serve:
-        from robochoc.cli.reports.progress import stages
-        from robochoc.view.scene import scene_of
+        from robochoc.cli.reports.scene import scene_for
 
-        with stages(team.name) as progress:
-            scene = scene_of(outcome, team, mission=flight.mission, flown=flight.flown, progress=progress)
+        scene = scene_for(outcome, team, mission=flight.mission, flown=flight.flown)
         _show(scene, products, quiet=wanted.as_json)
     if outcome.verdict != "unknown":
         return flight.status

@@ -119,7 +119,7 @@ ros_options = _optional(
         metavar="SINK",
         help=(
             "Publish decisions as waypoints: mcap:FILE (for Foxglove), rosbag:FILE, rosbridge://HOST:PORT, rospy, or"
-            " what is installed (docs/ros.md). May be given several times."
+            " what is installed (docs/guides/ros.md). May be given several times."
         ),
     ),
     click.option("--frame", type=FrameType(), metavar="NAME", help=f"The frame of all places.  [default: {FRAME}]"),
@@ -158,7 +158,8 @@ situation_options = _optional(
         metavar="SOURCE",
         help=(
             "What robots report changes the problem, and the team solves again: flight (the decisions are flown in a"
-            " simulation), mcap:FILE, rosbag:FILE, rosbridge://HOST:PORT, rospy, or what is installed (docs/ros.md)."
+            " simulation), mcap:FILE, rosbag:FILE, rosbridge://HOST:PORT, rospy, or what is installed"
+            " (docs/guides/ros.md)."
         ),
     ),
     click.option(
