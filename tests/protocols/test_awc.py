@@ -16,24 +16,12 @@ from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import told, value
 from tests.support.complex_problems import complex_team
 from tests.support.problems import team_of
-
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
-
-
-def differ(left: str, right: str) -> Constraint:
-    return Constraint("C", DIFFERENT, (left, right), (left, right))
-
-
-def triangle(values: int = 2) -> Team:
-    """Three robots, each different from each; a fourth that only the third knows."""
-    domains = {name: range(1, values + 1) for name in ("A", "B", "C", "D")}
-    pairs = (("A", "B"), ("A", "C"), ("B", "C"), ("C", "D"))
-    return team_of(domains, [differ(*pair) for pair in pairs])
+from tests.support.small_teams import differ, triangle
 
 
 def agent(team: Team, name: str) -> AWC:
     """The protocol object of one robot, started, with nothing left to say."""
-    awc = AWC(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
+    awc = AWC(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
     awc.start()
     awc.outbox.clear()
     return awc
@@ -45,7 +33,7 @@ def nogood(assignments: Mapping[str, Value]) -> Nogood:
 
 def test_start_takes_the_first_value_and_tells_it_with_priority_0_to_all_neighbours() -> None:
     team = triangle()
-    awc = AWC(LocalProblem(agent_problems(team, everywhere=True)["RB"]), PriorityOrder(team.order))
+    awc = AWC(LocalProblem(agent_problems(team, shared_scopes=True)["RB"]), PriorityOrder(team.order))
     awc.start()
     assert awc.outbox == [("RA", Ok((1,), 0)), ("RC", Ok((1,), 0))]
 

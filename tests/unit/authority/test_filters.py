@@ -332,11 +332,11 @@ def test_what_others_offer_may_be_broken(monkeypatch: pytest.MonkeyPatch) -> Non
     offered(
         monkeypatch,
         filters.GROUP,
-        backwards="test_filters:Backwards",
-        half="test_filters:Half",
+        backwards="tests.unit.authority.test_filters:Backwards",
+        half="tests.unit.authority.test_filters:Half",
         gone="nowhere.to:Find",
-        function="offered:offered",
-        twice=["test_filters:Backwards", "test_filters:Half"],
+        function="tests.support.offered:offered",
+        twice=["tests.unit.authority.test_filters:Backwards", "tests.unit.authority.test_filters:Half"],
     )
     assert filter_named("backwards").__name__ == "Backwards"
     for name, why in {

@@ -27,9 +27,7 @@ from robochoc.model.problem import (
 )
 from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
-from tests.protocols.test_abt import triangle
-from tests.unit.model.test_change import named
-from tests.unit.model.test_changed_files import writable
+from tests.support.small_teams import named_constraint, triangle
 
 
 class Losing(Session):
@@ -41,7 +39,7 @@ class Losing(Session):
         self.epochs: list[Epoch] = []
 
     @property
-    def quiet(self) -> bool:
+    def lossless(self) -> bool:
         return True
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
@@ -62,14 +60,14 @@ CHANGES: list[Change] = [
     RemoveConstraint("RC", "RB", "C"),
     RemoveValue("C", 1),
     AddValue("C", 7),
-    AddConstraint("RC", "RB", named("N", "B", "C")),
-    AddConstraint("RD", "RC", named("M", "C", "D")),
+    AddConstraint("RC", "RB", named_constraint("N", "B", "C")),
+    AddConstraint("RD", "RC", named_constraint("M", "C", "D")),
 ]
 
 
 @pytest.fixture
 def team(tmp_path: Path) -> Team:
-    write_team(writable(triangle()), tmp_path / "team")
+    write_team(triangle(), tmp_path / "team")
     return read_team(tmp_path / "team")
 
 
@@ -83,7 +81,7 @@ def test_who_is_lost_leaves(team: Team) -> None:
     journey, session, teams = travel(team, ["RB"])
     assert teams == [team, without(team, ["RB"])]
     assert journey.withdrawn == ["RB"]
-    assert session.epochs[0].fresh == frozenset()
+    assert session.epochs[0].restarted == frozenset()
 
 
 def test_who_comes_back_has_the_same_problem_and_the_lowest_priority(team: Team) -> None:
@@ -92,7 +90,7 @@ def test_who_comes_back_has_the_same_problem_and_the_lowest_priority(team: Team)
     assert journey.withdrawn == []
     (epoch,) = session.epochs
     assert epoch.team.order == ("RA", "RC", "RD", "RB")
-    assert epoch.fresh == frozenset({"RB"})
+    assert epoch.restarted == frozenset({"RB"})
     assert "RB" in epoch.void.agents
 
 

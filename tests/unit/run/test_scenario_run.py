@@ -36,8 +36,8 @@ from robochoc.run.orchestrator import Options, Runtime, solve
 from robochoc.run.scenario import Played, ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import invalidated_by
-from tests.conformance.test_epochs import differ
 from tests.support.problems import team_of
+from tests.support.small_teams import differ
 
 BASE = team_of(dict.fromkeys("ABC", range(1, 4)), [differ("A", "B"), differ("B", "C")])
 DONE = RunResult(Verdict.SOLUTION, None, {}, Metrics({"Ok": 7}))
@@ -53,7 +53,7 @@ class Scripted(Session):
         self.limits: list[int | None] = []
 
     @property
-    def quiet(self) -> bool:
+    def lossless(self) -> bool:
         return True
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
@@ -143,7 +143,7 @@ def test_a_spare_comes_back_at_the_end_of_the_order(tmp_path: Path) -> None:
     session = Scripted(journey.team, losing("RA"), losing("RC"))
     travel(journey, session)
     assert [epoch.team.order for epoch in session.epochs] == [("RB", "RC", "RA"), ("RB", "RA")]
-    assert [epoch.fresh for epoch in session.epochs] == [{"RA"}, set()]
+    assert [epoch.restarted for epoch in session.epochs] == [{"RA"}, set()]
     assert journey.withdrawn == ["RC"]
 
 
