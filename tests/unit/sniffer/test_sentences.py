@@ -32,7 +32,7 @@ from tests.support.recorded import fed, record
 
 OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
 PROTOCOLS: list[type[Protocol]] = [*map(protocol_named, OURS), FirstFit]
-TYPES = sorted(
+TYPES: list[type[Message]] = sorted(
     {kind for protocol in PROTOCOLS for kind in get_args(protocol.messages) or (protocol.messages,)},
     key=lambda kind: (kind.__name__, kind.__module__),
 )
