@@ -16,7 +16,7 @@ import numpy.typing as npt
 import pytest
 from PIL import Image
 
-from robochoc.flight.log import Flown
+from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import mission_of
 from robochoc.view.page import page
 from robochoc.view.scene import Scene, scene_of
@@ -35,7 +35,7 @@ Page = Any
 def scene(**how: Any) -> Scene:  # noqa: ANN401 - `straight`'s
     outcome = epochs_of_three(HOSTILE)
     mission = mission_of(outcome, five())
-    flown: Flown = straight(mission, **how)
+    flown: FlightLog = straight(mission, **how)
     return scene_of(outcome, mission, flown)
 
 

@@ -27,7 +27,7 @@ from robochoc.ros.live.rosbridge import (
     outgoing,
 )
 from robochoc.ros.sink import SinkError
-from robochoc.ros.source import Heard, SourceError
+from robochoc.ros.source import ReceivedMessage, SourceError
 from tests.support.clocks import waiting
 from tests.support.rosbridge_server import Manner, Server
 from tests.support.strangers import stranger
@@ -323,11 +323,11 @@ def test_what_we_send_we_understand(stamp: int, fields: dict[str, object]) -> No
 
 def test_a_loud_topic_does_not_push_out_others() -> None:
     inbox = Inbox(per_topic=10, weight=1000)
-    inbox.put(Heard("/blocked", "a", {}, 0))
+    inbox.put(ReceivedMessage("/blocked", "a", {}, 0))
     for number in range(100):
-        inbox.put(Heard("/battery", "b", {}, number))
-    inbox.put(Heard("/long", "c", {}, 0), 900)
-    inbox.put(Heard("/long", "c", {}, 1), 980)
+        inbox.put(ReceivedMessage("/battery", "b", {}, number))
+    inbox.put(ReceivedMessage("/long", "c", {}, 0), 900)
+    inbox.put(ReceivedMessage("/long", "c", {}, 1), 980)
     heard = []
     while (one := inbox.get(0)) is not None:
         heard.append((one.topic, one.at_ns))

@@ -20,7 +20,7 @@ from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.orchestrator import solve
 from robochoc.sniffer.server import Server
 from robochoc.sniffer.session import Session
-from robochoc.view.address import listening, url_of
+from robochoc.view.address import loopback_socket, url_of
 
 TOKEN = "a-path-that-nobody-guesses"  # noqa: S105 - it is for tests
 
@@ -70,7 +70,7 @@ class Served:
             runner.run(self._serve())
 
     async def _serve(self) -> None:
-        with listening() as here:
+        with loopback_socket() as here:
             self.port = here.getsockname()[1]
             self.url = url_of(here, f"{TOKEN}/")
             self.server = Server(self._session, here, TOKEN, self._count)
