@@ -22,10 +22,10 @@ from robochoc.ros.source import ReceivedMessage, Source, SourceError
 from robochoc.ros.source_feedback import SourceFeedback
 from robochoc.run.orchestrator import OnLoss, Options, Runtime, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
-from tests.conformance.test_epochs import pair
 from tests.support.clocks import waiting
 from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import ROOT
+from tests.support.small_teams import pair
 
 HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")
 SIMULATED = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
