@@ -87,7 +87,7 @@ def publish_flight(mission: Mission, flown: FlightLog, outlets: Sequence[SinkPub
     falls = {one.drone: one for one in reversed(flown.events) if one.drone in fallen}
     reports = sorted((OutOfOrder(flown.names[n], one.what, one.at_s) for n, one in falls.items()), key=lambda r: r.at_s)
     broadcast = Broadcast()
-    begins_s = [0.0, *(flown_leg.begins_s for flown_leg in flown.legs[1:]), flown.simulated_s]
+    begins_s = [0.0, *(times.begins_s for times in flown.legs[1:]), flown.simulated_s]
     for leg, (begin_s, end_s) in zip(mission.legs, pairwise(begins_s), strict=True):
         for outlet in outlets:
             outlet.decide(leg, nanoseconds(begin_s))

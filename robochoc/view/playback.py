@@ -120,7 +120,7 @@ def _looks(number: int, mission: Mission, flown: FlightLog) -> Iterator[tuple[fl
 
 def _begun(mission: Mission, flown: FlightLog) -> list[tuple[Leg, float]]:
     """The legs that were flown, and when each began."""
-    return [(leg, flown_leg.begins_s) for leg, flown_leg in zip(mission.legs, flown.legs, strict=False)]
+    return [(leg, times.begins_s) for leg, times in zip(mission.legs, flown.legs, strict=False)]
 
 
 def _chapters(mission: Mission, flown: FlightLog) -> Iterator[Chapter]:
