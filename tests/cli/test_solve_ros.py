@@ -16,7 +16,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.ros.recordings.mcap_file import McapSink
 from robochoc.ros.single_robot import drones_of_robot, leg_of_robot
 from robochoc.ros.sinks import open_source
-from tests.support.machines import Site, ended
+from tests.support.deployments import Deployment, ended
 from tests.support.program import ROOT
 
 HANGAR = ROOT / "docs" / "examples" / "hangar"
@@ -267,7 +267,7 @@ def test_a_flight_that_would_never_end_is_not_begun(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_robot_publishes_its_own_decision(site: Site, tmp_path: Path) -> None:
+def test_a_robot_publishes_its_own_decision(site: Deployment, tmp_path: Path) -> None:
     tokens = site.enrol("--team", SCOUTS)
     master = site.master("--json")
     first = next(iter(tokens))
