@@ -20,26 +20,26 @@ from robochoc.services.identifier import AgentIdentifier
 from robochoc.services.sl import REQUEST_CAPS, Function, df_on, request
 from robochoc.services.symbolic import Expression, read
 from robochoc.sniffer.acl import ACLError, ACLMessage, parse, text
-from tests.support.program import ROOT
-from tests.support.talks import (
+from tests.support.acl_conversations import (
+    BUNDLED_PROTOCOLS,
     OK,
-    OURS,
     PLATFORM,
     assert_others_read,
     conversation,
     types_of,
 )
+from tests.support.program import ROOT
 
 DOCS = (ROOT / "docs" / "guides" / "acl.md").read_text()
 
 
 # The acts
 
-ACTS = {kind.__name__: kind.act for name in OURS for kind in types_of(protocol_named(name))}
+ACTS = {kind.__name__: kind.act for name in BUNDLED_PROTOCOLS for kind in types_of(protocol_named(name))}
 
 
 def test_types_of_one_name_do_the_same_in_all_of_our_protocols() -> None:
-    for name in OURS:
+    for name in BUNDLED_PROTOCOLS:
         for kind in types_of(protocol_named(name)):
             assert kind.act == ACTS[kind.__name__], kind
 
