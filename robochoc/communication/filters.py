@@ -2,7 +2,7 @@
 
 A filter comes from an installed package, under the entry point group `robochoc.filters`, as protocols do. Several can
 be stacked: they seal in their order, and open in the reverse one. Two come with robochoc: `signed` and `sealed`. What
-they protect from, and how to write one: docs/security.md.
+they protect from, and how to write one: docs/guides/security.md.
 """
 
 from __future__ import annotations

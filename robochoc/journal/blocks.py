@@ -1,6 +1,6 @@
 """A journal's frame: blocks in a chain of checksums, so that none can be missing, doubled, in a wrong place or altered.
 
-docs/journal.md has every byte of it. The checksum is BLAKE2b (RFC 7693), the compression zlib's (RFC 1950).
+docs/guides/journal.md has every byte of it. The checksum is BLAKE2b (RFC 7693), the compression zlib's (RFC 1950).
 """
 
 from __future__ import annotations

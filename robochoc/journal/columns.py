@@ -1,4 +1,4 @@
-"""What a block of a journal holds: its entries in columns, as msgpack (docs/journal.md).
+"""What a block of a journal holds: its entries in columns, as msgpack (docs/guides/journal.md).
 
 Most entries are of four kinds. What entries of these have in common stands side by side, as that is packed best; all
 others are written as they are. A block is read without those before it.

@@ -1,8 +1,8 @@
 """The journal: all events of a run, in a compact file that can be read while it is written, and after a crash.
 
 The first entry says what was run, the last one how it ended. Statistics, pictures and golden tests are computed from
-it; robots do not know that it is kept. The file is described in docs/journal.md; its text form is one JSON object a
-line.
+it; robots do not know that it is kept. The file is described in docs/guides/journal.md; its text form is one JSON
+object a line.
 """
 
 from __future__ import annotations

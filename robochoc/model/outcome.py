@@ -22,7 +22,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Metrics:
-    """What a run cost. Definitions: `docs/metrics.md`.
+    """What a run cost. Definitions: `docs/reference/metrics.md`.
 
     `messages`: protocol messages sent, by type; `bytes`: of their encoded contents; `ncccs`: non-concurrent
     constraint checks; `checks`: constraint checks of all robots; `wall_s`: seconds of wall-clock time;

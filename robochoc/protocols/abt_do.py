@@ -107,7 +107,7 @@ class ABTDORetro(Backtracking):
 
     messages = Ok | Nogood | Order | AddLink
     traits = Traits(
-        concludes=ENDS_WITH_PROOF, paper="Zivan & Meisels 2006; Zivan et al. 2009", everywhere=True, privacy="none"
+        concludes=ENDS_WITH_PROOF, paper="Zivan & Meisels 2006; Zivan et al. 2009", shared_scopes=True, privacy="none"
     )
     order: CurrentOrder
 

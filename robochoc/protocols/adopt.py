@@ -84,8 +84,8 @@ class ADOPT(BoundingProtocol):
         concludes=ENDS_WITH_PROOF,
         paper="Modi, Shen, Tambe, Yokoo 2005",
         costs=True,
-        everywhere=True,
-        beyond=False,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
         privacy="constraints among others",
     )
 

@@ -111,7 +111,7 @@ class AFB(Protocol):
         concludes=ENDS_WITH_PROOF,
         paper="Gershman, Meisels & Zivan 2009",
         costs=True,
-        everywhere=True,
+        shared_scopes=True,
         privacy="constraints that a robot has no part in",
     )
 

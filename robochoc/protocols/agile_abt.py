@@ -94,7 +94,7 @@ class AgileABT(Backtracking):
     """
 
     messages = Ok | Nogood | Order | AddLink
-    traits = Traits(concludes=ENDS_WITH_PROOF, paper="Bessiere et al. 2011", everywhere=True, privacy="none")
+    traits = Traits(concludes=ENDS_WITH_PROOF, paper="Bessiere et al. 2011", shared_scopes=True, privacy="none")
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

@@ -106,7 +106,9 @@ class AWC(Protocol):
     """One agent of AWC. State: `view` (agent_view) and `priorities` of others, `nogoods`, own `priority`."""
 
     messages = Ok | Nogood | AddLink
-    traits = Traits(concludes=ENDS_WITH_PROOF, paper="Yokoo 1995; Yokoo et al. 1998", everywhere=True, privacy="none")
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF, paper="Yokoo 1995; Yokoo et al. 1998", shared_scopes=True, privacy="none"
+    )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

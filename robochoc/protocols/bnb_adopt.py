@@ -86,8 +86,8 @@ class BnBADOPT(BoundingProtocol):
         concludes=ENDS_WITH_PROOF,
         paper="Yeoh, Felner, Koenig 2010; Gutierrez & Meseguer 2010",
         costs=True,
-        everywhere=True,
-        beyond=False,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
         privacy="constraints among others",
     )
 

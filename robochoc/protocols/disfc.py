@@ -74,7 +74,7 @@ class DisFC(Protocol):
         paper="Brito and Meseguer 2003; PKC: Brito et al. 2009",
         n_ary=False,
         partially_known=True,
-        everywhere=True,
+        shared_scopes=True,
         privacy="values; of PKCs every robot's part, but for the rows of values taken",
     )
 

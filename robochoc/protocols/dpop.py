@@ -155,8 +155,8 @@ class DPOP(TreeProtocol):
         concludes=ENDS_WITH_PROOF,
         paper="Petcu & Faltings 2005",
         costs=True,
-        everywhere=True,
-        beyond=False,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
         tables=True,
         privacy="constraints of others, but for sums",
     )

@@ -61,8 +61,8 @@ class DSA(CycleProtocol):
         paper="Fitzpatrick & Meertens 2001; Zhang, Wang, Xing, Wittenburg 2005",
         complete=False,
         costs=True,
-        everywhere=True,
-        beyond=False,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
         privacy="constraints among others",
     )
 

@@ -29,7 +29,7 @@ class FirstFit(Protocol):
     """One robot. `view` holds the values of the parents that fly, `awaited` the parents not yet heard."""
 
     messages = Placed
-    traits = Traits(concludes=(), paper="paper, Section 5.2", complete=False, beyond=False)
+    traits = Traits(concludes=(), paper="paper, Section 5.2", complete=False, writes_to_non_neighbours=False)
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

@@ -93,7 +93,7 @@ class MaxSum(CycleProtocol):
         paper="Farinelli, Rogers, Petcu, Jennings 2008",
         complete=False,
         costs=True,
-        beyond=False,
+        writes_to_non_neighbours=False,
         privacy="constraints among others",
     )
 

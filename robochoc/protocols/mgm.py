@@ -82,8 +82,8 @@ class MGM(Gainers):
         paper="Maheswaran, Pearce, Tambe 2004",
         complete=False,
         costs=True,
-        everywhere=True,
-        beyond=False,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
         privacy="constraints among others",
     )
 

@@ -103,8 +103,8 @@ class MGM2(Gainers):
         paper="Maheswaran, Pearce, Tambe 2004",
         complete=False,
         costs=True,
-        everywhere=True,
-        beyond=False,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
         privacy="constraints among others",
     )
 

@@ -195,7 +195,7 @@ class SFB(Protocol):
         paper="Hirayama & Yokoo 1997; Gershman, Meisels, Zivan 2009",
         synchronous=True,
         costs=True,
-        everywhere=True,
+        shared_scopes=True,
         tables=True,
     )
     settings: SFBSettings = SFBSettings()

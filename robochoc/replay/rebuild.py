@@ -75,7 +75,7 @@ class Ensemble(NamedTuple):
     protocol: type[Protocol]
     hosts: Mapping[str, Host]
     parts: Mapping[str, AgentProblem]
-    quiet: bool
+    lossless: bool
     mindful: Collection[str]
     compiled: CompiledTeam
 
@@ -110,9 +110,9 @@ class Cast:
             raise CannotReplayError(str(why)) from why
         self._lost.update(event.robot for event in run.events if isinstance(event, Lost))
         kept = issubclass(protocol, DynamicProtocol)
-        mindful = [name for name in parts if kept and name in before and name not in epoch.fresh]
-        quiet = run.given is None or run.given.quiet
-        return Ensemble(protocol, self._hosts, parts, quiet, mindful, epoch.compiled)
+        mindful = [name for name in parts if kept and name in before and name not in epoch.restarted]
+        lossless = run.given is None or run.given.quiet
+        return Ensemble(protocol, self._hosts, parts, lossless, mindful, epoch.compiled)
 
     def _protocol(self, run: Run) -> type[Protocol]:
         """The class that the run names; of a master's journal, the header's."""
@@ -199,7 +199,7 @@ def _host(protocol: type[Protocol], part: AgentProblem, before: Host | None, epo
     """The robot of `part`: the one that was there before, if it goes on, or a new one. Raises `CannotReplayError`."""
     name = part.robot.name
     try:
-        if before is None or name in epoch.fresh:
+        if before is None or name in epoch.restarted:
             return Host.of(protocol, part)
         before.change(part, epoch.void)
     except _UNCOMPILED:

@@ -39,7 +39,9 @@ class Publisher:
     def __init__(self, team: str, drones: Sequence[Drone], sinks: Sequence[Sink], frame: str = "map") -> None:
         if all(drone.topic is None for drone in drones):
             told = f"no drone of {team or 'the team'} has a topic to publish its waypoints on"
-            raise NothingToPublishError(on_one_line(f"{told}: give its robot's file a <topic> (docs/format.md)"))
+            raise NothingToPublishError(
+                on_one_line(f"{told}: give its robot's file a <topic> (docs/reference/format.md)")
+            )
         self.names = Names(drones)
         self._drones = drones
         self._sinks = sinks

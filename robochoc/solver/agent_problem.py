@@ -69,11 +69,11 @@ class AgentProblem(NamedTuple):
 
 
 def agent_problems(
-    team: Team | CompiledTeam, brief: RunParameters = NO_BRIEF, *, everywhere: bool = False, tree: bool = False
+    team: Team | CompiledTeam, brief: RunParameters = NO_BRIEF, *, shared_scopes: bool = False, tree: bool = False
 ) -> dict[str, AgentProblem]:
     """Return the part of each robot of `team` that is compiled, in priority order.
 
-    `everywhere`: every robot of a constraint's scope knows it. `tree`: all know who is whose parent.
+    `shared_scopes`: every robot of a constraint's scope knows it. `tree`: all know who is whose parent.
     """
     compiled = as_compiled(team)
     team = compiled.team
@@ -81,7 +81,7 @@ def agent_problems(
     known = {name: team.variables[name].domain for names in shown.values() for name in names}
     links = {robot.name: tuple(parent.name for parent in robot.parents) for robot in team.robots} if tree else None
     copies: dict[str, list[Known]] = {robot.name: [] for robot in team.robots}
-    if everywhere:
+    if shared_scopes:
         for robot in team.robots:
             for one in held(robot):
                 for owner in {team.owner[name] for name in one.constraint.variables} - {robot.name}:

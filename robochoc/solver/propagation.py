@@ -1,9 +1,9 @@
 """Generalised arc consistency on tables: what is left is smaller, and safe for ACE to have.
 
 ACE 2.6 counts wrongly where a table of forbidden tuples meets a domain of one value, fails an assertion where its own
-first filtering empties a table, and trips over small permutations (`tests/unit/solver/test_ace.py`; docs/design.md,
-"ACE"). So it gets none of these: values without support go, variables with one value leave their tables, tables that
-say nothing any more are dropped, and small permutations are spelt out.
+first filtering empties a table, and trips over small permutations (`tests/unit/solver/test_ace.py`;
+docs/explanation/design.md, "ACE"). So it gets none of these: values without support go, variables with one value leave
+their tables, tables that say nothing any more are dropped, and small permutations are spelt out.
 """
 
 from __future__ import annotations

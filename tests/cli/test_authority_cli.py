@@ -177,4 +177,4 @@ def test_the_readme_and_the_docs_know_it() -> None:
     readme = (ROOT / "README.md").read_text()
     for command in ("init", "enrol", "list", "revoke"):
         assert f"robochoc authority {command}" in readme
-        assert f"robochoc authority {command}" in (ROOT / "docs" / "security.md").read_text()
+        assert f"robochoc authority {command}" in (ROOT / "docs" / "guides" / "security.md").read_text()

@@ -1,4 +1,4 @@
-"""A user's own protocol (docs/write-a-protocol.md): installed as a user does, found, run, tested; what may go wrong.
+"""A user's own protocol (docs/tutorials/write-a-protocol.md): installed as a user does, found, run, tested; failures.
 
 Packages go into folders of their own, which stand on PYTHONPATH: nothing is downloaded, and neither the repository nor
 the environment changes.
@@ -27,7 +27,7 @@ from tests.support.problems import team_of
 from tests.support.program import ROOT
 
 EXAMPLE = ROOT / "docs" / "examples" / "breakout"
-GUIDE = (ROOT / "docs" / "write-a-protocol.md").read_text()
+GUIDE = (ROOT / "docs" / "tutorials" / "write-a-protocol.md").read_text()
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", GUIDE, re.MULTILINE | re.DOTALL)
 COMMANDS = [place for place, (kind, _) in enumerate(BLOCKS) if kind == "sh"]
 INSTALL = "pip install docs/examples/breakout"
@@ -123,8 +123,8 @@ def test_the_guide_names_what_a_protocol_has() -> None:
 def test_the_guides_links_lead_somewhere() -> None:
     links = re.findall(r"\]\(([^)]+)\)", GUIDE)
     assert links
-    assert all((ROOT / "docs" / link).exists() for link in links)
-    assert "docs/write-a-protocol.md" in (ROOT / "README.md").read_text()
+    assert all((ROOT / "docs" / "tutorials" / link).exists() for link in links)
+    assert "docs/tutorials/write-a-protocol.md" in (ROOT / "README.md").read_text()
 
 
 def _explained(head: str) -> set[str]:

@@ -40,7 +40,7 @@ def test_names_that_say_nothing_are_not_used() -> None:
 
 def test_every_dependency_is_explained() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    design = (ROOT / "docs" / "design.md").read_text()
+    design = (ROOT / "docs" / "explanation" / "design.md").read_text()
     for requirement in project["dependencies"]:
         name = re.split(r"[<>=!~ ]", requirement)[0]
         assert f"| {name} |" in design, name

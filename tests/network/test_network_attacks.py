@@ -168,7 +168,7 @@ def test_reading_the_letters_of_others(run: NetworkRun, key: str) -> None:
 
 def test_a_robot_that_writes_to_one_it_has_nothing_to_do_with(run: NetworkRun) -> None:
     """RX0 and RX3 share no constraint, and the protocol says that it goes `beyond` none."""
-    assert not Held.traits.beyond
+    assert not Held.traits.writes_to_non_neighbours
     with run.post("RX3") as post:
         put(post, letter_key("RX0", "RX3"), letter(run, "RX3", "RX0", Said(1, 0, encode(Ok((0,))))))
         run.wait_for_refusal("RX3", "put rc/msg/RX0/RX3", "no rule")

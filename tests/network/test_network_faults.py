@@ -270,8 +270,8 @@ class Elsewhere:
 
     @contextmanager
     def master(self) -> Iterator[subprocess.Popen[bytes]]:
-        program = str(ROOT.joinpath("support", "network_master.py"))
-        command = [sys.executable, program, str(self.folder / "authority"), self.endpoint, str(self.folder / "go")]
+        given = [str(self.folder / "authority"), self.endpoint, str(self.folder / "go")]
+        command = [sys.executable, "-m", "tests.support.network_master", *given]
         process = subprocess.Popen(command, stdout=subprocess.PIPE)
         try:
             yield process
@@ -352,8 +352,8 @@ def short_path() -> Iterator[Path]:
     "signum", [signal.SIGINT, signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
 )
 def test_a_parent_that_is_struck_leaves_nothing(signum: signal.Signals, short_path: Path) -> None:
-    program = str(ROOT.joinpath("support", "network_parent.py"))
-    with running([sys.executable, program], short_path / "run") as run:
+    program = "tests.support.network_parent"
+    with running([sys.executable, "-m", program], short_path / "run") as run:
         wait_until(lambda: "searching" in run.output() or run.is_over, "it never searched")
         ports = run.ports()
         assert ports, run.errors()
@@ -372,8 +372,8 @@ def test_a_parent_that_is_struck_leaves_nothing(signum: signal.Signals, short_pa
 def test_a_parent_that_is_struck_at_any_time_leaves_no_process(
     signum: signal.Signals, wait_s: float, short_path: Path
 ) -> None:
-    program = str(ROOT.joinpath("support", "network_parent.py"))
-    with running([sys.executable, program], short_path / "run") as run:
+    program = "tests.support.network_parent"
+    with running([sys.executable, "-m", program], short_path / "run") as run:
         time.sleep(wait_s)
         run.strike(signum)
         run.end()

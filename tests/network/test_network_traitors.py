@@ -128,7 +128,7 @@ def test_a_router_that_changes_letters(tmp_path: Path, filters: tuple[str, ...])
 def test_constraints_that_others_have_to_know_are_sealed_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, filters: tuple[str, ...]
 ) -> None:
-    monkeypatch.setattr(Held, "traits", replace(Held.traits, everywhere=True))
+    monkeypatch.setattr(Held, "traits", replace(Held.traits, shared_scopes=True))
     sent: list[bytes] = []
     write = Framing.write
 

@@ -1,4 +1,4 @@
-"""What one robot can do to the verdict: its lie, what is said of it, and whom that names (docs/security.md)."""
+"""What one robot can do to the verdict: its lie, what is said of it, and whom that names (docs/guides/security.md)."""
 
 from __future__ import annotations
 

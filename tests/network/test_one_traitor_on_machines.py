@@ -1,4 +1,4 @@
-"""One traitor among three machines: what users see of it at the master's (docs/security.md, "One traitor")."""
+"""One traitor among three machines: what users see of it at the master's (docs/guides/security.md, "One traitor")."""
 
 from __future__ import annotations
 

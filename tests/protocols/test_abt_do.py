@@ -35,7 +35,7 @@ def clique(values: int = 3) -> Team:
 
 def agent(team: Team, name: str) -> ABTDORetro:
     """The protocol object of one robot, started, with nothing left to say."""
-    abt = ABTDORetro(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
+    abt = ABTDORetro(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
     abt.start()
     abt.outbox.clear()
     return abt
@@ -58,7 +58,7 @@ def orders(said: Sequence[tuple[str, Message]]) -> list[tuple[str, Message]]:
 
 def test_start_takes_the_first_value_and_tells_it_to_lower_neighbours_only() -> None:
     team = clique()
-    abt = ABTDORetro(LocalProblem(agent_problems(team, everywhere=True)["RC"]), PriorityOrder(team.order))
+    abt = ABTDORetro(LocalProblem(agent_problems(team, shared_scopes=True)["RC"]), PriorityOrder(team.order))
     abt.start()
     assert abt.outbox == [("RD", Ok((1,), 3))]
 

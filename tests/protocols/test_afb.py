@@ -39,7 +39,7 @@ def chain() -> Team:
 
 def agent(team: Team, name: str, brief: RunParameters = NO_BRIEF) -> AFB:
     """The protocol object of one robot, started, with nothing left to say."""
-    robot = AFB(LocalProblem(agent_problems(team, brief=brief, everywhere=True)[name]), PriorityOrder(team.order))
+    robot = AFB(LocalProblem(agent_problems(team, brief=brief, shared_scopes=True)[name]), PriorityOrder(team.order))
     robot.start()
     robot.outbox.clear()
     return robot
@@ -73,7 +73,7 @@ def solution(cost: Cost, *values: int) -> NewSolution:
 
 
 def test_the_first_robot_generates_the_cpa_and_asks_all_others_for_estimates() -> None:
-    robot = AFB(LocalProblem(agent_problems(team := chain(), everywhere=True)["RA"]), PriorityOrder(team.order))
+    robot = AFB(LocalProblem(agent_problems(team := chain(), shared_scopes=True)["RA"]), PriorityOrder(team.order))
     robot.start()
     first = cpa((1, 1), least=[0, 0])
     assert robot.outbox == [("RB", first), ("RC", asks((1, 1))), ("RD", asks((1, 1)))]

@@ -40,7 +40,7 @@ def triangle(values: int = 2) -> Team:
 
 def begun(team: Team, name: str) -> AgileABT:
     """The protocol object of one robot, started; what it has said is in its outbox."""
-    agile = AgileABT(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
+    agile = AgileABT(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
     agile.start()
     return agile
 

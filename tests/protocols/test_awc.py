@@ -33,7 +33,7 @@ def triangle(values: int = 2) -> Team:
 
 def agent(team: Team, name: str) -> AWC:
     """The protocol object of one robot, started, with nothing left to say."""
-    awc = AWC(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
+    awc = AWC(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
     awc.start()
     awc.outbox.clear()
     return awc
@@ -45,7 +45,7 @@ def nogood(assignments: Mapping[str, Value]) -> Nogood:
 
 def test_start_takes_the_first_value_and_tells_it_with_priority_0_to_all_neighbours() -> None:
     team = triangle()
-    awc = AWC(LocalProblem(agent_problems(team, everywhere=True)["RB"]), PriorityOrder(team.order))
+    awc = AWC(LocalProblem(agent_problems(team, shared_scopes=True)["RB"]), PriorityOrder(team.order))
     awc.start()
     assert awc.outbox == [("RA", Ok((1,), 0)), ("RC", Ok((1,), 0))]
 

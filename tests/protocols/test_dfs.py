@@ -36,7 +36,7 @@ class Greeter(TreeProtocol):
     """Greets all neighbours when it begins; `made` are all that there are, by name."""
 
     messages = TreeMessage | Hello
-    traits = Traits(costs=True, everywhere=True)
+    traits = Traits(costs=True, shared_scopes=True)
     made: ClassVar[dict[str, Greeter]] = {}
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -220,7 +220,7 @@ TEAM = graph("ABCDE", "AB BC BD CD DE")
 
 
 def robot(name: str, team: Team = TEAM) -> Greeter:
-    return Greeter(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
+    return Greeter(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
 
 
 def started(name: str) -> Greeter:

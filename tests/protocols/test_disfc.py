@@ -51,7 +51,7 @@ def triangle() -> Team:
 
 
 def unstarted(team: Team, name: str) -> DisFC:
-    return DisFC(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
+    return DisFC(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
 
 
 def agent(team: Team, name: str) -> DisFC:

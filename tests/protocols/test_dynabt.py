@@ -51,10 +51,10 @@ def change(dynabt: DynABT, old: Team, new: Team) -> None:
     assert dynabt.outbox == []
 
 
-def after(dynabt: DynABT, team: Team, *changes: Change, quiet: bool = True) -> list[tuple[str, Message]]:
+def after(dynabt: DynABT, team: Team, *changes: Change, lossless: bool = True) -> list[tuple[str, Message]]:
     """What the robot says when it goes on after `changes`."""
     change(dynabt, team, changed(team, changes))
-    dynabt.resume(quiet=quiet)
+    dynabt.resume(lossless=lossless)
     said = list(dynabt.outbox)
     dynabt.outbox.clear()
     return said
@@ -146,7 +146,7 @@ def test_a_no_solution_goes_with_a_constraint_that_it_rests_on() -> None:
     team = triangle(1)
     dynabt = agent(team, "RA")
     told(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
-    said = after(dynabt, team, RemoveConstraint("RB", "RA", "C"), quiet=False)
+    said = after(dynabt, team, RemoveConstraint("RB", "RA", "C"), lossless=False)
     assert (dynabt.verdict, dynabt.proof) == (None, frozenset())
     assert ("RB", Ok((1,))) in said
 
@@ -155,7 +155,7 @@ def test_a_no_solution_stays_when_another_constraint_goes() -> None:
     team = triangle(1)
     dynabt = agent(team, "RA")
     told(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
-    assert after(dynabt, team, RemoveConstraint("RC", "RB", "C"), quiet=False) == []
+    assert after(dynabt, team, RemoveConstraint("RC", "RB", "C"), lossless=False) == []
     assert dynabt.verdict is Verdict.NO_SOLUTION
 
 
@@ -186,7 +186,7 @@ def test_additions_keep_nogoods_and_a_no_solution() -> None:
     unsolvable = triangle(1)
     top = agent(unsolvable, "RA")
     told(top, ("RB", Nogood({}, (1,), [CAB, "RB="])))
-    assert after(top, unsolvable, AddConstraint("RD", "RA", named("A", "D", "N")), quiet=False) == []
+    assert after(top, unsolvable, AddConstraint("RD", "RA", named("A", "D", "N")), lossless=False) == []
     assert top.verdict is Verdict.NO_SOLUTION
 
 
@@ -202,7 +202,7 @@ def test_a_link_is_made_while_there_is_no_solution() -> None:
     team = triangle(1)
     dynabt = agent(team, "RA")
     told(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
-    after(dynabt, team, AddConstraint("RD", "RA", named("A", "D", "N")), quiet=False)
+    after(dynabt, team, AddConstraint("RD", "RA", named("A", "D", "N")), lossless=False)
     assert "RD" in dynabt.lower
 
 
@@ -314,7 +314,7 @@ def test_a_robot_of_an_old_name_is_a_stranger() -> None:
     dynabt.change(
         LocalProblem(agent_problems(new)["RA"]), PriorityOrder(new.order), Invalidated(frozenset(), frozenset({"RD"}))
     )
-    dynabt.resume(quiet=True)
+    dynabt.resume(lossless=True)
     assert dynabt.outbox == [("RD", Ok((2,)))]
 
 
@@ -323,12 +323,12 @@ def test_a_robot_of_an_old_name_is_a_stranger() -> None:
 
 def test_after_a_quiet_epoch_nobody_says_again_what_is_known() -> None:
     team, dynabt = with_two_nogoods()
-    assert after(dynabt, team, AddValue("A", 9), quiet=True) == []
+    assert after(dynabt, team, AddValue("A", 9), lossless=True) == []
 
 
 def test_after_an_epoch_that_was_broken_off_values_are_told_once_more() -> None:
     team, dynabt = with_two_nogoods()
-    assert after(dynabt, team, AddValue("A", 9), quiet=False) == [("RD", Ok((3,)))]
+    assert after(dynabt, team, AddValue("A", 9), lossless=False) == [("RD", Ok((3,)))]
 
 
 def test_after_an_epoch_that_was_broken_off_links_are_asked_for_again() -> None:
@@ -336,8 +336,8 @@ def test_after_an_epoch_that_was_broken_off_links_are_asked_for_again() -> None:
     dynabt = agent(team, "RB")
     told(dynabt, ("RC", Nogood({"RA": (1,)}, (1,), [CAC])))
     assert dynabt.higher == {"RA"}
-    assert after(dynabt, team, AddValue("C", 9), quiet=True) == []
-    assert after(dynabt, team, AddValue("C", 9), quiet=False) == [("RA", AddLink()), ("RC", Ok((2,)))]
+    assert after(dynabt, team, AddValue("C", 9), lossless=True) == []
+    assert after(dynabt, team, AddValue("C", 9), lossless=False) == [("RA", AddLink()), ("RC", Ok((2,)))]
 
 
 def test_who_changes_twice_before_it_goes_on_tells_all_that_is_new() -> None:
@@ -361,5 +361,5 @@ def test_links_that_were_added_stay() -> None:
 def test_who_takes_another_value_tells_it_once() -> None:
     team = triangle()
     dynabt = agent(team, "RA")
-    said = after(dynabt, team, AddConstraint("RD", "RA", named("A", "D", "N")), RemoveValue("A", 1), quiet=False)
+    said = after(dynabt, team, AddConstraint("RD", "RA", named("A", "D", "N")), RemoveValue("A", 1), lossless=False)
     assert said == [("RB", Ok((2,))), ("RC", Ok((2,))), ("RD", Ok((2,)))]

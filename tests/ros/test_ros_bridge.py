@@ -236,14 +236,14 @@ def test_a_server_that_dies_wakes_who_waits(server: Server) -> None:
 PROGRAM = """
 import sys
 from robochoc.ros.live.rosbridge import RosbridgeSink, RosbridgeSource
-from robochoc.ros.sink import SinkFailed
+from robochoc.ros.sink import SinkError
 source = RosbridgeSource(sys.argv[1])
 source.listen({"/a": "std_msgs/String"})
 sink = RosbridgeSink(sys.argv[1])
 try:
     for number in range(100_000):
         sink.publish("/a", "std_msgs/String", {"data": "x" * 1000}, 0)
-except SinkFailed as failed:
+except SinkError as failed:
     print(failed)
 """
 

@@ -23,7 +23,7 @@ P = TypeVar("P", bound=CycleProtocol)
 
 def robot_of(protocol: type[P], team: Team, name: str, *chances: float) -> P:
     """The protocol object of one robot, not yet started, which draws `chances`, and then 0 for ever."""
-    part = agent_problems(team, everywhere=protocol.traits.everywhere)[name]
+    part = agent_problems(team, shared_scopes=protocol.traits.shared_scopes)[name]
     robot = protocol(LocalProblem(part), PriorityOrder(team.order))
     robot.chance = itertools.chain(chances, itertools.repeat(0.0)).__next__
     return robot

@@ -49,7 +49,7 @@ class Held(ABT):
     """The first two robots only say `Ping` to each other until there is that file; robots write to neighbours only."""
 
     messages = Ok | Nogood | AddLink | Ping
-    traits = replace(ABT.traits, beyond=False)
+    traits = replace(ABT.traits, writes_to_non_neighbours=False)
     settings = Until()
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

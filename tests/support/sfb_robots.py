@@ -25,7 +25,7 @@ def team(costs: Costs) -> Team:
 def agents(problem: Team, settings: SFBSettings | None = None) -> dict[str, SFB]:
     """The protocol objects of all robots, not started."""
     order = PriorityOrder(problem.order)
-    found = {name: SFB(LocalProblem(part), order) for name, part in agent_problems(problem, everywhere=True).items()}
+    found = {name: SFB(LocalProblem(part), order) for name, part in agent_problems(problem, shared_scopes=True).items()}
     for robot in found.values():
         robot.settings = settings or robot.settings
     return found

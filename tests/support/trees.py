@@ -37,7 +37,7 @@ def priced(names: str, costs: Costs, values: Mapping[str, int] = {}) -> Team:
 
 def unplaced(protocol: type[P], team: Team, name: str) -> P:
     """The protocol object of one robot, before it has started."""
-    return protocol(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
+    return protocol(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
 
 
 def placed(

@@ -56,7 +56,7 @@ class Breakout(Protocol):
 
     messages = Ok | Improve
     traits = Traits(
-        paper="Yokoo & Hirayama 1996, 2005", complete=False, everywhere=True, privacy="constraints among others"
+        paper="Yokoo & Hirayama 1996, 2005", complete=False, shared_scopes=True, privacy="constraints among others"
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -11,7 +11,7 @@ from robochoc.cli.reports.failures import USAGE, Failure
 
 @click.command()
 @click.argument("name", required=False)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object a protocol.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per protocol.")
 def protocols(name: str | None, *, as_json: bool) -> None:
     """List the protocols that are installed, of this package and of others, or explain the protocol NAME.
 

@@ -64,14 +64,14 @@ _SECTIONS: Sections = {
     "Messages on their way": ("--schedule", "--delay", "--channel", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
     "Output": ("--explain", "--serve", "--open"),
-    "ROS (docs/ros.md)": ("--ros", "--frame", "--scale", "--situation", "--battery"),
+    "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale", "--situation", "--battery"),
     "Simulated flight (--situation flight)": ("--fail", "--distance", "--wind", "--gusts", "--obstacle"),
 }  # fmt: skip
 
 
 @click.command(cls=SolveCommand, sections=_SECTIONS)
 @click.argument("paths", nargs=-1, required=True, type=TeamFolder(), metavar="PATH ...")
-@protocol_option
+@protocol_option(central=True)
 @settings_option
 @click.option(
     "--order",

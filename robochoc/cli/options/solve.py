@@ -34,15 +34,13 @@ class WithdrawalName(click.Choice[str]):
         return super().convert(_FORMER.get(value, value), param, ctx)
 
 
-protocol_option = click.option(
-    "--protocol",
-    type=ProtocolName(),
-    metavar="NAME",
-    help=(
-        "The protocol, as 'robochoc protocols' lists them; central: no robots, one model of all files."
-        f"  [default: {SATISFIES}; with costs {MINIMISES}]"
-    ),
-)
+def protocol_option(*, central: bool) -> Any:  # noqa: ANN401 - a decorator, as `click.option` returns it
+    """Return the option `--protocol NAME`; `central` says that there may also be no protocol, but one model."""
+    alone = "; central: no robots, one model of all files" if central else ""
+    words = f"The protocol, as 'robochoc protocols' lists them{alone}.  [default: {SATISFIES}; with costs {MINIMISES}]"
+    return click.option("--protocol", type=ProtocolName(), metavar="NAME", help=words)
+
+
 settings_option = click.option(
     "--set",
     "settings_given",

@@ -86,7 +86,7 @@ class LocalNetwork(Session):
         self._waiting = list(self.compiled.robots.values())
         watched = observer is not None
         profiles = {robot.name: profile_of(robot) for robot in team.robots}
-        ways = reach(profiles, beyond=protocol.traits.beyond)
+        ways = reach(profiles, writes_to_non_neighbours=protocol.traits.writes_to_non_neighbours)
         self._master = self._opened(
             lambda endpoint: Master(
                 self._household,
@@ -124,8 +124,8 @@ class LocalNetwork(Session):
         return self._master
 
     @property
-    def quiet(self) -> bool:
-        """See `Session.quiet`: every search begins anew, so that there is none before."""
+    def lossless(self) -> bool:
+        """See `Session.lossless`: every search begins anew, so that there is none before."""
         return True
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:

@@ -2,7 +2,7 @@
 
 The master has seen no file. It knows what robots have declared (profiles), what each protocol's robots may conclude
 (traits), and that whatever one robot says it has sent another, that one has had, or will not have had. So a lie is held
-against the liar's earlier words, or against a neighbour's. `docs/security.md` says what that leaves.
+against the liar's earlier words, or against a neighbour's. `docs/guides/security.md` says what that leaves.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What a sender may have of a receiver: letters and bytes that wait, and letters, bytes and events a second. Pure.
 
-The limits are far beyond what honest robots need: docs/security.md has the measurement.
+The limits are far beyond what honest robots need: docs/guides/security.md has the measurement.
 """
 
 from __future__ import annotations

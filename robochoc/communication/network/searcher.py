@@ -114,12 +114,12 @@ class Searcher:
     def prepare(self) -> None:
         """Tell others which constraints they have to know; get ready once all children have told.
 
-        Only protocols whose order changes have more than the lowest robot know a constraint (`Traits.everywhere`).
+        Only protocols whose order changes have more than the lowest robot know a constraint (`Traits.shared_scopes`).
         Raises `UnsupportedError`.
         """
         owners = {name: agent for agent, names in self._task.interfaces.items() for name in names}
         self._refuse_unfit(owners)
-        if self._protocol.traits.everywhere:
+        if self._protocol.traits.shared_scopes:
             known = [one for one in held(self._robot) if one.constraint.model is not Model.PKC]
             for parent in self._robot.parents:
                 theirs = [one for one in known if parent.name in {owners.get(v) for v in one.constraint.variables}]
@@ -152,8 +152,8 @@ class Searcher:
         self._get_ready()
 
     def _get_ready(self) -> None:
-        everywhere = self._protocol.traits.everywhere
-        if self._host or (everywhere and any(child.name not in self._copies for child in self._robot.children)):
+        shared_scopes = self._protocol.traits.shared_scopes
+        if self._host or (shared_scopes and any(child.name not in self._copies for child in self._robot.children)):
             return
         self._host = Host.of(self._protocol, self._part())
         if self._around.observed:

@@ -122,7 +122,7 @@ def _take_place(name: str, order: Sequence[str]) -> None:
     """Let the scheduler favour robots that come earlier in the priority order: `nice` from 0 to `LOWEST_NICE`.
 
     What a robot decides on the basis of an old view is work for nothing, for all below it. On two cores 121 robots
-    need a tenth of the messages this way (docs/design.md, "Processes").
+    need a tenth of the messages this way (docs/explanation/design.md, "Processes").
     """
     os.nice(LOWEST_NICE * order.index(name) // len(order))
 
@@ -325,7 +325,7 @@ class _RobotLoop:
         self._began = order.began
         self._searching = True
         self._told = (-1, -1)
-        self._send(self._host.start(quiet=order.quiet))
+        self._send(self._host.start(lossless=order.lossless))
         early, self._early = self._early, []
         self._take_in(early)
 

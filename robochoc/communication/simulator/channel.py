@@ -2,7 +2,7 @@
 
 A message is cut into frames; each takes time on the air by its bytes, may be lost and is then sent again, and what is
 left is latency: queues, access to the medium, relays. Loss only delays: every message arrives, and none overtakes
-another of the same channel, as protocols require. Where the figures come from: docs/channels.md.
+another of the same channel, as protocols require. Where the figures come from: docs/guides/channels.md.
 """
 
 from __future__ import annotations
@@ -193,5 +193,5 @@ def _text(path: Path) -> str:
         raise _invalid(path, "is not UTF-8", "a channel's file is TOML, in UTF-8") from None
 
 
-def _invalid(path: Path, message: str, hint: str = "docs/channels.md shows all fields") -> InvalidInputError:
+def _invalid(path: Path, message: str, hint: str = "docs/guides/channels.md shows all fields") -> InvalidInputError:
     return InvalidInputError([Diagnostic(os.fspath(path), 0, message, hint)])

@@ -128,7 +128,7 @@ class Types:
             text = definition_of(kind)
             if not text:
                 told = f"ROS {self.version} has no type {kind!r} that is known here"
-                raise UnknownTypeError(f"{told}; its mapping can bring the definition (docs/ros.md)")
+                raise UnknownTypeError(f"{told}; its mapping can bring the definition (docs/guides/ros.md)")
             try:
                 new = get_types_from_msg(text, name)
                 self._store.register({each: what for each, what in new.items() if each not in self._store.fielddefs})

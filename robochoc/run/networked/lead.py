@@ -288,7 +288,7 @@ class _Lead:
 
 
 def claimed(outcome: Outcome) -> Outcome:
-    """Return `outcome` with whom it rests on, as nobody could check it (docs/security.md, "One traitor").
+    """Return `outcome` with whom it rests on, as nobody could check it (docs/guides/security.md, "One traitor").
 
     That there is no solution is the word of who says so; that none costs less, or what was not told, is everybody's.
     """

@@ -309,7 +309,7 @@ def test_a_filter_that_fails_has_not_opened(three: dict[str, KeyRing]) -> None:
 
 
 def test_the_filter_in_the_docs_works(three: dict[str, KeyRing], tmp_path: Path) -> None:
-    text = (ROOT / "docs" / "security.md").read_text()
+    text = (ROOT / "docs" / "guides" / "security.md").read_text()
     (tmp_path / "packed.py").write_text(text.partition("```python\n")[2].partition("```")[0])
     packed = runpy.run_path(str(tmp_path / "packed.py"))["Packed"]
     sealing, opening = (FilterStack(three[name], [packed, Sealed]) for name in "AB")
@@ -332,11 +332,11 @@ def test_what_others_offer_may_be_broken(monkeypatch: pytest.MonkeyPatch) -> Non
     offered(
         monkeypatch,
         filters.GROUP,
-        backwards="test_filters:Backwards",
-        half="test_filters:Half",
+        backwards="tests.unit.authority.test_filters:Backwards",
+        half="tests.unit.authority.test_filters:Half",
         gone="nowhere.to:Find",
-        function="offered:offered",
-        twice=["test_filters:Backwards", "test_filters:Half"],
+        function="tests.support.offered:offered",
+        twice=["tests.unit.authority.test_filters:Backwards", "tests.unit.authority.test_filters:Half"],
     )
     assert filter_named("backwards").__name__ == "Backwards"
     for name, why in {

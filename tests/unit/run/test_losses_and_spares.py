@@ -41,7 +41,7 @@ class Losing(Session):
         self.epochs: list[Epoch] = []
 
     @property
-    def quiet(self) -> bool:
+    def lossless(self) -> bool:
         return True
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
@@ -83,7 +83,7 @@ def test_who_is_lost_leaves(team: Team) -> None:
     journey, session, teams = travel(team, ["RB"])
     assert teams == [team, without(team, ["RB"])]
     assert journey.withdrawn == ["RB"]
-    assert session.epochs[0].fresh == frozenset()
+    assert session.epochs[0].restarted == frozenset()
 
 
 def test_who_comes_back_has_the_same_problem_and_the_lowest_priority(team: Team) -> None:
@@ -92,7 +92,7 @@ def test_who_comes_back_has_the_same_problem_and_the_lowest_priority(team: Team)
     assert journey.withdrawn == []
     (epoch,) = session.epochs
     assert epoch.team.order == ("RA", "RC", "RD", "RB")
-    assert epoch.fresh == frozenset({"RB"})
+    assert epoch.restarted == frozenset({"RB"})
     assert "RB" in epoch.void.agents
 
 

@@ -53,7 +53,7 @@ class Scripted(Session):
         self.limits: list[int | None] = []
 
     @property
-    def quiet(self) -> bool:
+    def lossless(self) -> bool:
         return True
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
@@ -143,7 +143,7 @@ def test_a_spare_comes_back_at_the_end_of_the_order(tmp_path: Path) -> None:
     session = Scripted(journey.team, losing("RA"), losing("RC"))
     travel(journey, session)
     assert [epoch.team.order for epoch in session.epochs] == [("RB", "RC", "RA"), ("RB", "RA")]
-    assert [epoch.fresh for epoch in session.epochs] == [{"RA"}, set()]
+    assert [epoch.restarted for epoch in session.epochs] == [{"RA"}, set()]
     assert journey.withdrawn == ["RC"]
 
 

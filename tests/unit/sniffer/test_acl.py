@@ -30,7 +30,7 @@ from tests.support.talks import (
     types_of,
 )
 
-DOCS = (ROOT / "docs" / "acl.md").read_text()
+DOCS = (ROOT / "docs" / "guides" / "acl.md").read_text()
 
 
 # The table

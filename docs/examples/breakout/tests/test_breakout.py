@@ -23,7 +23,7 @@ from robochoc.verification.checker import objections
 def agents(team: Team) -> dict[str, Breakout]:
     """The protocol objects of all robots, by name, not yet started."""
     order = PriorityOrder(team.order)
-    known = agent_problems(team, everywhere=Breakout.traits.everywhere)
+    known = agent_problems(team, shared_scopes=Breakout.traits.shared_scopes)
     return {name: Breakout(LocalProblem(part), order) for name, part in known.items()}
 
 
