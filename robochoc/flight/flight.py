@@ -21,13 +21,12 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from robochoc.flight.log import SAMPLES_A_SECOND, Flown, Happening, Nearest, Stage
 from robochoc.flight.mission import Goal, Mission
 from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.bounds import check_homes, check_length, check_near, check_ways, origin_of
 from robochoc.flight.quadrotor.conditions import LEAST_M, Conditions, Failure
 from robochoc.flight.quadrotor.course import STOP_S, Course
-from robochoc.flight.quadrotor.flown import SAMPLES_A_SECOND, Flown, Happening, Stage
-from robochoc.flight.quadrotor.nearest import Nearest
 from robochoc.flight.quadrotor.obstacles import Threat, threats
 from robochoc.flight.quadrotor.simulation import DT, Simulation
 from robochoc.flight.quadrotor.spots import gaps, nearest_two

@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from robochoc.flight.log import Flown
 from robochoc.flight.mission import Drone, Leg, Mission
-from robochoc.flight.quadrotor.flown import Flown
 from robochoc.flight.reports import OutOfOrder, Report
 from robochoc.ros.publisher import Publisher
 from robochoc.ros.sink import Sink

@@ -6,24 +6,20 @@ Lengths are in cells, as in `scene`; times in seconds from the beginning.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.flight.layout import Axis, Point
+from robochoc.flight.cells import in_cells
+from robochoc.flight.layout import Point
+from robochoc.flight.log import Flown, Happening
 from robochoc.flight.mission import Leg, Mission
-from robochoc.flight.quadrotor.flown import Flown, Happening
 from robochoc.model.outcome import Verdict
 
 _HIT = "hits the ground"
 """What the flight says in the end of one that falls."""
-
-_CELLS_M = (0.25, 4.0)
-"""How long a cell's sides may be: a drone is larger, or has minutes to fly."""
-_FAR_M = 1e6
-"""Who belongs further away than that is shown, and flown, near the origin."""
 
 _Array = npt.NDArray[np.float64]
 
@@ -94,50 +90,6 @@ def film_of(mission: Mission, flown: Flown) -> Film:
             for seen_s, (x, y, z) in zip(flown.seen_s or [0.0] * len(obstacles), obstacles, strict=True)
         ),
     )
-
-
-def roomy(mission: Mission) -> Mission:
-    """`mission`; where its cells are smaller than drones, or vast, the same in a box whose cells are metres.
-
-    Problems with vast numbers are no fields to scale: they are flown as they are drawn.
-    """
-    cells_m = [_cell_m(axis) * mission.scale for axis in mission.axes]
-    ends_m = [abs(end) * mission.scale for axis in mission.axes for end in (axis.first, axis.last)]
-    if _CELLS_M[0] <= min(cells_m) <= max(cells_m) <= _CELLS_M[1] and max(ends_m) <= _FAR_M:
-        return mission
-
-    def moved(point: Point) -> Point:
-        x, y, z = in_cells(mission, np.array(point)).tolist()
-        return x, y, z
-
-    rows, columns, levels = (replace(axis, first=axis.low, last=axis.high) for axis in mission.axes)
-    return replace(
-        mission,
-        drones=tuple(replace(drone, home=moved(drone.home)) for drone in mission.drones),
-        legs=tuple(
-            replace(leg, goals={number: replace(goal, at=moved(goal.at)) for number, goal in leg.goals.items()})
-            for leg in mission.legs
-        ),
-        axes=(rows, columns, levels),
-        scale=1.0,
-    )
-
-
-def _cell_m(axis: Axis) -> float:
-    """How many units a cell of `axis` is."""
-    return (axis.last - axis.first) / (axis.high - axis.low) if axis.high > axis.low else 1.0
-
-
-def in_cells(mission: Mission, metres: _Array) -> _Array:
-    """Points (..., 3) in metres, in the cells of the mission's box."""
-    parts = [_cells(axis, metres[..., number] / mission.scale) for number, axis in enumerate(mission.axes)]
-    return np.stack(parts, axis=-1)
-
-
-def _cells(axis: Axis, values: _Array) -> _Array:
-    """`Axis.at`, of many values."""
-    span = axis.last - axis.first
-    return axis.low + (values - axis.first) * ((axis.high - axis.low) / span if span else 1.0)
 
 
 def fell(flown: Flown) -> dict[int, Happening]:

@@ -16,8 +16,8 @@ import numpy.typing as npt
 import pytest
 from PIL import Image
 
+from robochoc.flight.log import Flown
 from robochoc.flight.mission import mission_of
-from robochoc.flight.quadrotor.flown import Flown
 from robochoc.view.page import page
 from robochoc.view.scene import Scene, scene_of
 from tests.support.flights import LEG_S, epochs_of_three, five, straight
@@ -36,7 +36,7 @@ def scene(**how: Any) -> Scene:  # noqa: ANN401 - `straight`'s
     outcome = epochs_of_three(HOSTILE)
     mission = mission_of(outcome, five())
     flown: Flown = straight(mission, **how)
-    return scene_of(outcome, mission=mission, flown=flown)
+    return scene_of(outcome, mission, flown)
 
 
 @pytest.fixture(scope="module")
@@ -357,7 +357,7 @@ from robochoc.flight.mission import mission_of
 from robochoc.view.live import serve
 from robochoc.view.scene import scene_of
 outcome, mission = epochs_of_three(), mission_of(epochs_of_three(), five())
-serve(scene_of(outcome, mission=mission, flown=straight(mission)), ready=lambda url: print(url, flush=True))
+serve(scene_of(outcome, mission, straight(mission)), ready=lambda url: print(url, flush=True))
 """
 
 

@@ -14,7 +14,7 @@ from robochoc.journal.journal import read_journal
 from robochoc.model.orders import Order
 from tests.support.entries import entries_of
 from tests.support.program import robochoc
-from tests.unit.model.test_orders import graph_team, pkc_team
+from tests.support.small_teams import graph_team, pkc_team
 
 
 def test_the_command_line_knows_every_order() -> None:

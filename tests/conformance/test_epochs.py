@@ -14,38 +14,25 @@ from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
-    Constraint,
     Domain,
     Event,
     Parent,
-    Relation,
     RemoveAgent,
     RemoveConstraint,
     RemoveValue,
     Robot,
-    Semantics,
     Team,
     Variable,
 )
 from robochoc.run.orchestrator import Options, Runtime, solve
 from robochoc.run.registry import protocol_named, protocol_names
-from tests.conformance.test_conformance import random_schedule
 from tests.support.changes import random_journey, stages
 from tests.support.loose_problems import loosened
 from tests.support.problems import ON_ONE_MACHINE, random_team, solutions, team_of
+from tests.support.random_options import random_schedule
+from tests.support.small_teams import differ, pair
 
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
 SIMULATED = Options(runtime=Runtime.SIMULATOR, protocol="dynabt")
-
-
-def differ(left: str, right: str, name: str = "C") -> Constraint:
-    return Constraint(name, DIFFERENT, (left, right), (left, right))
-
-
-def pair(*events: Event, values: int = 1) -> Team:
-    """Two robots that want to differ."""
-    team = team_of(dict.fromkeys("AB", range(1, values + 1)), [differ("A", "B")])
-    return replace(team, scenario=events)
 
 
 def agrees(team: Team, options: Options) -> int:

@@ -12,8 +12,8 @@ from robochoc.model.orders import Order
 from robochoc.model.outcome import Verdict
 from robochoc.run.orchestrator import Options, Runtime
 from robochoc.run.registry import protocol_named, protocol_names
-from tests.conformance.test_conformance import random_schedule
 from tests.support.loose_problems import agrees, every_order, loose_team, turned_interface
+from tests.support.random_options import random_schedule
 
 EVERY_PROTOCOL = pytest.mark.parametrize("protocol", protocol_names())
 FIRST, MANY = 3, 2000

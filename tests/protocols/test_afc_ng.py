@@ -20,14 +20,7 @@ from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import told, value
 from tests.support.complex_problems import complex_team
 from tests.support.problems import random_team, team_of
-
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
-
-
-def different(names: str, pairs: str, values: int) -> Team:
-    """A robot for each letter; each of `pairs` takes different ones of `values` values."""
-    constraints = [Constraint("C", DIFFERENT, (pair[0], pair[1]), (pair[0], pair[1])) for pair in pairs.split()]
-    return team_of({name: range(1, values + 1) for name in names}, constraints)
+from tests.support.small_teams import DIFFERENT, different
 
 
 def triangle(values: int = 2) -> Team:

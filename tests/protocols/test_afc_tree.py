@@ -12,7 +12,7 @@ from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.model.problem import Team
 from robochoc.protocols.afc_ng import CPA, AFCng, Nogood, Solved
 from robochoc.protocols.afc_tree import Accept, AFCTree
 from robochoc.protocols.order import PriorityOrder
@@ -20,15 +20,8 @@ from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.verification.checker import objections
 from tests.support.agents import told, value
-from tests.support.problems import random_team, team_of
-
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
-
-
-def different(names: str, pairs: str, values: int) -> Team:
-    """A robot for each letter; each of `pairs` takes different ones of `values` values."""
-    constraints = [Constraint("C", DIFFERENT, (pair[0], pair[1]), (pair[0], pair[1])) for pair in pairs.split()]
-    return team_of({name: range(1, values + 1) for name in names}, constraints)
+from tests.support.problems import random_team
+from tests.support.small_teams import different
 
 
 def fork(values: int = 3) -> Team:

@@ -23,19 +23,7 @@ from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import told, value
 from tests.support.problems import random_team, team_of
-
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
-
-
-def differ(left: str, right: str) -> Constraint:
-    return Constraint("C", DIFFERENT, (left, right), (left, right))
-
-
-def triangle(values: int = 2) -> Team:
-    """Three robots, each different from each; a fourth that only the third knows."""
-    domains = {name: range(1, values + 1) for name in ("A", "B", "C", "D")}
-    pairs = (("A", "B"), ("A", "C"), ("B", "C"), ("C", "D"))
-    return team_of(domains, [differ(*pair) for pair in pairs])
+from tests.support.small_teams import differ, triangle
 
 
 def begun(team: Team, name: str) -> AgileABT:

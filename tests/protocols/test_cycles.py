@@ -29,9 +29,9 @@ from tests.support.agents import told
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.courses import any_schedule, course_of, domains_of, played, robot_of, started
 from tests.support.problems import team_of
+from tests.support.small_teams import DIFFERENT
 
 ALL = pytest.mark.parametrize("protocol", [DSA, MGM, MGM2, MaxSum])
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
 
 
 def chain(*, names: str = "ABC", values: int = 3) -> Team:

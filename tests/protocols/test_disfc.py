@@ -26,11 +26,17 @@ from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.filters import allows
-from tests.protocols.test_pkc import SECRETS, agrees, pair_team, part
 from tests.support.agents import told
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.pkc_bytes import changed_where_nobody_was, nothing_hidden, renamed, restated, run
-from tests.support.pkc_problems import random_pkc_team, with_private_parts
+from tests.support.pkc_problems import (
+    SECRETS,
+    check_against_brute_force,
+    pkc_pair,
+    pkc_part,
+    random_pkc_team,
+    with_private_parts,
+)
 from tests.support.problems import random_team, team_of
 
 EVERYTHING = b"\x07"
@@ -38,7 +44,7 @@ EVERYTHING = b"\x07"
 
 
 def tkc(pair: str, *forbidden: tuple[int, int]) -> Constraint:
-    return replace(part(pair, *forbidden), model=Model.TKC)
+    return replace(pkc_part(pair, *forbidden), model=Model.TKC)
 
 
 def differ(pair: str) -> Constraint:
@@ -156,7 +162,7 @@ def test_who_asked_for_a_link_gets_a_filter_that_allows_everything_now_and_later
 
 
 def test_parts_go_down_and_up() -> None:
-    team = pair_team(part("AB", (1, 2)), part("AB", (1, 1)))
+    team = pkc_pair(pkc_part("AB", (1, 2)), pkc_part("AB", (1, 1)))
     higher, lower = unstarted(team, "RA"), unstarted(team, "RB")
     higher.start()
     lower.start()
@@ -165,21 +171,21 @@ def test_parts_go_down_and_up() -> None:
 
 
 def test_a_higher_robot_outside_a_filter_from_below_says_so() -> None:
-    robot = agent(pair_team(part("AB"), part("AB")), "RA")
+    robot = agent(pkc_pair(pkc_part("AB"), pkc_part("AB")), "RA")
     assert told(robot, ("RB", Ok(1, b"\x03"))) == []
     assert told(robot, ("RB", Ok(2, b"\x02"))) == [("RB", Nogood({"RA": 1}, 2))]
     assert told(robot) == []
 
 
 def test_a_new_assignment_is_held_against_the_filters_from_below() -> None:
-    robot = agent(pair_team(part("AB"), part("AB")), "RA")
+    robot = agent(pkc_pair(pkc_part("AB"), pkc_part("AB")), "RA")
     told(robot, ("RB", Ok(4, b"\x01")))
     assert told(robot, ("RB", Nogood({}, 1))) == [("RB", Ok(2, b"\x03")), ("RB", Nogood({"RA": 2}, 4))]
 
 
 def test_filters_are_over_the_declared_domain_of_all_that_the_receiver_shows() -> None:
     domains = dict.fromkeys(("A", "b", "B"), (1, 2))
-    constraints = [replace(part("Ab", (1, 1)), model=Model.TKC), replace(part("AB", (1, 2)), model=Model.TKC)]
+    constraints = [replace(pkc_part("Ab", (1, 1)), model=Model.TKC), replace(pkc_part("AB", (1, 2)), model=Model.TKC)]
     team = complex_team({"RA": ["A"], "RB": ["b", "B"]}, domains, constraints)
     (_, ok), *_ = [*unsaid(team, "RA")]
     assert isinstance(ok, Ok)
@@ -196,7 +202,7 @@ def unsaid(team: Team, name: str) -> list[tuple[str, Message]]:
 
 def test_a_domain_too_large_for_a_filter_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(filters, "LARGEST", 2)
-    Simulation(pair_team(part("AB"), None), DisFC, Concurrent(0))
+    Simulation(pkc_pair(pkc_part("AB"), None), DisFC, Concurrent(0))
     with pytest.raises(UnsupportedError, match="RA shows its neighbours 3 combinations of values"):
         Simulation(triangle(), DisFC, Concurrent(0))
 
@@ -214,7 +220,7 @@ def test_the_docstring_shows_what_happens() -> None:
 
 def test_disfc_agrees_with_brute_force() -> None:
     chance = Random("pkc disfc")
-    seen = Counter(agrees(random_pkc_team(chance), DisFC, chance) for _ in range(500))
+    seen = Counter(check_against_brute_force(random_pkc_team(chance), DisFC, chance) for _ in range(500))
     assert min(seen.values()) > 125, seen
 
 
@@ -222,8 +228,8 @@ def test_disfc_agrees_where_all_is_known_and_where_all_is_split() -> None:
     chance = Random("disfc split")
     for _ in range(40):
         team = random_team(chance, n_ary=False)
-        agrees(team, DisFC, chance)
-        agrees(with_private_parts(team, chance), DisFC, chance)
+        check_against_brute_force(team, DisFC, chance)
+        check_against_brute_force(with_private_parts(team, chance), DisFC, chance)
 
 
 def test_disfc_agrees_on_complex_robots() -> None:
@@ -234,7 +240,7 @@ def test_disfc_agrees_on_complex_robots() -> None:
         if all(len({team.owner[name] for name in c.variables}) < 3 for robot in team.robots for c in robot.shared):
             split = seen.total() % 2 == 1
             team = with_private_parts(team, chance) if split else team
-            agrees(team, DisFC, chance)
+            check_against_brute_force(team, DisFC, chance)
             seen[split] += 1
 
 

@@ -6,13 +6,11 @@ from dataclasses import replace
 
 from robochoc.formats import PREDEFINED
 from robochoc.model.change import changed
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
-    Change,
     Constraint,
     Domain,
     Parent,
@@ -30,39 +28,11 @@ from robochoc.protocols.dynabt import DynABT, Nogood
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.explanation import Invalidated, invalidated_by
-from tests.protocols.test_abt import DIFFERENT, differ, triangle
+from robochoc.solver.explanation import Invalidated
 from tests.support.agents import told, value
+from tests.support.dynabt_robots import after, agent, change
 from tests.support.problems import team_of
-
-
-def agent(team: Team, name: str) -> DynABT:
-    """The protocol object of one robot, started, with nothing left to say."""
-    dynabt = DynABT(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
-    dynabt.start()
-    dynabt.outbox.clear()
-    return dynabt
-
-
-def change(dynabt: DynABT, old: Team, new: Team) -> None:
-    """Tell the robot what the runtime tells it between two epochs; nothing may be said meanwhile."""
-    name = dynabt.problem.agent
-    dynabt.change(LocalProblem(agent_problems(new)[name]), PriorityOrder(new.order), invalidated_by(old, new))
-    assert dynabt.outbox == []
-
-
-def after(dynabt: DynABT, team: Team, *changes: Change, lossless: bool = True) -> list[tuple[str, Message]]:
-    """What the robot says when it goes on after `changes`."""
-    change(dynabt, team, changed(team, changes))
-    dynabt.resume(lossless=lossless)
-    said = list(dynabt.outbox)
-    dynabt.outbox.clear()
-    return said
-
-
-def named(left: str, right: str, name: str) -> Constraint:
-    return Constraint(name, DIFFERENT, (left, right), (left, right))
-
+from tests.support.small_teams import DIFFERENT, differ, triangle
 
 CAB, CBC, CAC = "RB<RA:C", "RC<RB:C", "RC<RA:C"  # keys of the triangle's constraints
 
@@ -79,7 +49,7 @@ def test_a_direct_conflict_is_explained_by_its_constraint() -> None:
 
 def test_of_two_constraints_the_one_that_is_broken_explains() -> None:
     one_only = Constraint("one", DIFFERENT, ("A", 1), ("A", 1), model=None)
-    team = team_of(dict.fromkeys("AB", (1, 2)), [named("A", "B", "C1"), named("A", "B", "C2"), one_only])
+    team = team_of(dict.fromkeys("AB", (1, 2)), [differ("A", "B", "C1"), differ("A", "B", "C2"), one_only])
     dynabt = agent(team, "RB")
     told(dynabt, ("RA", Ok((1,))))
     assert dynabt.store.because(0) == {"RB<RA:C1"}
@@ -181,19 +151,19 @@ def test_a_constraint_that_comes_in_the_place_of_its_namesake_is_another() -> No
 
 def test_additions_keep_nogoods_and_a_no_solution() -> None:
     team, dynabt = with_two_nogoods()
-    change(dynabt, team, changed(team, [AddConstraint("RD", "RA", named("A", "D", "N"))]))
+    change(dynabt, team, changed(team, [AddConstraint("RD", "RA", differ("A", "D", "N"))]))
     assert list(dynabt.store) == [{"RA": (1,)}, {"RB": (2,)}]
     unsolvable = triangle(1)
     top = agent(unsolvable, "RA")
     told(top, ("RB", Nogood({}, (1,), [CAB, "RB="])))
-    assert after(top, unsolvable, AddConstraint("RD", "RA", named("A", "D", "N")), lossless=False) == []
+    assert after(top, unsolvable, AddConstraint("RD", "RA", differ("A", "D", "N")), lossless=False) == []
     assert top.verdict is Verdict.NO_SOLUTION
 
 
 def test_add_constraint_links_the_new_child_and_tells_the_value_there_only() -> None:
     team = triangle()
     dynabt = agent(team, "RA")
-    assert after(dynabt, team, AddConstraint("RD", "RA", named("A", "D", "N"))) == [("RD", Ok((1,)))]
+    assert after(dynabt, team, AddConstraint("RD", "RA", differ("A", "D", "N"))) == [("RD", Ok((1,)))]
     assert dynabt.lower == ["RB", "RC", "RD"]
     assert told(dynabt, ("RB", Nogood({}, (1,), [])))[-1] == ("RD", Ok((2,)))
 
@@ -202,7 +172,7 @@ def test_a_link_is_made_while_there_is_no_solution() -> None:
     team = triangle(1)
     dynabt = agent(team, "RA")
     told(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
-    after(dynabt, team, AddConstraint("RD", "RA", named("A", "D", "N")), lossless=False)
+    after(dynabt, team, AddConstraint("RD", "RA", differ("A", "D", "N")), lossless=False)
     assert "RD" in dynabt.lower
 
 
@@ -299,7 +269,7 @@ def test_nogoods_that_rest_on_a_robot_that_left_are_void() -> None:
 def test_a_robot_that_comes_is_told_the_value_of_its_parents() -> None:
     team = triangle()
     newcomer = Robot(
-        "RE", (Variable("E", Domain("D", (range(1, 3),))),), parents=(Parent("RA", (named("A", "E", "N"),)),)
+        "RE", (Variable("E", Domain("D", (range(1, 3),))),), parents=(Parent("RA", (differ("A", "E", "N"),)),)
     )
     assert after(agent(team, "RA"), team, AddAgent(newcomer)) == [("RE", Ok((1,)))]
     assert after(agent(team, "RB"), team, AddAgent(newcomer)) == []
@@ -309,7 +279,7 @@ def test_a_robot_of_an_old_name_is_a_stranger() -> None:
     team = triangle()
     dynabt = agent(team, "RA")
     told(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
-    again = replace(team["RD"], parents=(Parent("RA", (named("A", "D", "N"),)),))
+    again = replace(team["RD"], parents=(Parent("RA", (differ("A", "D", "N"),)),))
     new = changed(team, [RemoveAgent("RD"), AddAgent(again)])
     dynabt.change(
         LocalProblem(agent_problems(new)["RA"]), PriorityOrder(new.order), Invalidated(frozenset(), frozenset({"RD"}))
@@ -343,7 +313,7 @@ def test_after_an_epoch_that_was_broken_off_links_are_asked_for_again() -> None:
 def test_who_changes_twice_before_it_goes_on_tells_all_that_is_new() -> None:
     """A robot was lost before all had taken in the change before."""
     team = triangle()
-    first = changed(team, [AddConstraint("RD", "RA", named("A", "D", "N"))])
+    first = changed(team, [AddConstraint("RD", "RA", differ("A", "D", "N"))])
     dynabt = agent(team, "RA")
     change(dynabt, team, first)
     assert after(dynabt, first, RemoveAgent("RB")) == [("RD", Ok((1,)))]
@@ -361,5 +331,5 @@ def test_links_that_were_added_stay() -> None:
 def test_who_takes_another_value_tells_it_once() -> None:
     team = triangle()
     dynabt = agent(team, "RA")
-    said = after(dynabt, team, AddConstraint("RD", "RA", named("A", "D", "N")), RemoveValue("A", 1), lossless=False)
+    said = after(dynabt, team, AddConstraint("RD", "RA", differ("A", "D", "N")), RemoveValue("A", 1), lossless=False)
     assert said == [("RB", Ok((2,))), ("RC", Ok((2,))), ("RD", Ok((2,)))]

@@ -7,19 +7,20 @@ from robochoc.model.problem import AddAgent, AddConstraint, Child, Domain, Paren
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.dynabt import Nogood
 from robochoc.solver.explanation import invalidated_by
-from tests.protocols.test_dynabt import after, agent, named
 from tests.support.agents import told, value
+from tests.support.dynabt_robots import after, agent
+from tests.support.small_teams import differ
 
 
 def pair(*told: str) -> Team:
     """RA with A1 and A2, of which RB is told some; RB differs from A1."""
     bits = Domain("D", (range(1, 3),))
     above = Robot("RA", (Variable("A1", bits), Variable("A2", bits)), children=(Child("RB", told),))
-    below = Robot("RB", (Variable("B", bits),), parents=(Parent("RA", (named("A1", "B", "C"),)),))
+    below = Robot("RB", (Variable("B", bits),), parents=(Parent("RA", (differ("A1", "B", "C"),)),))
     return Team("pair", (above, below))
 
 
-A2B = AddConstraint("RB", "RA", named("A2", "B", "N"))
+A2B = AddConstraint("RB", "RA", differ("A2", "B", "N"))
 
 
 def test_who_shows_other_variables_begins_anew_with_what_it_shows() -> None:
@@ -45,11 +46,11 @@ def test_the_values_of_one_who_shows_other_variables_mean_nothing_any_more() -> 
 
 def test_a_child_that_shows_other_variables_is_told_the_value_again() -> None:
     bits = Domain("D", (range(1, 3),))
-    parents = (Parent("RB", (named("B", "C1", "C"),)),)
+    parents = (Parent("RB", (differ("B", "C1", "C"),)),)
     child = Robot("RC", (Variable("C1", bits), Variable("C2", bits)), parents=parents)
     above = Robot("RB", (Variable("B", bits),), children=(Child("RC", ("B",)),))
     team = Team("two", (above, child))
-    change_ = AddConstraint("RC", "RB", named("B", "C2", "N"))
+    change_ = AddConstraint("RC", "RB", differ("B", "C2", "N"))
     assert invalidated_by(team, changed(team, [change_])).agents == {"RC"}
     assert after(agent(team, "RB"), team, change_) == [("RC", Ok((1,)))]
 
@@ -57,7 +58,7 @@ def test_a_child_that_shows_other_variables_is_told_the_value_again() -> None:
 def test_values_that_look_alike_but_are_of_other_variables_are_others() -> None:
     team = pair("A1")
     bits = Domain("D", (range(1, 3),))
-    other = Robot("RC", (Variable("C", bits),), parents=(Parent("RA", (named("A2", "C", "N"),)),))
+    other = Robot("RC", (Variable("C", bits),), parents=(Parent("RA", (differ("A2", "C", "N"),)),))
     dynabt = agent(team, "RA")
     told(dynabt, ("RB", Nogood({}, (1,), [])))
     assert (dynabt.problem.values, value(dynabt)) == (((1,), (2,)), (2,))

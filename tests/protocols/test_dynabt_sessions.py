@@ -18,10 +18,10 @@ from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import Invalidated, invalidated_by
 from robochoc.verification.checker import objections
-from tests.conformance.test_complex_teams import compiled_by_hand
 from tests.support.changes import random_journey, stages
 from tests.support.complex_changes import random_complex_journey
 from tests.support.problems import solutions
+from tests.support.solver_networks import compiled_by_brute_force
 
 
 def random_schedule(chance: Random) -> Schedule:
@@ -31,7 +31,7 @@ def random_schedule(chance: Random) -> Schedule:
 
 def played(team: Team, schedule: Schedule) -> Counter[Verdict]:
     """The verdicts of all epochs that came to their end; each is right."""
-    journey = ScenarioRun(team, None, compiled_by_hand, lambda: None)
+    journey = ScenarioRun(team, None, compiled_by_brute_force, lambda: None)
     seen = Counter[Verdict]()
     with Simulation(journey.compiled(), protocol_named("dynabt"), schedule) as session:
         epochs = list(journey.go(session, lambda _: None))

@@ -22,10 +22,10 @@ from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.source import Heard, Source, SourceError
 from robochoc.run.orchestrator import OnLoss, Options, Runtime, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
-from tests.conformance.test_epochs import pair
 from tests.support.clocks import waiting
 from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import ROOT
+from tests.support.small_teams import pair
 
 HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")
 SIMULATED = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
@@ -93,7 +93,7 @@ def test_an_epoch_without_a_solution_may_be_followed_by_one_with() -> None:
 @pytest.mark.parametrize(
     ("options", "named"),
     [
-        (Options(protocol="dynabt", withdraw=Withdrawal.FEWEST), "--withdraw"),
+        (Options(protocol="dynabt", withdraw=Withdrawal.MINIMUM), "--withdraw"),
         (Options(protocol="dynabt", runtime=Runtime.NETWORK), "--runtime network"),
         (Options(protocol="central"), "--protocol central"),
     ],

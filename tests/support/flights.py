@@ -8,17 +8,26 @@ from dataclasses import replace
 import numpy as np
 
 from robochoc.flight.layout import Point
-from robochoc.flight.mission import Mission
-from robochoc.flight.quadrotor.flown import Flown, Happening, Stage
-from robochoc.flight.quadrotor.nearest import Nearest
+from robochoc.flight.log import Flown, Happening, Nearest, Stage
+from robochoc.flight.mission import Mission, mission_of
+from robochoc.flight.preview import preview_of
 from robochoc.model.outcome import Epoch, Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Team, Variable
+from robochoc.view import scene as scenes
+from robochoc.view.scene import Scene
 
 FPS = 30
 LEG_S = 2
 """How long each leg takes."""
 TILT = 0.1
 """Radians, by which everybody leans when under way."""
+
+
+def scene_of(outcome: Outcome, team: Team | None = None, *, mission: Mission | None = None) -> Scene:
+    """Return the scene of a preview flight, as the command line makes it."""
+    mission = mission or mission_of(outcome, team)
+    preview = preview_of(mission)
+    return scenes.scene_of(outcome, mission, preview.flown, flown_mission=preview.mission, why_not=preview.why_not)
 
 
 def straight(mission: Mission, *, falls: Mapping[int, float] | None = None, obstacles: tuple[Point, ...] = ()) -> Flown:

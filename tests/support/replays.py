@@ -8,20 +8,20 @@ from random import Random
 
 import msgspec
 
-from robochoc.journal.events import AnyEvent, Began
+from robochoc.journal.events import AnyEvent, Began, Given
 from robochoc.journal.journal import Header, Journal, Recorder, read_journal
 from robochoc.model.orders import Order
 from robochoc.model.problem import Kind, Model, Team
 from robochoc.run.orchestrator import Options, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
-from tests.conformance.test_conformance import random_schedule
 from tests.support.changes import random_journey
 from tests.support.complex_changes import random_complex_journey
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import random_team
+from tests.support.random_options import random_schedule
 
 ENOUGH = 1500
 """Messages after which a run may end."""
@@ -63,7 +63,7 @@ def withdrawal(protocol: str, team: Team, chance: Random) -> Withdrawal | None:
     parts = any(one.model is Model.PKC for one in team.constraints())
     fewest = not parts and (traits.complete or not traits.costs)
     maximal = not parts and team.kind is Kind.DISCSP
-    return chance.choice([None, None, *([Withdrawal.FEWEST] * fewest), *([Withdrawal.MAXIMAL] * maximal)])
+    return chance.choice([None, None, *([Withdrawal.MINIMUM] * fewest), *([Withdrawal.MAXIMAL] * maximal)])
 
 
 def recorded(team: Team, options: Options, solver: AceProcess | None = None) -> Journal:
@@ -108,3 +108,8 @@ def as_told(team: Team, options: Options) -> tuple[Journal, list[AnyEvent]]:
             runs.append([])
         runs[-1].append(event)
     return read_journal(recorder.content()), [event for run in runs for event in sorted(run, key=lambda one: one.t)]
+
+
+def without_given(journal: Journal) -> Journal:
+    """Return `journal` as older versions wrote it: without what robots were given."""
+    return with_events(journal, [event for event in journal.events if not isinstance(event, Given)])

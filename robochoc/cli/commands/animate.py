@@ -28,9 +28,7 @@ def animate(saved: Path, html: Path | None, folder: Path | None, port: int, *, s
     robochoc solve instances/queens3d-4 --withdraw --json > out/result.json
     robochoc animate out/result.json --html out/page.html
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.cli.reports.progress import stages
-    from robochoc.cli.reports.scene import serve_scene, write_page
-    from robochoc.view.scene import scene_of
+    from robochoc.cli.reports.scene import scene_for, serve_scene, write_page
 
     if not (html or serve):
         raise click.UsageError("say where to write the page (--html FILE), or show it live (--serve)")
@@ -39,8 +37,7 @@ def animate(saved: Path, html: Path | None, folder: Path | None, port: int, *, s
     refuse_same_places({"--html": html}, {"the result": saved}, teams=[folder] if folder else [])
     outcome = saved_outcome(saved)
     team = team_of(outcome, saved, folder)
-    with stages(outcome.team) as progress:
-        scene = scene_of(outcome, team, progress=progress)
+    scene = scene_for(outcome, team)
     if html:
         write_page(scene, html)
     if serve:

@@ -71,10 +71,9 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
         for line in (*published, *too_late(given["failures"], flown)):
             click.echo(line, err=True)
     if html or serve:
-        from robochoc.cli.reports.scene import serve_scene, write_page
-        from robochoc.view.scene import scene_of
+        from robochoc.cli.reports.scene import scene_for, serve_scene, write_page
 
-        scene = scene_of(outcome, team, mission=mission, flown=flown)
+        scene = scene_for(outcome, team, mission=mission, flown=flown)
         if html:
             write_page(scene, html, quiet=as_json)
         if serve:

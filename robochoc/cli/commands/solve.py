@@ -260,11 +260,9 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     for line in told_of(loop) if loop and not wanted.as_json else ():
         click.echo(line, err=True)
     if products.html or products.serve:
-        from robochoc.cli.reports.progress import stages
-        from robochoc.view.scene import scene_of
+        from robochoc.cli.reports.scene import scene_for
 
-        with stages(team.name) as progress:
-            scene = scene_of(outcome, team, mission=flight.mission, flown=flight.flown, progress=progress)
+        scene = scene_for(outcome, team, mission=flight.mission, flown=flight.flown)
         _show(scene, products, quiet=wanted.as_json)
     if outcome.verdict != "unknown":
         return flight.status
@@ -312,7 +310,7 @@ def _objective(team: Team, options: Options) -> Callable[[], Objective] | None:
     from robochoc.run.orchestrator import Withdrawal
     from robochoc.verification.objective import Objective, withdrawal_cost
 
-    fewest = options.withdraw is Withdrawal.FEWEST
+    fewest = options.withdraw is Withdrawal.MINIMUM
     if team.dynamic or not (fewest or team.kind == "DisWCSP"):
         return None
     return lambda: Objective(team, withdrawal_cost(team) if fewest else None)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
@@ -14,6 +14,7 @@ from robochoc.cli.reports.failures import INVALID, LIMIT, LOST, USAGE, Failure, 
 if TYPE_CHECKING:
     from robochoc.run.networked.address import Address
 
+Command = TypeVar("Command", bound=Callable[..., object])
 _EXTRA = {"cryptography", "zenoh"}
 
 
@@ -52,7 +53,7 @@ identity_option = click.option(
 )
 
 
-def patience_option(text: str, default_s: float, name: str = "patience_s") -> Any:  # noqa: ANN401 - a decorator, as `click.option` returns it
+def patience_option(text: str, default_s: float, name: str = "patience_s") -> Callable[[Command], Command]:
     """Return the option `--patience SECONDS`, as the argument `name`, explained by `text`."""
     return click.option(
         "--patience",

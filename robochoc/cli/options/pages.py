@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import TypeVar
 
 import click
 
 from robochoc.cli.options.paths import OutputFile
 
+Command = TypeVar("Command", bound=Callable[..., object])
 
-def html_option(*short: str) -> Any:  # noqa: ANN401 - a decorator, as `click.option` returns it
+
+def html_option(*short: str) -> Callable[[Command], Command]:
     """Return the option `--html FILE`, with other spellings for it."""
     return click.option(
         "--html",

@@ -34,7 +34,7 @@ class WithdrawalName(click.Choice[str]):
         return super().convert(_FORMER.get(value, value), param, ctx)
 
 
-def protocol_option(*, central: bool) -> Any:  # noqa: ANN401 - a decorator, as `click.option` returns it
+def protocol_option(*, central: bool) -> Callable[[Command], Command]:
     """Return the option `--protocol NAME`; `central` says that there may also be no protocol, but one model."""
     alone = "; central: no robots, one model of all files" if central else ""
     words = f"The protocol, as 'robochoc protocols' lists them{alone}.  [default: {SATISFIES}; with costs {MINIMISES}]"

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from robochoc.flight.log import SAMPLES_A_SECOND
 from robochoc.flight.quadrotor.airframe import Array
-from robochoc.flight.quadrotor.flown import SAMPLES_A_SECOND
 
 MOST_DRONES = 1_000
 """At a time: planning looks at all pairs."""

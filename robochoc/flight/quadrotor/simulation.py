@@ -12,13 +12,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from robochoc.flight.log import SAMPLES_A_SECOND, Happening
 from robochoc.flight.quadrotor.airframe import HUMMINGBIRD, Array
+from robochoc.flight.quadrotor.attitude import quaternions
 from robochoc.flight.quadrotor.bodies import Bodies, Mask
 from robochoc.flight.quadrotor.conditions import Conditions, Failure
 from robochoc.flight.quadrotor.control import Controller
 from robochoc.flight.quadrotor.course import Course
-from robochoc.flight.quadrotor.flown import SAMPLES_A_SECOND, Happening, quaternions
-from robochoc.flight.quadrotor.nearest import Watch
+from robochoc.flight.quadrotor.separation import Watch
 from robochoc.flight.quadrotor.wind import Wind
 
 STEPS_A_SAMPLE = 4

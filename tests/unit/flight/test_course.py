@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robochoc.flight.log import Nearest
 from robochoc.flight.mission import Goal
 from robochoc.flight.quadrotor.airframe import Array
+from robochoc.flight.quadrotor.attitude import quaternions
 from robochoc.flight.quadrotor.course import STOP_S, Course
-from robochoc.flight.quadrotor.flown import quaternions
-from robochoc.flight.quadrotor.nearest import Nearest, Watch
+from robochoc.flight.quadrotor.separation import Watch
 from robochoc.flight.quadrotor.simulation import DT
 from robochoc.flight.quadrotor.spots import free_spot, gaps
 from robochoc.flight.quadrotor.targets import Hazards, Targets, waits

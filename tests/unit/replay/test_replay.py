@@ -40,10 +40,10 @@ from robochoc.solver.compiled_team import CompiledTeam
 from tests.support.golden import odd_team
 from tests.support.problems import random_team
 from tests.support.program import ROOT
-from tests.support.replays import as_told, in_binary, in_text, random_run, recorded, with_events
+from tests.support.replays import as_told, in_binary, in_text, random_run, recorded, with_events, without_given
 
 FEW, MANY = 2, 100
-FOUR = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.FEWEST)
+FOUR = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MINIMUM)
 
 
 @pytest.fixture(scope="module")
@@ -288,10 +288,6 @@ def test_delays_are_the_simulators_only() -> None:
 
 
 # What cannot be played
-
-
-def without_given(journal: Journal) -> Journal:
-    return with_events(journal, [event for event in journal.events if not isinstance(event, Given)])
 
 
 def test_files_help_where_the_journal_does_not_say_what_robots_were_given() -> None:

@@ -17,10 +17,10 @@ from robochoc.model.outcome import Outcome, Verdict
 from robochoc.run.networked.address import AddressError
 from robochoc.run.registry import UnknownProtocolError, offers
 from robochoc.solver.encoding import UnsupportedError
-from tests.conformance.test_epochs import differ
 from tests.support.machines import Site
 from tests.support.problems import team_of
 from tests.support.program import ROOT
+from tests.support.small_teams import differ
 
 FOUR = ROOT / "instances" / "queens3d-4"
 SCOUTS = ROOT / "docs" / "examples" / "scouts"

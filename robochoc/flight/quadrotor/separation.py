@@ -8,27 +8,16 @@ measured, and yet what is found is the least of all pairs at all steps.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
+from robochoc.flight.log import Nearest
 from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.bodies import Mask
 
 _REACH_M = 0.5
 _ROUNDING_M = 1e-6
 """More than what is lost in the list's distances, which are taken by scalar products."""
-
-
-@dataclass(frozen=True)
-class Nearest:
-    """How near the drones with the numbers `first` and `second` came, and when."""
-
-    distance_m: float
-    first: int
-    second: int
-    at_s: float
 
 
 class Watch:

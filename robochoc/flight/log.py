@@ -5,12 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from robochoc.flight.layout import Point
-from robochoc.flight.quadrotor.airframe import Array
-from robochoc.flight.quadrotor.nearest import Nearest
+
+Array = npt.NDArray[np.float64]
 
 SAMPLES_A_SECOND = 30
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """How near the drones with the numbers `first` and `second` came, and when."""
+
+    distance_m: float
+    first: int
+    second: int
+    at_s: float
 
 
 @dataclass(frozen=True)
@@ -61,27 +72,3 @@ class Flown:
     def simulated_s(self) -> float:
         """How long the flight was."""
         return float(self.times[-1])
-
-
-def quaternions(axes: Array) -> Array:
-    """(..., 4) x y z w of rotations (..., 3, 3), of which `[..., k, :]` is the turned axis k.
-
-    By Shepperd, "Quaternion from rotation matrix", 1978: of four ways the one without cancellation.
-    """
-    xx, yy, zz = axes[..., 0, 0], axes[..., 1, 1], axes[..., 2, 2]
-    squares = np.stack([1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz], axis=-1)
-    # The products of each component with all four, times four.
-    xy, yz, zx = (axes[..., i, j] + axes[..., j, i] for i, j in ((0, 1), (1, 2), (2, 0)))
-    xw, yw, zw = (axes[..., i, j] - axes[..., j, i] for i, j in ((1, 2), (2, 0), (0, 1)))
-    rows = np.stack(
-        [
-            np.stack([squares[..., 0], xy, zx, xw], axis=-1),
-            np.stack([xy, squares[..., 1], yz, yw], axis=-1),
-            np.stack([zx, yz, squares[..., 2], zw], axis=-1),
-            np.stack([xw, yw, zw, squares[..., 3]], axis=-1),
-        ],
-        axis=-2,
-    )
-    largest = squares.argmax(-1)[..., None, None]
-    found = np.take_along_axis(rows, largest, -2)[..., 0, :]
-    return np.asarray(found / np.sqrt(np.square(found).sum(-1, keepdims=True)))
