@@ -11,11 +11,11 @@ from robochoc.flight.layout import Point
 
 Array = npt.NDArray[np.float64]
 
-SAMPLES_A_SECOND = 30
+SAMPLE_RATE_HZ = 30
 
 
 @dataclass(frozen=True)
-class Nearest:
+class ClosestApproach:
     """How near the drones with the numbers `first` and `second` came, and when."""
 
     distance_m: float
@@ -25,7 +25,7 @@ class Nearest:
 
 
 @dataclass(frozen=True)
-class Stage:
+class LegTimes:
     """A leg of the flight and its time, in seconds from the beginning."""
 
     title: str
@@ -34,7 +34,7 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Happening:
+class FlightEvent:
     """Something worth telling: when, which drone (its number), and what it does or meets with."""
 
     at_s: float
@@ -43,8 +43,8 @@ class Happening:
 
 
 @dataclass(frozen=True)
-class Flown:
-    """T samples of N drones, `SAMPLES_A_SECOND`, in metres and seconds from the flight's beginning.
+class FlightLog:
+    """T samples of N drones, `SAMPLE_RATE_HZ`, in metres and seconds from the flight's beginning.
 
     `attitudes` are unit quaternions x, y, z, w, from the drone's frame to the world's. `errors_m` says how far
     everybody was in the end from the goal that was asked for: 0 for who had none, nan for who has fallen. `nearest` is
@@ -58,11 +58,11 @@ class Flown:
     times: Array
     positions: Array
     attitudes: Array
-    stages: tuple[Stage, ...]
-    happenings: tuple[Happening, ...]
+    legs: tuple[LegTimes, ...]
+    events: tuple[FlightEvent, ...]
     errors_m: Array
-    nearest: Nearest | None
-    nearest_fallen: Nearest | None
+    nearest: ClosestApproach | None
+    nearest_fallen: ClosestApproach | None
     distance: float
     obstacles: tuple[Point, ...]
     wall_s: float

@@ -10,7 +10,7 @@ import numpy as np
 from robochoc.flight.cells import in_cells
 from robochoc.flight.flight import fly
 from robochoc.flight.layout import Axis, Point
-from robochoc.flight.log import Flown
+from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Mission
 
 _NO_FLIGHT = (ValueError, ArithmeticError, MemoryError)
@@ -39,7 +39,7 @@ class Preview:
     """
 
     mission: Mission
-    flown: Flown | None = None
+    flown: FlightLog | None = None
     why_not: str = ""
 
 

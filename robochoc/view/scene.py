@@ -12,15 +12,15 @@ import numpy as np
 
 from robochoc.flight.cells import in_cells
 from robochoc.flight.layout import Axis, Point
-from robochoc.flight.log import Flown
+from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Goal, Mission
 from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import Outcome
-from robochoc.view.film import Film, fell, film_of
+from robochoc.view.playback import Playback, fell, playback_of
 
 
 @dataclass(frozen=True)
-class Drone:
+class DrawnDrone:
     """Begins at `home`, on the ground. It ends at its `place` in the air, or `aside`, or (neither) stays there."""
 
     name: str
@@ -45,9 +45,9 @@ class Scene:
 
     title: str
     facts: tuple[tuple[str, str], ...]
-    drones: tuple[Drone, ...]
+    drones: tuple[DrawnDrone, ...]
     axes: tuple[Axis, Axis, Axis]
-    film: Film | None = None
+    film: Playback | None = None
 
     @property
     def ground(self) -> float:
@@ -58,7 +58,7 @@ class Scene:
 def scene_of(
     outcome: Outcome,
     mission: Mission,
-    flown: Flown | None = None,
+    flown: FlightLog | None = None,
     *,
     flown_mission: Mission | None = None,
     why_not: str = "",
@@ -77,11 +77,11 @@ def scene_of(
     drones = tuple(_drones(flown_mission))
     title = f"{outcome.team}: {_headline(outcome, mission, drones)}"
     flight = _flight_facts(flown, why_not, is_to_scale=flown_mission is mission)
-    film = film_of(flown_mission, flown) if flown else None
+    film = playback_of(flown_mission, flown) if flown else None
     return Scene(title, (*_facts(outcome, mission), *flight), drones, mission.axes, film)
 
 
-def _headline(outcome: Outcome, mission: Mission, drones: Sequence[Drone]) -> str:
+def _headline(outcome: Outcome, mission: Mission, drones: Sequence[DrawnDrone]) -> str:
     """Return what happened, counted in robots; in drones where robots have several, or are not known."""
     robots = {drone.robot for drone in mission.drones if drone.robot}
     if len(robots) == len(drones):
@@ -90,7 +90,7 @@ def _headline(outcome: Outcome, mission: Mission, drones: Sequence[Drone]) -> st
     return describe_outcome(outcome, len(drones), flying=flying, noun="drone")
 
 
-def _drones(mission: Mission) -> Iterator[Drone]:
+def _drones(mission: Mission) -> Iterator[DrawnDrone]:
     """Each drone, and where the last leg that says something of it wants it to be."""
     last: dict[int, Goal] = {}
     for leg in mission.legs:
@@ -100,9 +100,9 @@ def _drones(mission: Mission) -> Iterator[Drone]:
         end = _cell(mission, goal.at) if goal else None
         home = _cell(mission, drone.home)
         if goal and goal.lands:
-            yield Drone(drone.name, drone.group, home, aside=end)
+            yield DrawnDrone(drone.name, drone.group, home, aside=end)
         else:
-            yield Drone(drone.name, drone.group, home, place=end)
+            yield DrawnDrone(drone.name, drone.group, home, place=end)
 
 
 def _cell(mission: Mission, metres: Point) -> Point:
@@ -110,7 +110,7 @@ def _cell(mission: Mission, metres: Point) -> Point:
     return x, y, z
 
 
-def _flight_facts(flown: Flown | None, why_not: str, *, is_to_scale: bool) -> Iterator[tuple[str, str]]:
+def _flight_facts(flown: FlightLog | None, why_not: str, *, is_to_scale: bool) -> Iterator[tuple[str, str]]:
     """How the flight went, distances only where they are to scale; or why there was none."""
     if flown is None:
         if why_not:
@@ -119,8 +119,8 @@ def _flight_facts(flown: Flown | None, why_not: str, *, is_to_scale: bool) -> It
     yield "flown", f"{flown.times[-1]:.1f} s{'' if is_to_scale else ', not to scale'}"
     if flown.nearest and is_to_scale:
         yield "nearest", f"{flown.nearest.distance_m:.2f} m (set: {flown.distance:.2g} m)"
-    for number, happening in fell(flown).items():
-        yield "fallen", f"{flown.names[number]} ({happening.what})"
+    for number, event in fell(flown).items():
+        yield "fallen", f"{flown.names[number]} ({event.what})"
     if flown.nearest_fallen and is_to_scale:
         yield "to others", f"{flown.nearest_fallen.distance_m:.2f} m at the nearest"
 

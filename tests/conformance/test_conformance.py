@@ -15,7 +15,7 @@ from robochoc.model.problem import INFINITE, Team
 from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.verification.checker import objections
-from tests.support.loose_problems import any_order, least, loosened
+from tests.support.loose_problems import any_order, loosened, minimum_cost
 from tests.support.problems import ON_ONE_MACHINE, random_team, solutions
 from tests.support.random_options import MAX_MESSAGES, random_options
 
@@ -45,7 +45,7 @@ def agrees(team: Team, options: Options) -> Verdict:
     if hasattr(protocol.settings, "cycles"):
         options = replace(options, settings={"cycles": "20"})
     outcome = solve(team, options if complete else replace(options, messages=MAX_MESSAGES))
-    solvable = least(team) < INFINITE
+    solvable = minimum_cost(team) < INFINITE
     expected = Verdict.SOLUTION if solvable else Verdict.NO_SOLUTION
     if not complete and outcome.verdict is Verdict.UNKNOWN:
         return expected

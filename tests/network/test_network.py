@@ -23,7 +23,7 @@ from robochoc.verification.checker import cost, objections
 from tests.support.clocks import once
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import least_cost, random_cost_team
-from tests.support.held import CHAIN, Broken, Held, Overwhelmed
+from tests.support.paused_abt import CHAIN, CrashingABT, OverloadedABT, PausedABT
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import random_team, solutions
 from tests.support.solver_networks import compiled_by_brute_force
@@ -172,7 +172,7 @@ def test_limits() -> None:
 
 def test_when_the_time_is_over_there_is_what_was_decided_so_far() -> None:
     def searched(limit: float) -> RunResult:
-        with LocalNetwork(CHAIN, Held, brief=RunParameters(settings={"file": "/nowhere"})) as network:
+        with LocalNetwork(CHAIN, PausedABT, brief=RunParameters(settings={"file": "/nowhere"})) as network:
             return network.search(timeout=limit)
 
     result = once(lambda result: len(result.assignments) == len(CHAIN.order), searched)
@@ -183,13 +183,13 @@ def test_when_the_time_is_over_there_is_what_was_decided_so_far() -> None:
 
 def test_a_problem_that_is_too_much_for_a_robot() -> None:
     """It says so, and the run ends with that."""
-    with LocalNetwork(CHAIN, Overwhelmed) as network, pytest.raises(TooLargeError, match="this is too much for RX2"):
+    with LocalNetwork(CHAIN, OverloadedABT) as network, pytest.raises(TooLargeError, match="this is too much for RX2"):
         network.search(TIMEOUT_S)
 
 
 def test_a_robot_that_breaks() -> None:
     with (
-        LocalNetwork(CHAIN, Broken) as network,
+        LocalNetwork(CHAIN, CrashingABT) as network,
         pytest.raises(RobotsLostError, match="RX2 was lost: ValueError: out of"),
     ):
         network.search(TIMEOUT_S)

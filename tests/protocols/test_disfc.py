@@ -26,7 +26,7 @@ from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.filters import allows
-from tests.support.agents import told
+from tests.support.agents import replies
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.pkc_bytes import changed_where_nobody_was, nothing_hidden, renamed, restated, run
 from tests.support.pkc_problems import (
@@ -85,25 +85,25 @@ def test_every_pair_of_a_filter_is_a_check() -> None:
 
 def test_a_value_that_a_filter_takes_away_is_left() -> None:
     robot = agent(triangle(), "RB")
-    assert told(robot, ("RA", Ok(5, b"\x06"))) == [("RC", Ok(2, b"\x05"))]
+    assert replies(robot, ("RA", Ok(5, b"\x06"))) == [("RC", Ok(2, b"\x05"))]
     assert robot.store[0] == {"RA": (5,)}
 
 
 def test_of_two_filters_that_take_a_value_away_the_highest_robots_is_to_blame() -> None:
     robot = agent(triangle(), "RC")
-    told(robot, ("RB", Ok(1, b"\x06")), ("RA", Ok(1, b"\x06")))
+    replies(robot, ("RB", Ok(1, b"\x06")), ("RA", Ok(1, b"\x06")))
     assert robot.store[0] == {"RA": (1,)}
 
 
 def test_a_value_that_all_filters_allow_is_kept_with_its_counter() -> None:
     robot = agent(triangle(), "RC")
-    assert told(robot, ("RA", Ok(1, b"\x03")), ("RB", Ok(1, b"\x05"))) == []
+    assert replies(robot, ("RA", Ok(1, b"\x03")), ("RB", Ok(1, b"\x05"))) == []
     assert robot.counter == 1
 
 
 def test_backtrack_tells_counters_to_the_lowest_robot_and_forgets_its_assignment() -> None:
     robot = agent(triangle(), "RC")
-    said = told(robot, ("RA", Ok(4, b"\x06")), ("RB", Ok(7, b"\x01")))
+    said = replies(robot, ("RA", Ok(4, b"\x06")), ("RB", Ok(7, b"\x01")))
     assert said == [("RB", Nogood({"RA": 4}, 7)), ("RD", Ok(2, b"\x05"))]
     assert robot.view == {"RA": 4}
     assert set(robot.filters) == {"RA"}
@@ -111,54 +111,54 @@ def test_backtrack_tells_counters_to_the_lowest_robot_and_forgets_its_assignment
 
 def test_a_coherent_nogood_about_the_present_counter_is_accepted() -> None:
     robot = agent(triangle(), "RB")
-    told(robot, ("RA", Ok(1, EVERYTHING)))
-    assert told(robot, ("RC", Nogood({"RA": 1}, 1))) == [("RC", Ok(2, b"\x05"))]
+    replies(robot, ("RA", Ok(1, EVERYTHING)))
+    assert replies(robot, ("RC", Nogood({"RA": 1}, 1))) == [("RC", Ok(2, b"\x05"))]
 
 
 def test_a_nogood_about_another_counter_is_ignored() -> None:
     robot = agent(triangle(), "RB")
-    assert told(robot, ("RC", Nogood({}, 2))) == []
+    assert replies(robot, ("RC", Nogood({}, 2))) == []
     assert robot.counter == 1
 
 
 def test_an_obsolete_nogood_about_the_present_counter_is_answered() -> None:
     robot = agent(triangle(), "RB")
-    told(robot, ("RA", Ok(2, EVERYTHING)))
-    assert told(robot, ("RC", Nogood({"RA": 1}, 1))) == [("RC", Ok(1, b"\x06"))]
+    replies(robot, ("RA", Ok(2, EVERYTHING)))
+    assert replies(robot, ("RC", Nogood({"RA": 1}, 1))) == [("RC", Ok(1, b"\x06"))]
 
 
 def test_nogoods_go_with_the_assignments_they_rest_on() -> None:
     robot = agent(triangle(), "RB")
-    told(robot, ("RA", Ok(1, b"\x06")))
-    told(robot, ("RA", Ok(2, EVERYTHING)))
+    replies(robot, ("RA", Ok(1, b"\x06")))
+    replies(robot, ("RA", Ok(2, EVERYTHING)))
     assert list(robot.store) == []
 
 
 def test_the_empty_nogood_ends_the_search() -> None:
     robot = agent(team_of({"A": (1,), "B": (1,)}, [differ("AB")]), "RA")
-    assert told(robot, ("RB", Nogood({}, 1))) == []
+    assert replies(robot, ("RB", Nogood({}, 1))) == []
     assert robot.verdict is Verdict.NO_SOLUTION
-    assert told(robot, ("RB", AddLink())) == []
+    assert replies(robot, ("RB", AddLink())) == []
 
 
 def test_a_value_that_comes_back_has_a_new_counter() -> None:
     robot = agent(triangle(), "RB")
-    told(robot, ("RA", Ok(1, b"\x06")))
-    told(robot, ("RA", Ok(2, b"\x01")))
+    replies(robot, ("RA", Ok(1, b"\x06")))
+    replies(robot, ("RA", Ok(2, b"\x01")))
     assert (robot.value, robot.counter) == (0, 3)
 
 
 def test_strangers_in_a_nogood_are_asked_for_a_link() -> None:
     team = team_of(dict.fromkeys("ABC", (1, 2)), [differ("AC"), differ("BC")])
     robot = agent(team, "RB")
-    assert told(robot, ("RC", Nogood({"RA": 3}, 1))) == [("RA", AddLink()), ("RC", Ok(2, b"\x01"))]
+    assert replies(robot, ("RC", Nogood({"RA": 3}, 1))) == [("RA", AddLink()), ("RC", Ok(2, b"\x01"))]
     assert robot.view == {"RA": 3}
 
 
 def test_who_asked_for_a_link_gets_a_filter_that_allows_everything_now_and_later() -> None:
     robot = agent(triangle(), "RA")
-    assert told(robot, ("RD", AddLink())) == [("RD", Ok(1, EVERYTHING))]
-    assert ("RD", Ok(2, EVERYTHING)) in told(robot, ("RB", Nogood({}, 1)), ("RD", AddLink()))
+    assert replies(robot, ("RD", AddLink())) == [("RD", Ok(1, EVERYTHING))]
+    assert ("RD", Ok(2, EVERYTHING)) in replies(robot, ("RB", Nogood({}, 1)), ("RD", AddLink()))
 
 
 def test_parts_go_down_and_up() -> None:
@@ -172,15 +172,15 @@ def test_parts_go_down_and_up() -> None:
 
 def test_a_higher_robot_outside_a_filter_from_below_says_so() -> None:
     robot = agent(pkc_pair(pkc_part("AB"), pkc_part("AB")), "RA")
-    assert told(robot, ("RB", Ok(1, b"\x03"))) == []
-    assert told(robot, ("RB", Ok(2, b"\x02"))) == [("RB", Nogood({"RA": 1}, 2))]
-    assert told(robot) == []
+    assert replies(robot, ("RB", Ok(1, b"\x03"))) == []
+    assert replies(robot, ("RB", Ok(2, b"\x02"))) == [("RB", Nogood({"RA": 1}, 2))]
+    assert replies(robot) == []
 
 
 def test_a_new_assignment_is_held_against_the_filters_from_below() -> None:
     robot = agent(pkc_pair(pkc_part("AB"), pkc_part("AB")), "RA")
-    told(robot, ("RB", Ok(4, b"\x01")))
-    assert told(robot, ("RB", Nogood({}, 1))) == [("RB", Ok(2, b"\x03")), ("RB", Nogood({"RA": 2}, 4))]
+    replies(robot, ("RB", Ok(4, b"\x01")))
+    assert replies(robot, ("RB", Nogood({}, 1))) == [("RB", Ok(2, b"\x03")), ("RB", Nogood({"RA": 2}, 4))]
 
 
 def test_filters_are_over_the_declared_domain_of_all_that_the_receiver_shows() -> None:

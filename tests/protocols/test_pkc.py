@@ -21,7 +21,7 @@ from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
-from tests.support.agents import told
+from tests.support.agents import replies
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.pkc_bytes import changed_elsewhere, nothing_hidden, restated, run, watched
 from tests.support.pkc_problems import (
@@ -64,53 +64,53 @@ def test_the_value_goes_up_where_only_the_parent_holds_a_part() -> None:
 
 def test_a_lower_robot_checks_its_own_part() -> None:
     abt = agent(pkc_pair(pkc_part("AB", (1, 1)), pkc_part("AB")), "RB")
-    assert told(abt, ("RA", Ok((1,)))) == [("RA", Ok((2,)))]
+    assert replies(abt, ("RA", Ok((1,)))) == [("RA", Ok((2,)))]
 
 
 def test_a_higher_robot_refuses_a_pair_that_its_part_forbids() -> None:
     abt = agent(pkc_pair(pkc_part("AB"), pkc_part("AB", (1, 2))), "RA")
-    assert told(abt, ("RB", Ok((1,)))) == []
-    assert told(abt, ("RB", Ok((2,)))) == [("RB", Nogood({"RA": (1,)}, (2,)))]
+    assert replies(abt, ("RB", Ok((1,)))) == []
+    assert replies(abt, ("RB", Ok((2,)))) == [("RB", Nogood({"RA": (1,)}, (2,)))]
 
 
 def test_a_lower_value_is_no_part_of_the_view() -> None:
     abt = agent(pkc_pair(pkc_part("AB"), pkc_part("AB")), "RA")
-    told(abt, ("RB", Ok((1,))))
+    replies(abt, ("RB", Ok((1,))))
     assert abt.view == {}
 
 
 def test_a_new_own_value_is_held_against_what_lower_robots_told() -> None:
     abt = agent(pkc_pair(pkc_part("AB"), pkc_part("AB", (2, 1))), "RA")
-    assert told(abt, ("RB", Ok((1,)))) == []
-    said = told(abt, ("RB", Nogood({}, (1,))))
+    assert replies(abt, ("RB", Ok((1,)))) == []
+    said = replies(abt, ("RB", Nogood({}, (1,))))
     assert said == [("RB", Ok((2,))), ("RB", Nogood({"RA": (2,)}, (1,)))]
 
 
 def test_each_pair_is_checked_once() -> None:
     abt = agent(pkc_pair(pkc_part("AB"), pkc_part("AB")), "RA")
-    told(abt, ("RB", Ok((1,))))
+    replies(abt, ("RB", Ok((1,))))
     assert abt.problem.checks == 1
-    told(abt)
+    replies(abt)
     assert abt.problem.checks == 1
 
 
 def test_a_refused_value_is_forgotten_until_it_is_told_again() -> None:
     abt = agent(pkc_pair(pkc_part("AB"), pkc_part("AB", (1, 2))), "RA")
-    told(abt, ("RB", Ok((2,))))
-    assert told(abt) == []
-    assert told(abt, ("RB", Ok((2,)))) == [("RB", Nogood({"RA": (1,)}, (2,)))]
+    replies(abt, ("RB", Ok((2,))))
+    assert replies(abt) == []
+    assert replies(abt, ("RB", Ok((2,)))) == [("RB", Nogood({"RA": (1,)}, (2,)))]
 
 
 def test_the_refused_robot_accepts_as_in_abt() -> None:
     abt = agent(pkc_pair(pkc_part("AB"), pkc_part("AB")), "RB")
-    told(abt, ("RA", Ok((1,))))
-    assert told(abt, ("RA", Nogood({"RA": (1,)}, (1,)))) == [("RA", Ok((2,)))]
+    replies(abt, ("RA", Ok((1,))))
+    assert replies(abt, ("RA", Nogood({"RA": (1,)}, (1,)))) == [("RA", Ok((2,)))]
 
 
 def test_the_refused_robot_answers_a_nogood_that_rests_on_an_old_value() -> None:
     abt = agent(pkc_pair(pkc_part("AB"), pkc_part("AB")), "RB")
-    told(abt, ("RA", Ok((2,))))
-    assert told(abt, ("RA", Nogood({"RA": (1,)}, (1,)))) == [("RA", Ok((1,)))]
+    replies(abt, ("RA", Ok((2,))))
+    assert replies(abt, ("RA", Nogood({"RA": (1,)}, (1,)))) == [("RA", Ok((1,)))]
 
 
 def test_a_refusal_names_only_the_variables_that_the_part_looks_at() -> None:

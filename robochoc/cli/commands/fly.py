@@ -23,7 +23,7 @@ from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.reports.failures import INVALID, LOST, Failure, invalid_input_fails
 
 if TYPE_CHECKING:
-    from robochoc.flight.flight import Flown
+    from robochoc.flight.flight import FlightLog
     from robochoc.flight.mission import Mission
 
 
@@ -81,18 +81,18 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
     click.get_current_context().exit(0 if as_planned(flown) else LOST)
 
 
-def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[Flown, list[str]]:
+def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[FlightLog, list[str]]:
     """What was flown, and what of it was published where."""
     from robochoc.cli.reports.progress import stages
     from robochoc.flight.flight import fly as flight
     from robochoc.formats import on_one_line
-    from robochoc.ros.outlet import Outlet, publish_flight
+    from robochoc.ros.sink_publisher import SinkPublisher, publish_flight
 
     conditions = conditions_of(given, mission)
     with ros_failures_told(), ExitStack() as stack:
         sinks = open_sinks(given["sinks"], stack)
         frame = given["frame"] or FRAME
-        outlets = [Outlet(mission.team, mission.drones, sink, frame) for sink in sinks]
+        outlets = [SinkPublisher(mission.team, mission.drones, sink, frame) for sink in sinks]
         try:
             with stages(mission.team) as progress:
                 flown = flight(mission, conditions, progress)

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from robochoc.journal.journal import Header, Recorder
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
-    from robochoc.ros.closed_loop import Loop
+    from robochoc.ros.closed_loop import ClosedLoop
     from robochoc.run.orchestrator import Options
     from robochoc.verification.objective import Objective
     from robochoc.view.scene import Scene
@@ -271,7 +271,7 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     return LIMIT
 
 
-def _run(team: Team, options: Options, recorder: Recorder | None, loop: Loop | None) -> Outcome:
+def _run(team: Team, options: Options, recorder: Recorder | None, loop: ClosedLoop | None) -> Outcome:
     """Run with whatever watches, a journal, a line on the terminal, and where decisions go."""
     from robochoc.cli.reports.progress import progress_line, waiting
     from robochoc.run.orchestrator import CENTRAL

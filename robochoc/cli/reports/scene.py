@@ -10,7 +10,7 @@ import click
 from robochoc.formats import write_atomically
 
 if TYPE_CHECKING:
-    from robochoc.flight.log import Flown
+    from robochoc.flight.log import FlightLog
     from robochoc.flight.mission import Mission
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def scene_for(
-    outcome: Outcome, team: Team | None, *, mission: Mission | None = None, flown: Flown | None = None
+    outcome: Outcome, team: Team | None, *, mission: Mission | None = None, flown: FlightLog | None = None
 ) -> Scene:
     """Return the scene of `outcome`. If it was not flown yet, it is flown here, in calm air.
 

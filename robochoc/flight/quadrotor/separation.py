@@ -11,21 +11,21 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.flight.log import Nearest
+from robochoc.flight.log import ClosestApproach
 from robochoc.flight.quadrotor.airframe import Array
-from robochoc.flight.quadrotor.bodies import Mask
+from robochoc.flight.quadrotor.rigid_bodies import Mask
 
 _REACH_M = 0.5
 _ROUNDING_M = 1e-6
 """More than what is lost in the list's distances, which are taken by scalar products."""
 
 
-class Watch:
+class SeparationMonitor:
     """Sees all drones at every step. Pairs with a drone that falls, or has fallen, are counted apart."""
 
     def __init__(self, number: int) -> None:
-        self.nearest: Nearest | None = None
-        self.nearest_fallen: Nearest | None = None
+        self.nearest: ClosestApproach | None = None
+        self.nearest_fallen: ClosestApproach | None = None
         self._pairs = np.triu_indices(number, 1)
         self._lost: Mask = np.zeros(number, dtype=np.bool_)
         self._anchor: Array | None = None
@@ -79,9 +79,11 @@ class Watch:
         self._sound = int((near & ~lost).sum())
         self._anchor = places.copy()
 
-    def _nearer(self, least: Nearest | None, squares: Array, offset: int, at_s: float) -> Nearest | None:
+    def _nearer(
+        self, least: ClosestApproach | None, squares: Array, offset: int, at_s: float
+    ) -> ClosestApproach | None:
         place = int(squares.argmin())
         distance = float(np.sqrt(squares[place]))
         if least is not None and least.distance_m <= distance:
             return least
-        return Nearest(distance, int(self._first[place + offset]), int(self._second[place + offset]), at_s)
+        return ClosestApproach(distance, int(self._first[place + offset]), int(self._second[place + offset]), at_s)

@@ -10,9 +10,9 @@ from random import Random
 from robochoc.formats import read_robot, read_team, write_team
 from robochoc.model.change import ChangeError, rejoined, without
 from robochoc.model.problem import Domain, Robot, Team
-from tests.support.changes import random_journey, stages
-from tests.support.complex_changes import random_complex_journey
+from tests.support.complex_changes import random_complex_changing_team
 from tests.support.problems import solutions, with_unique_definitions
+from tests.support.random_changes import random_changing_team, stages
 from tests.support.small_teams import triangle
 
 
@@ -43,7 +43,7 @@ def check_files(team: Team, folder: Path) -> None:
 def test_a_changed_team_could_stand_in_files(tmp_path: Path) -> None:
     chance = Random("files")
     for _ in range(6):
-        for journey in (random_journey(chance, 6), random_complex_journey(chance, 6)):
+        for journey in (random_changing_team(chance, 6), random_complex_changing_team(chance, 6)):
             for team in stages(journey):
                 check_files(team, tmp_path / "team")
 
@@ -52,7 +52,7 @@ def test_a_team_that_a_robot_rejoined_could_stand_in_files(tmp_path: Path) -> No
     chance = Random("rejoined")
     came = 0
     for _ in range(40):
-        first, *_, last = stages(random_complex_journey(chance, 4))
+        first, *_, last = stages(random_complex_changing_team(chance, 4))
         gone = chance.sample(last.order, chance.choice((0, 0, 1)))
         last = without(last, gone)
         for name in first.order:

@@ -19,16 +19,16 @@ from hypothesis import strategies as st
 
 from robochoc.flight import preview as previews
 from robochoc.flight.flight import fly
-from robochoc.flight.log import Happening
+from robochoc.flight.log import FlightEvent
 from robochoc.flight.mission import mission_of
-from robochoc.flight.quadrotor.conditions import Conditions, Failure
+from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.formats import write_team
 from robochoc.formats.result import result_json
 from robochoc.model.outcome import Outcome, Verdict
-from robochoc.view.film import Look
 from robochoc.view.keyframes import angle, attitude_keys, position_keys, slerp
 from robochoc.view.page import page
 from robochoc.view.palette import GREY, RED, web
+from robochoc.view.playback import DroneState
 from robochoc.view.scene import Scene, scene_of
 from tests.support.clocks import working
 from tests.support.flights import FPS, LEG_S, TILT, epochs_of_three, five, straight
@@ -181,7 +181,7 @@ def test_who_leaves_turns_grey_when_it_leaves() -> None:
     scene = shown()
     assert scene.film
     assert [len(looks) for looks in scene.film.looks] == [0, 0, 0, 0, 1]
-    assert [*scene.film.looks[4]] == [(LEG_S, Look.ASIDE)]
+    assert [*scene.film.looks[4]] == [(LEG_S, DroneState.ASIDE)]
     gone = scene.drones[4]
     assert gone.aside
     assert gone.place is None
@@ -200,7 +200,7 @@ def test_who_comes_back_has_its_colour_again() -> None:
     mission = mission_of(outcome, five())
     scene = scene_of(outcome, mission, straight(mission))
     assert scene.film
-    assert [*scene.film.looks[4]] == [(LEG_S, Look.ASIDE), (2 * LEG_S, Look.FLIES)]
+    assert [*scene.film.looks[4]] == [(LEG_S, DroneState.ASIDE), (2 * LEG_S, DroneState.FLIES)]
     colours = tracks_of(page(scene))["5 R5.1/body/<object>.material.color"]
     assert colours[-1][1] == pytest.approx(colours[0][1])
 
@@ -219,7 +219,7 @@ def test_the_flight_of_a_scenario_is_flown_here_if_need_be() -> None:
 def test_who_falls_turns_red_and_stays_where_it_lies() -> None:
     scene = shown(falls={1: 3.0})
     assert scene.film
-    assert scene.film.looks[1] == ((3.0, Look.FALLEN),)
+    assert scene.film.looks[1] == ((3.0, DroneState.FALLEN),)
     html = page(scene)
     assert film_in(html)["marks"] == [{"at": 3.0, "drone": 1, "says": "motor 2 stopped"}]
     tracks = tracks_of(html)
@@ -231,19 +231,19 @@ def test_who_falls_turns_red_and_stays_where_it_lies() -> None:
 def test_what_the_flight_tells_of_one_that_falls_is_understood() -> None:
     outcome = epochs_of_three()
     mission = mission_of(outcome, five())
-    failure = Failure(mission.drones[1].name, 3.0, 1)
-    scene = scene_of(outcome, mission, fly(mission, Conditions(failures=(failure,))))
+    failure = MotorFailure(mission.drones[1].name, 3.0, 1)
+    scene = scene_of(outcome, mission, fly(mission, FlightConditions(failures=(failure,))))
     assert scene.film
     ((at_s, look),) = scene.film.looks[1]
     assert at_s == pytest.approx(3.0, abs=0.05)
-    assert look is Look.FALLEN
+    assert look is DroneState.FALLEN
     assert "motor" in dict(scene.facts)["fallen"]
 
 
 def test_who_has_fallen_does_not_turn_grey_later() -> None:
     scene = shown(falls={4: 1.0})
     assert scene.film
-    assert scene.film.looks[4] == ((1.0, Look.FALLEN),)
+    assert scene.film.looks[4] == ((1.0, DroneState.FALLEN),)
 
 
 def test_obstacles_are_boxes_in_their_cells() -> None:
@@ -276,8 +276,8 @@ def test_obstacles_appear_when_they_are_seen() -> None:
 def test_what_happened_is_told_in_its_order() -> None:
     outcome = epochs_of_three()
     mission = mission_of(outcome)
-    seen = (Happening(4.0, 0, "second"), Happening(1.0, 2, "first"))
-    scene = scene_of(outcome, mission, replace(straight(mission), happenings=seen))
+    seen = (FlightEvent(4.0, 0, "second"), FlightEvent(1.0, 2, "first"))
+    scene = scene_of(outcome, mission, replace(straight(mission), events=seen))
     assert [mark["says"] for mark in film_in(page(scene))["marks"]] == ["first", "second"]
 
 
@@ -324,7 +324,7 @@ def test_a_flight_whose_legs_are_others_still_plays() -> None:
     outcome = epochs_of_three()
     mission = mission_of(outcome)
     flown = straight(mission)
-    html = page(scene_of(outcome, mission, replace(flown, stages=flown.stages[:1])))
+    html = page(scene_of(outcome, mission, replace(flown, legs=flown.legs[:1])))
     assert len(film_in(html)["chapters"]) == 1
 
 
@@ -334,8 +334,8 @@ def test_a_flight_whose_legs_are_others_still_plays() -> None:
 def test_hostile_names_and_words_stay_text() -> None:
     outcome = Outcome(HOSTILE, HOSTILE, "processes", 0, Verdict.SOLUTION, {HOSTILE: 1, "__proto__": 2, "\ud800": 3})
     mission = mission_of(outcome)
-    seen = (Happening(1.0, 0, HOSTILE),)
-    html = page(scene_of(outcome, mission, replace(straight(mission), happenings=seen)))
+    seen = (FlightEvent(1.0, 0, HOSTILE),)
+    html = page(scene_of(outcome, mission, replace(straight(mission), events=seen)))
     assert b"<img" not in html
     assert html.count(b"</script>") == 4
     film = film_in(html)

@@ -28,7 +28,7 @@ from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Team, Topic, Variable
 from robochoc.view.live import serve
 from robochoc.view.page import page
-from robochoc.view.scene import Drone, Scene
+from robochoc.view.scene import DrawnDrone, Scene
 from tests.support.flights import scene_of, straight
 
 HOSTILE = "</script><img src=x onerror=alert(1)>/../__proto__"
@@ -58,7 +58,7 @@ def queens(n: int) -> dict[str, int]:
     return {f"V{i}.{j}": (3 * i + 5 * j) % n + 1 for i in range(1, n + 1) for j in range(1, n + 1)}
 
 
-def by_name(scene: Scene) -> dict[str, Drone]:
+def by_name(scene: Scene) -> dict[str, DrawnDrone]:
     return {drone.name: drone for drone in scene.drones}
 
 

@@ -11,10 +11,10 @@ import pytest
 
 from robochoc.flight.layout import Point
 from robochoc.flight.quadrotor.airframe import GRAVITY, HUMMINGBIRD, Airframe, Array
-from robochoc.flight.quadrotor.bodies import Bodies
 from robochoc.flight.quadrotor.control import Controller
+from robochoc.flight.quadrotor.rigid_bodies import RigidBodies
 from robochoc.flight.quadrotor.simulation import DT
-from robochoc.flight.routes.timetable import plan
+from robochoc.flight.routes.timetable import plan_routes
 
 CALM = np.zeros((3, 1))
 OFF = np.zeros((4, 1))
@@ -23,15 +23,15 @@ FREE = replace(HUMMINGBIRD, drag=0.0)
 UNEVEN = replace(FREE, inertia=(0.006, 0.008, 0.013))
 
 
-def airborne(place: Point = (0.0, 0.0, 10.0), airframe: Airframe = HUMMINGBIRD, dt: float = DT) -> Bodies:
+def airborne(place: Point = (0.0, 0.0, 10.0), airframe: Airframe = HUMMINGBIRD, dt: float = DT) -> RigidBodies:
     """One body in the air, its motors off."""
-    bodies = Bodies(np.array([place]), 0.0, airframe, dt)
+    bodies = RigidBodies(np.array([place]), 0.0, airframe, dt)
     bodies.stands[:] = False
     return bodies
 
 
 def ride(
-    bodies: Bodies,
+    bodies: RigidBodies,
     reference: Callable[[float], Array],
     seconds: float,
     *,
@@ -59,7 +59,7 @@ def still(place: Point) -> Callable[[float], Array]:
 
 def moving(start: Point, goal: Point) -> tuple[Callable[[float], Array], float]:
     """A planned way, and how long it takes."""
-    way = plan(np.array([start]), np.array([goal]), distance=0.5)
+    way = plan_routes(np.array([start]), np.array([goal]), distance=0.5)
 
     def reference(s: float) -> Array:
         motion = way.at(s)
@@ -124,7 +124,7 @@ def test_a_free_body_keeps_its_energy_and_its_spin() -> None:
 
 
 def test_the_ground_holds_who_stands_and_takes_up_who_lands_softly() -> None:
-    standing = Bodies(np.array([[1.0, 2.0, 0.0]]), 0.0, HUMMINGBIRD, DT)
+    standing = RigidBodies(np.array([[1.0, 2.0, 0.0]]), 0.0, HUMMINGBIRD, DT)
     for _ in range(100):
         standing.step(np.full((4, 1), 0.9 * HOVER), np.array([[20.0], [0], [0]]))
     assert standing.state[:, 0].tolist() == [1, 2, 0, 0, 0, 0]
@@ -197,7 +197,7 @@ def test_a_drone_recovers_from_being_upside_down() -> None:
 @pytest.mark.parametrize(("wind", "most"), [(0.0, 0.01), (5.0, 0.07)])
 def test_tracking_stays_within_the_margin_of_plans(wind: float, most: float) -> None:
     reference, lasts = moving((0.0, 0.0, 0.0), (3.0, 2.0, 3.0))
-    bodies = Bodies(np.zeros((1, 3)), 0.0, HUMMINGBIRD, DT)
+    bodies = RigidBodies(np.zeros((1, 3)), 0.0, HUMMINGBIRD, DT)
     places = ride(bodies, reference, lasts, air=np.array([[wind], [0], [0]]))
     wanted = np.array([reference((step + 1) * DT)[:3, 0] for step in range(len(places))])
     assert np.sqrt(np.square(places - wanted).sum(1)).max() < most
@@ -214,7 +214,7 @@ def test_ten_times_as_many_steps_make_no_difference() -> None:
     air = np.array([[3.0], [0], [0]])
     one, ten = (
         ride(
-            Bodies(np.zeros((1, 3)), 0.0, HUMMINGBIRD, DT / steps),
+            RigidBodies(np.zeros((1, 3)), 0.0, HUMMINGBIRD, DT / steps),
             reference,
             2.2,
             air=air,

@@ -35,7 +35,7 @@ class _Command(Protocol):
     def lower(self) -> dict[str, Any]: ...
 
 
-class Recorder:
+class MeshcatCommands:
     """Draws by meshcat into `commands`: the packed messages that make its viewer show the same, in their order.
 
     Paths are meshcat's: names joined by `/`, below `/meshcat` unless they begin with `/`. The same calls make the

@@ -96,7 +96,7 @@ class Program:
         self._process.wait()
 
 
-class Site:
+class Deployment:
     """Machines around one master at `place`, with an Authority, below `folder`. A context manager: none outlives it.
 
     `inside` is put before a command: what starts it elsewhere.
@@ -190,7 +190,7 @@ def ended(programs: Mapping[str, Program], status: int = 0) -> None:
     assert not others, others
 
 
-def written(team: Team, site: Site) -> Path:
+def written(team: Team, site: Deployment) -> Path:
     folder = site.folder / "files"
     write_team(team, folder)
     return folder

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from robochoc.flight.cells import in_cells
 from robochoc.flight.layout import Point
-from robochoc.flight.log import Flown, Happening
+from robochoc.flight.log import FlightEvent, FlightLog
 from robochoc.flight.mission import Leg, Mission
 from robochoc.model.outcome import Verdict
 
@@ -24,7 +24,7 @@ _HIT = "hits the ground"
 _Array = npt.NDArray[np.float64]
 
 
-class Look(StrEnum):
+class DroneState(StrEnum):
     """What a drone looks like: in the colour of its row, or grey, or red."""
 
     FLIES = "flies"
@@ -42,7 +42,7 @@ class Chapter:
 
 
 @dataclass(frozen=True)
-class Mark:
+class EventMark:
     """Something that happened to a drone, by its number."""
 
     at_s: float
@@ -51,7 +51,7 @@ class Mark:
 
 
 @dataclass(frozen=True, eq=False)
-class Film:
+class Playback:
     """A flight to be shown. Arrays have a row for each of T times, and in it one for each of N drones.
 
     `looks` are for each drone its changes, in order: from when on it looks how.
@@ -62,9 +62,9 @@ class Film:
     """(T, N, 3)"""
     attitudes: _Array
     """(T, N, 4): unit quaternions x, y, z, w."""
-    looks: tuple[tuple[tuple[float, Look], ...], ...]
+    looks: tuple[tuple[tuple[float, DroneState], ...], ...]
     chapters: tuple[Chapter, ...] = ()
-    marks: tuple[Mark, ...] = ()
+    marks: tuple[EventMark, ...] = ()
     obstacles: tuple[tuple[float, Point], ...] = ()
     """Since when each is seen, and where it is."""
 
@@ -74,11 +74,11 @@ class Film:
         return float(self.times[-1]) if len(self.times) else 0.0
 
 
-def film_of(mission: Mission, flown: Flown) -> Film:
+def playback_of(mission: Mission, flown: FlightLog) -> Playback:
     """How `flown` looks in the box of `mission`, whose drones it flew."""
-    marks = [Mark(happening.at_s, happening.drone, happening.what) for happening in flown.happenings]
+    marks = [EventMark(event.at_s, event.drone, event.what) for event in flown.events]
     obstacles = [in_cells(mission, np.array(place)) for place in flown.obstacles]
-    return Film(
+    return Playback(
         flown.times,
         in_cells(mission, flown.positions),
         flown.attitudes,
@@ -92,38 +92,38 @@ def film_of(mission: Mission, flown: Flown) -> Film:
     )
 
 
-def fell(flown: Flown) -> dict[int, Happening]:
+def fell(flown: FlightLog) -> dict[int, FlightEvent]:
     """Who lies fallen in the end, and what made it fall: the last that happened to it before it hit the ground."""
-    told: dict[int, list[Happening]] = {}
-    for happening in flown.happenings:
-        if np.isnan(flown.errors_m[happening.drone]):
-            told.setdefault(happening.drone, []).append(happening)
+    told: dict[int, list[FlightEvent]] = {}
+    for event in flown.events:
+        if np.isnan(flown.errors_m[event.drone]):
+            told.setdefault(event.drone, []).append(event)
     for own in told.values():
         if len(own) > 1 and own[-1].what == _HIT:
             own.pop()
     return {number: own[-1] for number, own in told.items()}
 
 
-def _looks(number: int, mission: Mission, flown: Flown) -> Iterator[tuple[float, Look]]:
+def _looks(number: int, mission: Mission, flown: FlightLog) -> Iterator[tuple[float, DroneState]]:
     fallen = fell(flown).get(number)
     falls_s = fallen.at_s if fallen else np.inf
-    now = Look.FLIES
+    now = DroneState.FLIES
     for leg, begins_s in _begun(mission, flown):
         goal = leg.goals.get(number)
-        then = now if goal is None else Look.ASIDE if goal.lands else Look.FLIES
+        then = now if goal is None else DroneState.ASIDE if goal.lands else DroneState.FLIES
         if then is not now and begins_s < falls_s:
             yield begins_s, then
             now = then
     if fallen:
-        yield falls_s, Look.FALLEN
+        yield falls_s, DroneState.FALLEN
 
 
-def _begun(mission: Mission, flown: Flown) -> list[tuple[Leg, float]]:
+def _begun(mission: Mission, flown: FlightLog) -> list[tuple[Leg, float]]:
     """The legs that were flown, and when each began."""
-    return [(leg, stage.begins_s) for leg, stage in zip(mission.legs, flown.stages, strict=False)]
+    return [(leg, times.begins_s) for leg, times in zip(mission.legs, flown.legs, strict=False)]
 
 
-def _chapters(mission: Mission, flown: Flown) -> Iterator[Chapter]:
+def _chapters(mission: Mission, flown: FlightLog) -> Iterator[Chapter]:
     flying: set[int] = set()
     for leg, begins_s in _begun(mission, flown):
         for number, goal in leg.goals.items():

@@ -1,4 +1,4 @@
-"""What a synchronous local search has come by, cycle by cycle."""
+"""Runs of synchronous local search, cycle by cycle."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def domains_of(team: Team) -> dict[str, list[int]]:
     return domains
 
 
-def course_of(team: Team, result: RunResult) -> list[Assignment]:
+def assignments_by_cycle(team: Team, result: RunResult) -> list[Assignment]:
     """The values that all robots had in each cycle."""
     domains = domains_of(team)
     trails = {team[name].variables[0].name: found.trail for name, found in result.findings.items()}
@@ -80,7 +80,7 @@ def course_of(team: Team, result: RunResult) -> list[Assignment]:
     return course
 
 
-def burden_of(team: Team, assignment: Assignment) -> Burden:
+def cost_of_assignment(team: Team, assignment: Assignment) -> Burden:
     """How many constraints `assignment` breaks, and what the others charge."""
     prices = [constraint.price(assignment) for constraint in team.constraints()]
     return prices.count(INFINITE), sum(price for price in prices if price < INFINITE)
@@ -88,8 +88,8 @@ def burden_of(team: Team, assignment: Assignment) -> Burden:
 
 def is_optimal(team: Team, assignment: Assignment, together: int) -> bool:
     """Whether no `together` neighbours can do better by moving at once (k-optimality; Pearce, Tambe 2007)."""
-    now = burden_of(team, assignment)
-    return all(burden_of(team, other) >= now for other in _moves(team, assignment, together))
+    now = cost_of_assignment(team, assignment)
+    return all(cost_of_assignment(team, other) >= now for other in _moves(team, assignment, together))
 
 
 def _moves(team: Team, assignment: Assignment, together: int) -> Iterator[Assignment]:

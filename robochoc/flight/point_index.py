@@ -13,7 +13,7 @@ _A_HAIR_MORE = 1 + 1e-9
 """What lies just beyond a cube's side may still be near: distances are rounded."""
 
 
-class Places:
+class PointIndex:
     """Points, kept by the unit cube in which they lie. The same point may be there several times."""
 
     def __init__(self) -> None:

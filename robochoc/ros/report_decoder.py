@@ -13,8 +13,8 @@ from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.names import REPORTS, Names
-from robochoc.ros.source import Heard
+from robochoc.ros.names import REPORTS, TopicNames
+from robochoc.ros.source import ReceivedMessage
 
 LONGEST = 200
 """Characters of a reason that are kept."""
@@ -22,7 +22,7 @@ _FAR_M = 1e9
 """Nothing is further away than that: coordinates beyond it are no places."""
 
 
-class Reading:
+class ReportDecoder:
     """Reads what `drones` report. Raises `NameClashError` where their topics cannot be told apart.
 
     Places count in `frame`; a message that names no frame is taken to mean it.
@@ -34,7 +34,7 @@ class Reading:
     """Topics on which places came in another frame, and the last one of these."""
 
     def __init__(self, drones: Sequence[Drone], frame: str) -> None:
-        names = Names(drones)
+        names = TopicNames(drones)
         self._frame = frame.removeprefix("/")
         self._told = {
             f"{names.space(number)}/{token}": (drone.name, token)
@@ -44,7 +44,7 @@ class Reading:
         self.topics = {topic: REPORTS[token] for topic, (_, token) in self._told.items()}
         self.strange = {}
 
-    def report(self, heard: Heard) -> Report | None:
+    def report(self, heard: ReceivedMessage) -> Report | None:
         """What the message reports, at the time at which it was received; None where it says nothing."""
         drone, token = self._told.get(heard.topic, ("", ""))
         at_s = heard.at_ns / 1e9
@@ -65,7 +65,7 @@ class Reading:
             case _:
                 return None
 
-    def _place(self, heard: Heard, *path: str) -> Point | None:
+    def _place(self, heard: ReceivedMessage, *path: str) -> Point | None:
         """The point that stands at `path` in the message, if it is one of our frame."""
         frame = _at(heard.fields, ("header",)).get("frame_id")
         if isinstance(frame, str) and frame.removeprefix("/") not in {"", self._frame}:

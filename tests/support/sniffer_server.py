@@ -1,4 +1,4 @@
-"""A journal, and a server of it in a thread, to be asked as a browser would."""
+"""A sniffer's server in a thread, which tests ask as a browser would."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.orchestrator import solve
 from robochoc.sniffer.server import Server
 from robochoc.sniffer.session import Session
-from robochoc.view.address import listening, url_of
+from robochoc.view.address import loopback_socket, url_of
 
 TOKEN = "a-path-that-nobody-guesses"  # noqa: S105 - it is for tests
 
 
-def told(runtime: Runtime = Runtime.SIMULATOR, n: int = 4) -> tuple[list[AnyEvent], Outcome]:
-    """The events of a run, as they came, and its outcome."""
+def run_events(runtime: Runtime = Runtime.SIMULATOR, n: int = 4) -> tuple[list[AnyEvent], Outcome]:
+    """Return the events of a run, in their order, and its outcome."""
     events: list[AnyEvent] = []
     options = Options(runtime=runtime, protocol="abt", withdraw=Withdrawal.MAXIMAL)
     return events, solve(queens3d(n), options, observer=events.append)
@@ -44,7 +44,7 @@ def journal_of(events: list[AnyEvent], outcome: Outcome | None, of: Header | Non
     return recorder.content()
 
 
-class Served:
+class SnifferServer:
     """A server that runs in a thread of its own. `get` asks it for an answer."""
 
     def __init__(self, session: Session) -> None:
@@ -70,7 +70,7 @@ class Served:
             runner.run(self._serve())
 
     async def _serve(self) -> None:
-        with listening() as here:
+        with loopback_socket() as here:
             self.port = here.getsockname()[1]
             self.url = url_of(here, f"{TOKEN}/")
             self.server = Server(self._session, here, TOKEN, self._count)
@@ -104,6 +104,6 @@ class Served:
 
 
 @contextmanager
-def served(session: Session) -> Iterator[Served]:
-    with Served(session) as server:
+def sniffer_server(session: Session) -> Iterator[SnifferServer]:
+    with SnifferServer(session) as server:
         yield server

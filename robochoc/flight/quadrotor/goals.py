@@ -12,14 +12,14 @@ import numpy as np
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Goal
 from robochoc.flight.quadrotor.airframe import Array
-from robochoc.flight.quadrotor.bodies import Mask
 from robochoc.flight.quadrotor.conditions import LEAST_M
-from robochoc.flight.quadrotor.spots import free_spot, gaps, nearest_two
+from robochoc.flight.quadrotor.free_points import free_point, nearest_distances, nearest_two
+from robochoc.flight.quadrotor.rigid_bodies import Mask
 from robochoc.flight.routes.spacing import SLACK_M
 
 MARGIN_M = 0.1
 """Plans keep so much more than the distance. Tracking takes 1 cm of it in calm air, and 6 cm where a drone takes off
-into a wind of 5 m/s (`tests/unit/flight/test_bodies.py`); two drones may use it up towards each other."""
+into a wind of 5 m/s (`tests/unit/flight/test_rigid_bodies.py`); two drones may use it up towards each other."""
 _ALL_BUT = 0.999
 """Of what starts and goals leave: rounding must not make a plan impossible."""
 _STAGGER_S = 2.0
@@ -40,7 +40,7 @@ class Hazards:
         return bool((np.sqrt(np.square(self.points - place).sum(1)) < self.radii).any())
 
 
-class Targets:
+class LegGoals:
     """The `places` (N, 3) to fly to: the `goals`, or where drones are (`starts`) that have none.
 
     Two goals that are nearer to each other than `distance` raise `ValueError`. Those that are lost do not count.
@@ -55,13 +55,13 @@ class Targets:
         for number, goal in self.goals.items():
             self.places[number] = goal.at
         self._distance = distance
-        check_apart("goals", names, {number: goal.at for number, goal in self.goals.items()}, distance)
+        check_separation("goals", names, {number: goal.at for number, goal in self.goals.items()}, distance)
 
     def planned(self, starts: Array, hazards: Hazards | None = None) -> float:
         """The distance that a plan from `starts` (N, 3) keeps: with a margin, or as much of it as all places leave."""
         leave = min(nearest_two(starts[self.who]), nearest_two(self.places[self.who]))
         if hazards is not None:
-            apart = gaps(hazards.points, self._ends(starts))
+            apart = nearest_distances(hazards.points, self._ends(starts))
             leave = min(leave, float(apart[apart >= self._distance].min(initial=np.inf)))
         return max(self._distance, min(self._distance + MARGIN_M, _ALL_BUT * leave))
 
@@ -78,21 +78,24 @@ class Targets:
             others = self.places[self.who[self.who != number]]
             if goal is not None and hazards.meet(place):
                 why = "something is there"
-            elif goal is None and gaps(place[None], self.places[going])[0] < needed(self._distance) - SLACK_M:
+            elif (
+                goal is None
+                and nearest_distances(place[None], self.places[going])[0] < needed(self._distance) - SLACK_M
+            ):
                 why = "another one flies to where it is"
             else:
                 continue
             low = goal.lands if goal is not None else place[2] <= ground + _LOW_M
             radii = np.full(len(others), self._distance + MARGIN_M)
             taken = Hazards(np.vstack((others, hazards.points)), np.concatenate((radii, hazards.radii)))
-            self.places[number] = free_spot(wishes[number], taken.points, taken.radii, ground, low=bool(low))
+            self.places[number] = free_point(wishes[number], taken.points, taken.radii, ground, low=bool(low))
             aside = float(np.sqrt(np.square(self.places[number] - place).sum()))
             told.append((number, f"{'lands' if low else 'hovers'} {aside:.2f} m aside: {why}"))
         return told
 
     def standing(self, hazards: Hazards, starts: Array, planned: float) -> Array:
         """Those of the hazards that a plan can avoid: nobody starts or stays too near."""
-        return np.asarray(hazards.points[gaps(hazards.points, self._ends(starts)) >= planned])
+        return np.asarray(hazards.points[nearest_distances(hazards.points, self._ends(starts)) >= planned])
 
     def _ends(self, starts: Array) -> Array:
         return np.vstack((starts[self.who], self.places[self.who]))
@@ -103,7 +106,7 @@ def needed(distance: float) -> float:
     return distance + min(MARGIN_M, distance / 4)
 
 
-def check_apart(what: str, names: Sequence[str], places: Mapping[int, Point], distance: float) -> None:
+def check_separation(what: str, names: Sequence[str], places: Mapping[int, Point], distance: float) -> None:
     """That no two `places`, by drones' numbers, are too near to each other to keep `distance`. Raises `ValueError`."""
     least = needed(distance) - SLACK_M
     if nearest_two(np.array([*places.values()]).reshape(-1, 3)) >= least:
@@ -123,7 +126,7 @@ def check_apart(what: str, names: Sequence[str], places: Mapping[int, Point], di
             )
 
 
-def waits(goals: Mapping[int, Goal], homes: Array) -> Array:
+def start_delays(goals: Mapping[int, Goal], homes: Array) -> Array:
     """(N,) in seconds: those that land begin, then row by row, by the x of their homes."""
     lands = np.array([number in goals and goals[number].lands for number in range(len(homes))])
     _, rows = np.unique(homes[:, 0], return_inverse=True)

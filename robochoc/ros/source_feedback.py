@@ -1,17 +1,17 @@
-"""Senses that listen to a source: robots that report over a ROS, or a recording of what they have reported."""
+"""Feedback from a source: robots that report over a ROS, or a recording of what they have reported."""
 
 from __future__ import annotations
 
 import time
 from itertools import starmap
 
-from robochoc.flight.mission import Cast, Leg
+from robochoc.flight.mission import Leg, MissionBuilder
 from robochoc.flight.reports import Report
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.closed_loop import TOGETHER_S, Senses
+from robochoc.ros.closed_loop import TOGETHER_S, Feedback
 from robochoc.ros.mappings import short_kind
 from robochoc.ros.names import REPORTS
-from robochoc.ros.reading import Reading
+from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.source import Source
 
 PATIENCE_S = 10.0
@@ -21,14 +21,14 @@ _SLICE_S = 0.2
 """How often somebody who watches is told that we wait."""
 
 
-class Listening(Senses):
+class SourceFeedback(Feedback):
     """What `source` gives, read by `reading`.
 
     After each decision a live source has `patience_s` seconds for a report that changes something; then the run is
     over. A recording is read to its end, as fast as it goes: its messages' times are the clock.
     """
 
-    def __init__(self, source: Source, reading: Reading, patience_s: float = PATIENCE_S) -> None:
+    def __init__(self, source: Source, reading: ReportDecoder, patience_s: float = PATIENCE_S) -> None:
         self._source = source
         self._reading = reading
         self._patience_s = patience_s
@@ -41,7 +41,7 @@ class Listening(Senses):
 
     @property
     def notes(self) -> list[str]:
-        """See `Senses.notes`: places in a frame that is not ours, and what of a recording nobody could use."""
+        """See `Feedback.notes`: places in a frame that is not ours, and what of a recording nobody could use."""
         frames = [
             f"places on {topic} are in the frame '{frame}', and were passed over (--frame says which is ours)"
             for topic, frame in self._reading.strange.items()
@@ -60,17 +60,17 @@ class Listening(Senses):
         return ""
 
     def now_ns(self) -> int:
-        """See `Senses.now_ns`: the wall clock's, or that of the recording."""
+        """See `Feedback.now_ns`: the wall clock's, or that of the recording."""
         return time.time_ns() if self._source.live or self._now_ns is None else self._now_ns
 
-    def decided(self, cast: Cast, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - the robots were told
-        """See `Senses.decided`."""
+    def decided(self, cast: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - the robots were told
+        """See `Feedback.decided`."""
         limits = [left_s, self._patience_s if self._source.live else None]
         wait_s = min((limit for limit in limits if limit is not None), default=None)
         self._deadline = None if wait_s is None else time.monotonic() + wait_s
 
     def next(self, until_s: float | None) -> Report | None:
-        """See `Senses.next`."""
+        """See `Feedback.next`."""
         deadline = self._deadline
         if until_s is not None and self._source.live:
             soon = time.monotonic() + min(max(until_s - time.time(), 0), TOGETHER_S)

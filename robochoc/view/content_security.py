@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Iterable
 
 
-def policy(scripts: Iterable[str], connections: str = "'none'") -> str:
+def content_security_policy(scripts: Iterable[str], connections: str = "'none'") -> str:
     """The policy of a page with these `scripts`, that may ask `connections` (CSP's words) for data.
 
     Styles may stand in the page, as meshcat's viewer makes some of its own.

@@ -6,14 +6,14 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from robochoc.view.film import Film
+from robochoc.view.drawing import cell_of, corners, paints, path_of, tint
 from robochoc.view.label import printable
 from robochoc.view.palette import web
+from robochoc.view.playback import Playback
 from robochoc.view.scene import Scene
-from robochoc.view.stage import cell_of, corners, paints, path_of, tint
 
 
-def film_json(scene: Scene) -> str:
+def playback_json(scene: Scene) -> str:
     """The drones, by their names, paths and colours; the epochs and what happened, by when; and the room they take.
 
     Times are in seconds, `corners` and `cell` in meshcat's frame as `stage` scales it. Names are strangers': they are
@@ -40,7 +40,7 @@ def _drones(scene: Scene) -> Iterator[dict[str, Any]]:
         }
 
 
-def _story(film: Film) -> dict[str, Any]:
+def _story(film: Playback) -> dict[str, Any]:
     return {
         "duration": round(film.duration_s, 4),
         "chapters": [

@@ -1,4 +1,4 @@
-"""Who listens where a server was expected, and is none."""
+"""A listener that is not the server that clients expect."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ from contextlib import ExitStack, contextmanager, suppress
 
 
 @contextmanager
-def stranger(answer: bytes, *, hangs_up: bool) -> Iterator[int]:
-    """Yield the port of a listener that says `answer` to everybody; it hangs up then, or never until it is left."""
+def fake_server(answer: bytes, *, hangs_up: bool) -> Iterator[int]:
+    """Yield the port of a listener that sends `answer` to every client.
+
+    It then closes the connection, or at the end.
+    """
     with ExitStack() as kept, socket.create_server(("127.0.0.1", 0)) as listener:
 
         def serve() -> None:

@@ -31,6 +31,6 @@ def recorded(protocol: str, n: int = 3, schedule: ScheduleName = ScheduleName.CO
 
 
 @cache
-def fed(protocol: str, n: int = 3) -> Feed:
+def feed_of(protocol: str, n: int = 3) -> Feed:
     """The feed of that run."""
     return Feed(Trace.of(recorded(protocol, n)))

@@ -1,4 +1,4 @@
-"""Journals as tests look at them."""
+"""The entries of a journal in words, as JSON."""
 
 from __future__ import annotations
 

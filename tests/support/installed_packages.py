@@ -1,4 +1,4 @@
-"""As if packages had been installed that offer something."""
+"""Entry points that no installed package has."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from importlib.metadata import EntryPoint
 import pytest
 
 
-def offered(monkeypatch: pytest.MonkeyPatch, group: str, **places: str | list[str]) -> None:
-    """As if packages offered these under `group`, and nothing else was installed; several places: several packages."""
+def install_entry_points(monkeypatch: pytest.MonkeyPatch, group: str, **places: str | list[str]) -> None:
+    """Make `places` the entry points of `group`, the only ones. Several places of a name: as of several packages."""
     found = [
         EntryPoint(name, place, group)
         for name, some in places.items()

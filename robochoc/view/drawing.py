@@ -12,13 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from robochoc.flight.layout import Axis, Point
-from robochoc.view.film import Film, Look
 from robochoc.view.keyframes import Keys, Samples, angle, attitude_keys, position_keys
 from robochoc.view.label import label
+from robochoc.view.meshcat_commands import MeshcatCommands, Track
 from robochoc.view.palette import GREY, RED, Colour, colours
+from robochoc.view.playback import DroneState, Playback
 from robochoc.view.quadrotor import HUB, Shape, box, disc, joined, quadrotor
-from robochoc.view.recorder import Recorder, Track
-from robochoc.view.scene import Drone, Scene
+from robochoc.view.scene import DrawnDrone, Scene
 
 _Corners = npt.NDArray[np.float64]
 """The lowest and the highest x, y and z of something, a row each."""
@@ -91,9 +91,9 @@ def cell_of(scene: Scene) -> float:
     return 1 / _measured(scene)[1]
 
 
-def _drawn(scene: Scene, points: Sequence[Point]) -> Recorder:
+def _drawn(scene: Scene, points: Sequence[Point]) -> MeshcatCommands:
     """Everything, each drone at its point of `points`."""
-    recorder = Recorder()
+    recorder = MeshcatCommands()
     extent, radius = _measured(scene)
     _aim(recorder, extent, radius)
     _draw_ground(recorder, scene, extent)
@@ -120,7 +120,7 @@ def _corners(extent: _Corners) -> _Corners:
     return np.array([*product(*extent.T)])
 
 
-def _aim(recorder: Recorder, extent: _Corners, radius: float) -> None:
+def _aim(recorder: MeshcatCommands, extent: _Corners, radius: float) -> None:
     """Scale any scene to radius 1 around the origin, where the lights are, and have the camera see all of it."""
     x, y, z = (float(part) for part in -extent.mean(axis=0) / radius)
     recorder.place("", (x, y, z), (1 / radius, 1 / radius, 1 / radius))
@@ -143,7 +143,7 @@ def _from_where_to_see(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float
     return back * float(distance.max())
 
 
-def _draw_ground(recorder: Recorder, scene: Scene, extent: _Corners) -> None:
+def _draw_ground(recorder: MeshcatCommands, scene: Scene, extent: _Corners) -> None:
     """A plane, and on it each drone's pad in the colour of its row."""
     (left, front, _), (right, back, _) = extent
     corners = np.array([[left, front, 0], [right, front, 0], [right, back, 0], [left, back, 0]])
@@ -157,7 +157,7 @@ def _draw_ground(recorder: Recorder, scene: Scene, extent: _Corners) -> None:
         recorder.place("ground/pads", (0, 0, -0.01))
 
 
-def _draw_box(recorder: Recorder, axes: Sequence[Axis]) -> None:
+def _draw_box(recorder: MeshcatCommands, axes: Sequence[Axis]) -> None:
     """The edges, the walls behind and below with their grid, and very faintly every cell."""
     low, high = _box(axes)
     walls = [np.arange(a, b + 0.5) for a, b in zip(low, high, strict=True)]
@@ -172,7 +172,7 @@ def _draw_box(recorder: Recorder, axes: Sequence[Axis]) -> None:
         recorder.segments(f"box/{name}", _lattice(lines), _LINE, opacity)
 
 
-def _label_axes(recorder: Recorder, axes: Sequence[Axis], height: float) -> None:
+def _label_axes(recorder: MeshcatCommands, axes: Sequence[Axis], height: float) -> None:
     """Each named axis' name and numbers, beside the edge of the box that is nearest to the viewer."""
     for number, axis, origin, name_at in _beside(axes, height):
         for at, text in axis.ticks:
@@ -208,7 +208,9 @@ def _lattice(walls: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64
     return np.concatenate(ends)
 
 
-def _draw_drones(recorder: Recorder, drones: Sequence[Drone], points: Sequence[Point], radius: float) -> None:
+def _draw_drones(
+    recorder: MeshcatCommands, drones: Sequence[DrawnDrone], points: Sequence[Point], radius: float
+) -> None:
     texts = _texts([drone.name for drone in drones], _READABLE * radius)
     drawn = zip(drones, points, texts, paints(drones), strict=True)
     for number, (drone, point, text, colour) in enumerate(drawn):
@@ -220,14 +222,14 @@ def _draw_drones(recorder: Recorder, drones: Sequence[Drone], points: Sequence[P
         recorder.place(path, point)
 
 
-def _draw_obstacles(recorder: Recorder, obstacles: Sequence[Point]) -> None:
+def _draw_obstacles(recorder: MeshcatCommands, obstacles: Sequence[Point]) -> None:
     for number, place in enumerate(obstacles, 1):
         recorder.mesh(f"obstacles/{number}/body", box(place, _IN_THE_WAY), RED, opacity=_OPACITIES["body"])
         sides = [np.array([at - _IN_THE_WAY / 2, at + _IN_THE_WAY / 2]) for at in place]
         recorder.segments(f"obstacles/{number}/edges", _lattice(sides), RED, _OPACITIES["edges"])
 
 
-def _animate(recorder: Recorder, drones: Sequence[Drone], film: Film) -> None:
+def _animate(recorder: MeshcatCommands, drones: Sequence[DrawnDrone], film: Playback) -> None:
     paint = paints(drones)
     tracks: list[Track] = []
     for number, (drone, colour) in enumerate(zip(drones, paint, strict=True)):
@@ -245,7 +247,7 @@ def _animate(recorder: Recorder, drones: Sequence[Drone], film: Film) -> None:
         recorder.animate(tracks, FPS)
 
 
-def _moves(path: str, film: Film, number: int) -> Iterator[Track]:
+def _moves(path: str, film: Playback, number: int) -> Iterator[Track]:
     """How a drone moves and tilts, if it does at all."""
     frames = FPS * film.times
     positions, attitudes = film.positions[:, number], film.attitudes[:, number]
@@ -260,7 +262,7 @@ def _keys(frames: Samples, values: Samples, keys: Keys) -> list[tuple[float, lis
     return [*zip(frames[keys].round(6).tolist(), values[keys].tolist(), strict=True)]
 
 
-def _painting(path: str, looks: Sequence[tuple[float, Look]], colour: Colour) -> Track:
+def _painting(path: str, looks: Sequence[tuple[float, DroneState]], colour: Colour) -> Track:
     """How a drone changes its colour."""
     keys: list[tuple[float, Colour]] = [(0, colour)]
     for at_s, look in looks:
@@ -284,28 +286,28 @@ def _texts(names: Sequence[str], readable: float) -> list[str]:
     return [name[len(word) :] for name in names] if numbered else list(names)
 
 
-def _write(recorder: Recorder, path: str, text: str, at: npt.NDArray[np.float64], height: float) -> None:
+def _write(recorder: MeshcatCommands, path: str, text: str, at: npt.NDArray[np.float64], height: float) -> None:
     picture = label(text)
     x, y, z = (float(part) for part in at)
     recorder.sprite(path, picture.svg)
     recorder.place(path, (x, y, z), (height * picture.aspect, height, 1))
 
 
-def paints(drones: Sequence[Drone]) -> list[Colour]:
+def paints(drones: Sequence[DrawnDrone]) -> list[Colour]:
     """The colour of each drone: that of its row."""
     groups = sorted({drone.group for drone in drones})
     shades = dict(zip(groups, colours(len(groups)), strict=True))
     return [shades[drone.group] for drone in drones]
 
 
-def tint(look: Look, colour: Colour) -> Colour:
+def tint(look: DroneState, colour: Colour) -> Colour:
     """What a drone looks like, if it is of that `colour` by itself."""
     match look:
-        case Look.FLIES:
+        case DroneState.FLIES:
             return colour
-        case Look.ASIDE:
+        case DroneState.ASIDE:
             return GREY
-        case Look.FALLEN:
+        case DroneState.FALLEN:
             return RED
         case _ as never:
             assert_never(never)

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.flight.log import Flown
+from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Drone, Leg, Mission
 from robochoc.flight.reports import OutOfOrder, Report
 from robochoc.ros.publisher import Publisher
@@ -20,7 +20,7 @@ SECOND_NS = 1_000_000_000
 POSES_HZ = 20
 
 
-class Outlet:
+class SinkPublisher:
     """Publishes what `drones` of `team` do into one `sink`, and counts. Raises what `Publisher` raises."""
 
     def __init__(self, team: str, drones: Sequence[Drone], sink: Sink, frame: str) -> None:
@@ -63,7 +63,9 @@ class Broadcast:
     def __init__(self) -> None:
         self._ticks = 0
 
-    def tell(self, outlets: Sequence[Outlet], flown: Flown, reports: Sequence[Report], until_s: float) -> None:
+    def tell(
+        self, outlets: Sequence[SinkPublisher], flown: FlightLog, reports: Sequence[Report], until_s: float
+    ) -> None:
         """Publish what was not yet told of `flown` up to `until_s`, and `reports` among it. Raises `SinkError`."""
         untold = deque(reports)
         while (at_s := self._ticks / POSES_HZ) <= until_s:
@@ -77,22 +79,22 @@ class Broadcast:
             _report(outlets, report)
 
 
-def publish_flight(mission: Mission, flown: Flown, outlets: Sequence[Outlet]) -> None:
+def publish_flight(mission: Mission, flown: FlightLog, outlets: Sequence[SinkPublisher]) -> None:
     """Publish a whole flight: each leg's waypoints as it begins, poses, and who falls. Raises `SinkError`."""
     if not outlets:
         return
     fallen = {number for number, error in enumerate(flown.errors_m) if np.isnan(error)}
-    falls = {one.drone: one for one in reversed(flown.happenings) if one.drone in fallen}
+    falls = {one.drone: one for one in reversed(flown.events) if one.drone in fallen}
     reports = sorted((OutOfOrder(flown.names[n], one.what, one.at_s) for n, one in falls.items()), key=lambda r: r.at_s)
     broadcast = Broadcast()
-    begins_s = [0.0, *(stage.begins_s for stage in flown.stages[1:]), flown.simulated_s]
+    begins_s = [0.0, *(times.begins_s for times in flown.legs[1:]), flown.simulated_s]
     for leg, (begin_s, end_s) in zip(mission.legs, pairwise(begins_s), strict=True):
         for outlet in outlets:
             outlet.decide(leg, nanoseconds(begin_s))
         broadcast.tell(outlets, flown, [one for one in reports if begin_s < one.at_s <= end_s], end_s)
 
 
-def _report(outlets: Sequence[Outlet], report: Report) -> None:
+def _report(outlets: Sequence[SinkPublisher], report: Report) -> None:
     for outlet in outlets:
         outlet.report(report)
 

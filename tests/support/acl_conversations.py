@@ -16,8 +16,8 @@ from robochoc.sniffer.acl import ACLMessage, parse, text
 from robochoc.sniffer.conversation import Conversation
 
 PLATFORM = "192.168.1.14:7447/robochoc"
-OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
-EVERY_PROTOCOL = pytest.mark.parametrize("protocol", OURS)
+BUNDLED_PROTOCOLS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
+EVERY_PROTOCOL = pytest.mark.parametrize("protocol", BUNDLED_PROTOCOLS)
 
 
 def types_of(protocol: type[Protocol]) -> tuple[type[Message], ...]:

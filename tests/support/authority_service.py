@@ -1,4 +1,4 @@
-"""The Authority's service on this machine, and what a stranger may say to it."""
+"""The Authority's service on this machine, and what an unknown client may send to it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.support.authorities import Clock, Seen
 SOON_S = 5.0
 
 
-class Desk:
+class AuthorityService:
     """An Authority with its service, whose clock is the machine's plus what a test adds."""
 
     def __init__(self, folder: Path) -> None:
@@ -49,13 +49,13 @@ def open_files() -> int:
     return sum(1 for _ in Path("/proc/self/fd").iterdir())
 
 
-def trusting(desk: Desk) -> ssl.SSLContext:
+def trusting(desk: AuthorityService) -> ssl.SSLContext:
     context = ssl.create_default_context(cadata=pem(desk.authority.certificate).decode())
     context.check_hostname = False
     return context
 
 
-def answered(desk: Desk, raw: bytes, context: ssl.SSLContext | None = None) -> Answer:
+def answered(desk: AuthorityService, raw: bytes, context: ssl.SSLContext | None = None) -> Answer:
     """What the service answers to `raw`, over good TLS."""
     with (
         socket.create_connection(desk.place, SOON_S) as plain,

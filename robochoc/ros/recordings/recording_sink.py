@@ -18,7 +18,7 @@ _END_OF_TIME = (1 << 32) * 10**9
 """Nanoseconds since the epoch that ROS 1 can tell."""
 
 
-class Recorder(Sink):
+class RecordingSink(Sink):
     """Writes a file, which appears in its place when it is closed: whole, or not at all."""
 
     ending: ClassVar[str]

@@ -23,7 +23,7 @@ _LEVELLING_S = 0.1
 """The feet turn a drone that stands upright, with this time constant."""
 
 
-class Bodies:
+class RigidBodies:
     """N drones. `state` is (6, N): position and velocity, in the world's frame, whose z is up.
 
     `axes` is (3, 3, N): `axes[k]` is the body's axis k in the world. `rates` (3, N), rad/s, are about the body's

@@ -28,7 +28,7 @@ MOST_ROBOTS, MOST_VALUES = 7, 4
 VALUES = range(-3, 6)
 
 
-class Author:
+class ScenarioAuthor:
     """Writes scenarios; what robots have left may come again under their old names."""
 
     values = VALUES
@@ -115,10 +115,10 @@ def domains(team: Team) -> dict[str, list[int]]:
     return {name: list(variable.domain) for name, variable in team.variables.items()}
 
 
-def random_journey(chance: Random, events: int = 10, change: Callable[[Team], Team] = lambda team: team) -> Team:
+def random_changing_team(chance: Random, events: int = 10, change: Callable[[Team], Team] = lambda team: team) -> Team:
     """A random team with a scenario of so many events; `change` is made to it before."""
     team = change(random_team(chance))
-    return replace(team, scenario=tuple(Author(chance).scenario(team, events)))
+    return replace(team, scenario=tuple(ScenarioAuthor(chance).scenario(team, events)))
 
 
 def stages(team: Team) -> Iterator[Team]:

@@ -9,18 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robochoc.flight.log import Nearest
+from robochoc.flight.log import ClosestApproach
 from robochoc.flight.mission import Goal
 from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.attitude import quaternions
-from robochoc.flight.quadrotor.course import STOP_S, Course
-from robochoc.flight.quadrotor.separation import Watch
+from robochoc.flight.quadrotor.free_points import free_point, nearest_distances
+from robochoc.flight.quadrotor.goals import Hazards, LegGoals, start_delays
+from robochoc.flight.quadrotor.separation import SeparationMonitor
 from robochoc.flight.quadrotor.simulation import DT
-from robochoc.flight.quadrotor.spots import free_spot, gaps
-from robochoc.flight.quadrotor.targets import Hazards, Targets, waits
+from robochoc.flight.quadrotor.trajectory import STOP_S, Trajectory
 from robochoc.flight.quadrotor.wind import Wind
-from robochoc.flight.routes.motion import Limits
-from robochoc.flight.routes.timetable import plan
+from robochoc.flight.routes.motion import MotionLimits
+from robochoc.flight.routes.timetable import plan_routes
 
 
 def test_gusts_have_the_spread_that_is_asked_for_and_come_again_from_their_seed() -> None:
@@ -40,7 +40,7 @@ def test_gusts_have_the_spread_that_is_asked_for_and_come_again_from_their_seed(
 def test_no_pair_is_ever_nearer_than_the_watch_says(seed: int, number: int, pace: float) -> None:
     chance = np.random.default_rng(seed)
     places = chance.uniform(-2, 2, (3, number))
-    watch = Watch(number)
+    watch = SeparationMonitor(number)
     lost = np.zeros(number, dtype=np.bool_)
     best = [math.inf, math.inf]
     first, second = np.triu_indices(number, 1)
@@ -58,11 +58,11 @@ def test_no_pair_is_ever_nearer_than_the_watch_says(seed: int, number: int, pace
 
 
 def test_the_watch_says_who_and_when() -> None:
-    watch = Watch(3)
+    watch = SeparationMonitor(3)
     for step, x in enumerate((4.0, 2.5, 1.5, 2.0)):
         watch.see(np.array([[0, 9, x], [0, 0, 0], [0, 0, 0]]), step * 1.0)
-    assert watch.nearest == Nearest(1.5, 0, 2, 2.0)
-    lone = Watch(1)
+    assert watch.nearest == ClosestApproach(1.5, 0, 2, 2.0)
+    lone = SeparationMonitor(1)
     lone.see(np.zeros((3, 1)), 0.0)
     assert lone.nearest is None
 
@@ -86,8 +86,8 @@ def test_attitudes_turn_as_the_axes_do(components: list[float]) -> None:
 def test_a_free_spot_is_free(seed: int, count: int, low: bool) -> None:  # noqa: FBT001 - drawn
     taken = np.random.default_rng(seed).uniform(-1, 1, (count, 3))
     wish = np.array([0.0, 0.0, 0.0 if low else 1.0])
-    spot = free_spot(wish, taken, np.full(count, 0.6), 0.0, low=low)
-    assert gaps(spot[None], taken)[0] >= 0.6
+    spot = free_point(wish, taken, np.full(count, 0.6), 0.0, low=low)
+    assert nearest_distances(spot[None], taken)[0] >= 0.6
     assert spot[2] == 0 if low else spot[2] >= 0.6
     if not count:
         assert spot.tolist() == wish.tolist()
@@ -97,8 +97,8 @@ def test_a_free_spot_is_free(seed: int, count: int, low: bool) -> None:  # noqa:
 def test_where_all_is_full_the_free_spot_is_beyond(low: bool) -> None:  # noqa: FBT001 - a parameter
     steps = np.arange(-3, 3.1, 0.5)
     taken = np.array([[x, y, z] for x in steps for y in steps for z in ([0.0] if low else np.arange(0, 6.1, 0.5))])
-    spot = free_spot(np.array([0.0, 0.0, 0.0 if low else 3.0]), taken, np.full(len(taken), 0.6), 0.0, low=low)
-    assert gaps(spot[None], taken)[0] >= 0.6
+    spot = free_point(np.array([0.0, 0.0, 0.0 if low else 3.0]), taken, np.full(len(taken), 0.6), 0.0, low=low)
+    assert nearest_distances(spot[None], taken)[0] >= 0.6
     assert np.abs(spot).max() > 3
     assert spot[2] == 0 or not low
 
@@ -107,7 +107,7 @@ def test_goals_give_way_to_what_lies_there_and_who_stays_gives_way_to_goals() ->
     names = ["a", "b", "c"]
     starts = np.array([[0, 0, 2.0], [3, 0, 0], [3, 0, 4]])
     goals = {0: Goal((3.0, 0.0, 3.9)), 1: Goal((0.0, 0.0, 0.0), lands=True)}
-    targets = Targets(names, goals, starts, np.zeros(3, dtype=np.bool_), 0.5)
+    targets = LegGoals(names, goals, starts, np.zeros(3, dtype=np.bool_), 0.5)
     hazards = Hazards(np.array([[0.1, 0, 0]]), np.array([0.5]))
     told = targets.give_way(hazards, targets.places.copy(), 0.0)
     assert [number for number, _ in told] == [1, 2]
@@ -116,23 +116,26 @@ def test_goals_give_way_to_what_lies_there_and_who_stays_gives_way_to_goals() ->
     assert not hazards.meet(targets.places[1])
     assert np.linalg.norm(targets.places[2] - targets.places[0]) >= 0.5
     assert targets.planned(starts) == pytest.approx(0.6)
-    assert targets.standing(hazards, starts, 0.6).shape == (0, 3) or gaps(hazards.points, targets.places)[0] >= 0.6
+    assert (
+        targets.standing(hazards, starts, 0.6).shape == (0, 3)
+        or nearest_distances(hazards.points, targets.places)[0] >= 0.6
+    )
 
 
 def test_who_lands_begins_first_and_then_row_by_row() -> None:
     homes = np.array([[x, y, 0.0] for x in range(20) for y in range(2)])
-    delays = waits({5: Goal((0.0, 0.0, 0.0), lands=True)}, homes)
+    delays = start_delays({5: Goal((0.0, 0.0, 0.0), lands=True)}, homes)
     assert delays[5] == 0
     assert delays.max() == pytest.approx(2)
     assert (np.diff(np.delete(delays, 5)) >= 0).all()
     assert delays[0] == delays[1] > 0
-    assert waits({}, homes[:2]).tolist() == [0, 0]
+    assert start_delays({}, homes[:2]).tolist() == [0, 0]
 
 
 def test_the_clock_stops_smoothly_and_within_limits() -> None:
     reference = np.zeros((9, 1))
-    way = plan(np.array([[0.0, 0, 1]]), np.array([[8.0, 0, 1]]), distance=0.5)
-    course = Course(way, np.array([0]), reference)
+    way = plan_routes(np.array([[0.0, 0, 1]]), np.array([[8.0, 0, 1]]), distance=0.5)
+    course = Trajectory(way, np.array([0]), reference)
     rows = []
     for step in range(round(4 / DT)):
         if step * DT >= 2.5:
@@ -142,8 +145,8 @@ def test_the_clock_stops_smoothly_and_within_limits() -> None:
     x, speed, push = (np.array(rows)[:, row] for row in (0, 3, 6))
     assert np.abs(np.gradient(x, DT) - speed)[2:-2].max() < 0.02
     assert np.abs(np.gradient(speed, DT) - push)[2:-2].max() < 0.1
-    assert np.abs(push).max() < 1.5 / STOP_S * Limits().speed + Limits().acceleration
+    assert np.abs(push).max() < 1.5 / STOP_S * MotionLimits().speed + MotionLimits().acceleration
     assert course.over
     assert not speed[-1]
     stopping = x[-1] - x[round(2.5 / DT)]
-    assert 0.5 < stopping <= Limits().speed * STOP_S / 2 + 0.02
+    assert 0.5 < stopping <= MotionLimits().speed * STOP_S / 2 + 0.02

@@ -1,4 +1,4 @@
-"""ABT that is held until the test lets it go, so that there is time to attack a run across machines."""
+"""ABT that waits until the test starts it, so that there is time to attack a run across machines."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PAUSE_S = 0.005
 
 
 def chain(size: int = 4, values: Iterable[int] = (0, 1)) -> tuple[dict[str, tuple[int, ...]], list[Constraint]]:
-    """Variables X0, X1, ...: each is another than the one before."""
+    """Return variables X0, X1, ..., and constraints: each differs from the one before."""
     names = [f"X{number}" for number in range(size)]
     pairs = itertools.pairwise(names)
     return dict.fromkeys(names, tuple(values)), [Constraint("C", PREDICATES[0], pair, pair) for pair in pairs]
@@ -40,12 +40,12 @@ class Ping(Message, frozen=True):
 
 
 class Until(Settings, frozen=True):
-    """`file`: while it is not there, the search is held."""
+    """`file`: while it is not there, the search waits."""
 
     file: str = ""
 
 
-class Held(ABT):
+class PausedABT(ABT):
     """The first two robots only say `Ping` to each other until there is that file; robots write to neighbours only."""
 
     messages = Ok | Nogood | AddLink | Ping
@@ -82,16 +82,16 @@ class Held(ABT):
             super().start()
 
 
-class Overwhelmed(Held):
-    """One robot cannot do it."""
+class OverloadedABT(PausedABT):
+    """One robot raises `TooLargeError`."""
 
     def start(self) -> None:
         if self.problem.agent == "RX2":
             raise TooLargeError("this is too much for RX2")
 
 
-class Broken(Held):
-    """One robot's program has a mistake."""
+class CrashingABT(PausedABT):
+    """One robot's program raises `ValueError`."""
 
     def start(self) -> None:
         if self.problem.agent == "RX2":

@@ -1,4 +1,4 @@
-"""Senses without robots: the decisions are flown in the simulation, and what its drones meet is reported."""
+"""Feedback without robots: decisions are flown in the simulation, and what its drones meet is reported."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from itertools import islice
 
 import numpy as np
 
-from robochoc.flight.flight import Conditions, Failure, Flight, Flown
+from robochoc.flight.flight import Flight, FlightConditions, FlightLog, MotorFailure
 from robochoc.flight.layout import Point
-from robochoc.flight.mission import Cast, Drone, Goal, Leg
+from robochoc.flight.mission import Drone, Goal, Leg, MissionBuilder
 from robochoc.flight.reports import OutOfOrder, Report
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.closed_loop import TOGETHER_S, Senses
-from robochoc.ros.outlet import Broadcast, nanoseconds
+from robochoc.ros.closed_loop import TOGETHER_S, Feedback
+from robochoc.ros.sink_publisher import Broadcast, nanoseconds
 
 MOST_NAMES = 12
 """So many drones stand in a message."""
@@ -32,7 +32,7 @@ class UnknownDroneError(Exception):
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class FlightSettings:
     """What a simulated flight meets.
 
     `failures` are names, of robots or of drones, with the second at which a motor stops; of a robot's drones, the
@@ -50,14 +50,14 @@ class Surroundings:
         """Raise `UnknownDroneError` for a drone that is not there, and `ValueError` for what no flight can meet."""
         self.conditions(drones, 1.0)
 
-    def conditions(self, drones: Sequence[Drone], scale: float) -> Conditions:
+    def conditions(self, drones: Sequence[Drone], scale: float) -> FlightConditions:
         """The same for a flight of `drones`, in metres. Raises `UnknownDroneError` and `ValueError`."""
-        return Conditions(
+        return FlightConditions(
             distance=self.distance,
             wind=self.wind,
             gusts=self.gusts,
             seed=self.seed,
-            failures=tuple(Failure(_named(drones, name), at_s) for name, at_s in self.failures),
+            failures=tuple(MotorFailure(_named(drones, name), at_s) for name, at_s in self.failures),
             obstacles=tuple((x * scale, y * scale, z * scale) for x, y, z in self.obstacles),
         )
 
@@ -75,7 +75,7 @@ def _named(drones: Sequence[Drone], name: str) -> str:
 
 
 @dataclass
-class Flying(Senses):
+class SimulatedFeedback(Feedback):
     """Flies each decision in the simulation, in `surroundings`; it is over when all have reached their places.
 
     Whatever a drone has to report ends the leg early: the others slow down and hover. A report that changes nothing
@@ -84,7 +84,7 @@ class Flying(Senses):
     decides while all hover, and not before all is there that belongs to one event: a recording tells the same story.
     """
 
-    surroundings: Surroundings
+    surroundings: FlightSettings
     simulated: bool = True
     _flight: Flight | None = None
     _leg: Leg | None = None
@@ -98,11 +98,11 @@ class Flying(Senses):
     _broadcast: Broadcast = field(default_factory=Broadcast)
 
     def now_ns(self) -> int:
-        """See `Senses.now_ns`: the flight's own time."""
+        """See `Feedback.now_ns`: the flight's own time."""
         return nanoseconds(self._now_s)
 
-    def decided(self, cast: Cast, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - it is fast
-        """See `Senses.decided`."""
+    def decided(self, cast: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - it is fast
+        """See `Feedback.decided`."""
         if self._flight is None:
             homes = np.array([drone.home for drone in cast.drones], dtype=float).reshape(-1, 3)
             try:
@@ -118,24 +118,24 @@ class Flying(Senses):
         self._calls.append(0)
 
     def next(self, until_s: float | None) -> Report | None:
-        """See `Senses.next`."""
+        """See `Feedback.next`."""
         while not self._waiting and until_s is None and self._follows and self._leg and self._flight:
             self._fly(self._flight, self._leg)
         if not self._waiting or (until_s is not None and self._waiting[0].at_s > until_s):
             return None
         return self._waiting.popleft()
 
-    def flown(self) -> Flown | None:
+    def flown(self) -> FlightLog | None:
         """All that was flown, a stage for each decision; None if nothing was. Raises `CannotFlyError`."""
         if self._flight is None or self._leg is None:
             return None
         if not self._calls[-1]:
             self._go(self._flight, self._leg, self._leg.goals)
         flown = self._flight.flown()
-        stages = iter(flown.stages)
+        stages = iter(flown.legs)
         parts = [list(islice(stages, calls)) for calls in self._calls]
         return replace(
-            flown, stages=tuple(replace(first, ends_s=[first, *others][-1].ends_s) for first, *others in parts)
+            flown, legs=tuple(replace(first, ends_s=[first, *others][-1].ends_s) for first, *others in parts)
         )
 
     def _fly(self, flight: Flight, leg: Leg) -> None:
@@ -161,7 +161,7 @@ class Flying(Senses):
         except ValueError as refused:
             raise CannotFlyError(on_one_line(f"the decision cannot be flown: {refused}")) from refused
 
-    def _fallen(self, flown: Flown) -> list[Report]:
+    def _fallen(self, flown: FlightLog) -> list[Report]:
         """What those would report that have fallen while nobody asked."""
         known = {report.drone for report in self._known if isinstance(report, OutOfOrder)}
         lost = [flown.names[number] for number in np.flatnonzero(np.isnan(flown.errors_m))]
@@ -173,7 +173,7 @@ class Flying(Senses):
         self._known.update(map(_what, new))
         return new
 
-    def _tell(self, flown: Flown, reports: Sequence[Report]) -> None:
+    def _tell(self, flown: FlightLog, reports: Sequence[Report]) -> None:
         """Publish what was flown since the last time, and what was reported meanwhile, as time goes by."""
         self._now_s = float(flown.times[-1]) if len(flown.times) else self._now_s
         if self.outlets:

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 
-class Watched(NamedTuple):
+class WatchedPage(NamedTuple):
     """A page, its console and what went wrong in it, and all addresses that it asked for."""
 
     page: Page
@@ -19,12 +19,12 @@ class Watched(NamedTuple):
 
 
 @contextmanager
-def watched(browser: Any, **options: Any) -> Iterator[Watched]:  # noqa: ANN401 - Playwright's
+def watched_page(browser: Any, **options: Any) -> Iterator[WatchedPage]:  # noqa: ANN401 - Playwright's
     """A page that shows nothing yet; it is closed in the end."""
     context = browser.new_context(**options)
     page = context.new_page()
     page.set_default_timeout(15_000)
-    seen = Watched(page, [], [])
+    seen = WatchedPage(page, [], [])
     page.on("console", lambda message: seen.complaints.append(message.text))
     page.on("pageerror", lambda error: seen.complaints.append(str(error)))
     page.on("request", lambda request: seen.asked.append(request.url))

@@ -1,4 +1,4 @@
-"""Post without a network: letters go from hand to hand, in one thread."""
+"""A network in memory: all robots and their master run in one thread."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ from robochoc.solver.compiled_team import CompiledRobot
 RUN = "run"
 
 
-class Scripted:
-    """The post of the robot `name`: `script` says what comes in answer to each of its words to the master.
+class ScriptedTransport:
+    """The transport of the robot `name`: `script` says what the master answers to each message.
 
     `heard` holds these words; what it sends to others stands in `sent`.
     """
@@ -74,7 +74,7 @@ class Scripted:
         return [word for word in self.heard if isinstance(word, kind)]
 
 
-class Office:
+class InMemoryNetwork:
     """A team of robots whose letters stay in this thread, and a master who does no more than has to be."""
 
     def __init__(
@@ -99,7 +99,9 @@ class Office:
         self._letters = Framing(MASTER, RUN)
         unproven = cast("Identity", None)
         self._robots = {
-            robot.name: Stepped(robot, (identities or {}).get(robot.name, unproven), Desk(self, robot.name), protocol)
+            robot.name: SteppedRobot(
+                robot, (identities or {}).get(robot.name, unproven), InMemoryTransport(self, robot.name), protocol
+            )
             for robot in team.robots
         }
         for one in self._robots.values():
@@ -193,12 +195,12 @@ class Office:
                 pass
 
 
-class Desk:
+class InMemoryTransport:
     """One robot's post in the office."""
 
     router = "here"
 
-    def __init__(self, office: Office, name: str) -> None:
+    def __init__(self, office: InMemoryNetwork, name: str) -> None:
         self.inbox = office.inboxes[name]
         self._office = office
         self._name = name
@@ -207,10 +209,10 @@ class Desk:
         self._office.inboxes[receiver].put(Arrived(self._name, content))
 
 
-class Stepped(NetworkRobot):
+class SteppedRobot(NetworkRobot):
     """A robot whose loop is turned by hand."""
 
-    def __init__(self, robot: Robot, identity: Identity, desk: Desk, protocol: type[Protocol]) -> None:
+    def __init__(self, robot: Robot, identity: Identity, desk: InMemoryTransport, protocol: type[Protocol]) -> None:
         super().__init__(CompiledRobot(robot), identity, cast("Transport", desk), lambda _name: protocol)
 
     def begin(self) -> None:

@@ -12,15 +12,15 @@ import numpy as np
 import numpy.typing as npt
 
 from robochoc.flight.quadrotor.airframe import Array
-from robochoc.flight.routes.motion import Plan
+from robochoc.flight.routes.motion import RoutePlan
 
 STOP_S = 0.8
 
 
-class Course:
+class Trajectory:
     """The `plan` of the drones `who` (their numbers); all others stay where `reference` (9, N) has them."""
 
-    def __init__(self, plan: Plan, who: npt.NDArray[np.intp], reference: Array) -> None:
+    def __init__(self, plan: RoutePlan, who: npt.NDArray[np.intp], reference: Array) -> None:
         self.plan = plan
         self.who = who
         self.stopping = False

@@ -19,12 +19,12 @@ def nearest_two(points: Array) -> float:
     return float(apart.min())
 
 
-def gaps(points: Array, others: Array) -> Array:
+def nearest_distances(points: Array, others: Array) -> Array:
     """(K,): how near the nearest of `others` (M, 3) is to each of `points` (K, 3); infinite without others."""
     return np.asarray(_distances(points, others).min(axis=1, initial=np.inf))
 
 
-def free_spot(wish: Array, taken: Array, radii: Array, ground: float, *, low: bool) -> Array:
+def free_point(wish: Array, taken: Array, radii: Array, ground: float, *, low: bool) -> Array:
     """A place that is `radii` (M,) from `taken` (M, 3): `wish`, or the nearest to it of those on a grid.
 
     On the ground if it is to be `low`, else not much lower than `wish`.
