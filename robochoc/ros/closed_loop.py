@@ -54,7 +54,9 @@ class Senses(ABC):
 
 
 class Loop:
-    """A field (`robochoc.run.scenario.Field`) that publishes each epoch's decision, and senses what the robots report.
+    """An environment (`robochoc.run.scenario.Environment`) of robots that report their situation.
+
+    It publishes each epoch's decision, and turns what the robots report into changes of the problem.
 
     `team` is as its files have it. Without `senses`, nothing changes the problem. What is published goes into `sinks`
     (opened, and closed, by others), with the times of `senses`. What was heard over a ROS is not said there again, or

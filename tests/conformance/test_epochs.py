@@ -27,7 +27,7 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.conformance.test_conformance import random_schedule
 from tests.support.changes import random_journey, stages

@@ -11,7 +11,7 @@ import pytest
 
 from robochoc.formats import read_team
 from robochoc.model.outcome import Verdict
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.verification.checker import objections
 from tests.support.entries import entries_of
 from tests.support.machines import PAIR, TRIANGLE, Program, Site, ended, one_line, written

@@ -14,7 +14,7 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics
 from robochoc.protocols.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from tests.support.agents import told, value
 from tests.support.cost_problems import with_costs
 from tests.support.dpop_robots import begun, dimensions, domain, leaf, products

@@ -20,7 +20,7 @@ from robochoc.model.problem import Constraint, Model, Relation, Semantics, Team
 from robochoc.protocols.abt import ABT, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError

@@ -17,7 +17,7 @@ from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Event, RemoveAgent, RemoveValue
 from robochoc.ros.closed_loop import Loop, drones_of
 from robochoc.ros.simulated import CannotFlyError, Flying, Surroundings, UnknownDroneError
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.verification.checker import objections
 from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import ROOT
@@ -42,7 +42,7 @@ class Looped:
 def looped(surroundings: Surroundings, options: Options = SIMULATED, *, scale: float | None = None) -> Looped:
     flying = Flying(surroundings)
     loop = Loop(HANGAR, (), flying, scale=scale)
-    outcome = solve(HANGAR, options, field=loop)
+    outcome = solve(HANGAR, options, environment=loop)
     flown = flying.flown()
     assert flown is not None
     assert loop.mission is not None

@@ -17,7 +17,7 @@ from robochoc.model.orders import Order, OrderError, in_order, neighbours, order
 from robochoc.model.priorities import natural
 from robochoc.model.problem import Child, Constraint, Event, Model, Parent, Predicate, Relation, Robot, Semantics, Team
 from robochoc.protocols.order import PseudoTree
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.problems import random_team, solutions, team_of

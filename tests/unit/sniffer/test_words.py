@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from robochoc.generators.queens3d import queens3d
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal
+from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.sniffer.feed import Feed
 from robochoc.sniffer.phrases import Setting, row

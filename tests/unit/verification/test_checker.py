@@ -15,8 +15,8 @@ from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.orchestrator import Options, RefutedError, Runtime, solve
-from robochoc.verification.checker import cost, could_join, objections, price
+from robochoc.run import Options, Runtime, solve
+from robochoc.verification.checker import RefutedError, cost, could_join, objections, price
 from tests.support.problems import ON_ONE_MACHINE, team_of, teams
 
 
