@@ -42,13 +42,13 @@ class Craft:
     """The variables on which its place depends."""
 
 
-def numbers(name: str) -> Cell | None:
+def row_and_column(name: str) -> Cell | None:
     """The row and the column that a name such as `Robot3.1` ends in."""
     found = _ROW_AND_COLUMN.search(name)
     return (int(found[1]), int(found[2])) if found else None
 
 
-def lone_craft(variable: str, values: Assignment) -> Craft:
+def craft_of_variable(variable: str, values: Assignment) -> Craft:
     """The craft of `variable`, of whose robot nothing else is known."""
     return _craft(variable, [variable], None, values)
 
@@ -60,7 +60,7 @@ def crafts_of(robot: Robot, values: Assignment) -> list[Craft]:
     if len(topics) > 1:
         named = zip(_short_names(topics), topics, strict=True)
         crew = [_craft(name, own, topic, values) for name, topic in named]
-    elif not topics and len(own) > 1 and all(numbers(name) for name in own):
+    elif not topics and len(own) > 1 and all(row_and_column(name) for name in own):
         topics = [topic for topic in robot.topics[: len(own)] if len(robot.topics) == len(own)]
         named_topics = zip_longest(own, topics)
         crew = [_craft(name, [name], topic, values) for name, topic in named_topics]
@@ -80,7 +80,11 @@ def possible_crafts(robot: Robot) -> Iterator[Craft]:
 
 def _craft(name: str, variables: Sequence[str], topic: Topic | None, values: Assignment) -> Craft:
     """The craft `name`, whose cell is its topic's, or else the one that its own or its first variable's name says."""
-    cells = [_sent(topic, values) if topic else None, numbers(name), *(numbers(first) for first in variables[:1])]
+    cells = [
+        _sent(topic, values) if topic else None,
+        row_and_column(name),
+        *(row_and_column(first) for first in variables[:1]),
+    ]
     known = [values[own] for own in variables if own in values]
     level = None
     if known:

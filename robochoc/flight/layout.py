@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count, product
 
-from robochoc.flight.crafts import Cell, Craft, numbers
+from robochoc.flight.crafts import Cell, Craft, row_and_column
 
 Point = tuple[float, float, float]
 
@@ -89,7 +89,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Field:
+class Layout:
     """The box, and for each craft of a crew the spot on the ground where it stands in the beginning."""
 
     axes: tuple[Axis, Axis, Axis]
@@ -125,7 +125,7 @@ class Field:
             yield x, y, self.ground
 
 
-def field_of(crew: Sequence[Craft], others: Iterable[Craft] = ()) -> Field:
+def layout_of(crew: Sequence[Craft], others: Iterable[Craft] = ()) -> Layout:
     """The field for `crew`. Its axes also reach to `others`: where some of the crew may be at another time."""
     others = [*others]
     cells = _cells(crew)
@@ -138,7 +138,7 @@ def field_of(crew: Sequence[Craft], others: Iterable[Craft] = ()) -> Field:
         home = (rows.at(x), columns.at(y), levels.ground)
         homes.append((*next(beside), levels.ground) if taken.is_near(home) else home)
         taken.add(homes[-1])
-    return Field(axes, tuple(homes))
+    return Layout(axes, tuple(homes))
 
 
 def _cells(crew: Sequence[Craft]) -> list[Cell]:
@@ -165,7 +165,7 @@ def _axes(crew: Sequence[Craft], others: Sequence[Craft], cells: Sequence[Cell])
 
 
 def _axis_names(crew: Sequence[Craft]) -> tuple[str, str, str]:
-    if all(craft.cell and craft.cell == numbers(craft.name) for craft in crew):
+    if all(craft.cell and craft.cell == row_and_column(craft.name) for craft in crew):
         return "row", "column", "level"
     return ("x", "y", "z") if any(craft.cell for craft in crew) else ("", "", "value")
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from robochoc.flight.crafts import Craft, crafts_of, lone_craft, numbers, possible_crafts
-from robochoc.flight.layout import Axis, Field, Point, field_of
+from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts, row_and_column
+from robochoc.flight.layout import Axis, Layout, Point, layout_of
 from robochoc.model.outcome import Epoch, Outcome, Verdict
 from robochoc.model.priorities import natural
 from robochoc.model.problem import AddAgent, Assignment, Robot, Team, Topic
@@ -73,7 +73,7 @@ class Mission:
         return self.axes[2].value(self.axes[2].ground) * self.scale
 
 
-class Cast:
+class MissionBuilder:
     """The crew of a run whose epochs come one after the other: who they are, where they stand, what each epoch asks.
 
     `robots` are all that ever take part, those that come later among them; or, where nothing but names is known,
@@ -96,7 +96,7 @@ class Cast:
         crew = sorted(self._crafts(first), key=lambda craft: (natural(craft.name), craft.name))
         self._places = {(craft.robot, craft.name): number for number, craft in enumerate(crew)}
         self._crew = crew
-        self.field: Field = field_of(crew, others)
+        self.field: Layout = layout_of(crew, others)
         self.scale = _scale(self.field.axes) if scale is None else scale
         self._edge = self.field.edge(len(crew) if leaving is None else leaving)
         self._aside: dict[int, Point] = {}
@@ -132,7 +132,7 @@ class Cast:
                 yield from crafts_of(robot, values)
         for name in self._names:
             if here is None or name in here:
-                yield lone_craft(name, values) if name in values else Craft(name, numbers(name))
+                yield craft_of_variable(name, values) if name in values else Craft(name, row_and_column(name))
 
     def _drone(self, craft: Craft, home: Point) -> Drone:
         group = craft.cell[0] if craft.cell else round(home[0])
@@ -160,18 +160,18 @@ def mission_of(outcome: Outcome, team: Team | None = None, scale: float | None =
     for values in decided:
         first = {**values, **first}
     if team is not None:
-        robots, names = everybody(team), []
+        robots, names = all_robots(team), []
         others = [craft for values in decided for robot in robots for craft in crafts_of(robot, values)]
         others += _lowest(robots, others)
     else:
         robots, names = [], [*first, *outcome.withdrawn]
-        others = [lone_craft(name, values) for values in decided for name in values]
-    cast = Cast(robots, first, names=names, others=others, leaving=_leaving(epochs, outcome), scale=scale)
+        others = [craft_of_variable(name, values) for values in decided for name in values]
+    cast = MissionBuilder(robots, first, names=names, others=others, leaving=_leaving(epochs, outcome), scale=scale)
     legs = [cast.leg(epoch) for epoch in epochs[:-1]]
     return cast.mission(outcome.team, [*legs, cast.leg(epochs[-1], outcome.withdrawn)])
 
 
-def everybody(team: Team) -> list[Robot]:
+def all_robots(team: Team) -> list[Robot]:
     """All robots that ever take part: those of the beginning, and those that the scenario adds."""
     added = [change.robot for event in team.scenario for change in event.changes if isinstance(change, AddAgent)]
     return [*{robot.name: robot for robot in (*team.robots, *added)}.values()]

@@ -41,11 +41,13 @@ class Objects:
     def __init__(self) -> None:
         self._known: dict[int, tuple[Definition, bool]] = {}
         """By `id`: the object, which is kept so that the number stays its own, and whether it is right."""
+        self._wrong: list[Definition] = []
+        """The definitions of the robot in hand that are wrong. In a file, equal ones are written once."""
         self._found: list[Diagnostic] = []
 
     def mistakes(self, robot: Robot) -> list[Diagnostic]:
         """Return what is wrong with `robot` by itself: nothing of its neighbours is looked at."""
-        self._found = []
+        self._found, self._wrong = [], []
         if self._is_made_right(robot):
             for _ in self._steps(robot, ObjectPlaces(robot.name)):
                 if len(self._found) > MAX_PER_FILE:
@@ -56,7 +58,7 @@ class Objects:
 
     def mistakes_of_constraint(self, constraint: Constraint, robot: Robot) -> list[Diagnostic]:
         """Return what is wrong with a constraint that `robot` is to share from now on."""
-        self._found = []
+        self._found, self._wrong = [], []
         own = dict.fromkeys(variable.name for variable in robot.variables)
         self._shared(constraint, own, robot.kind, ObjectPlaces(robot.name))
         return self._found
@@ -171,11 +173,19 @@ class Objects:
         """Whether a domain or a definition is right; the first who has it is told what is wrong."""
         known = self._known.get(id(thing))
         if known is None:
-            before = len(self._found)
-            with self._at(places.part, type(thing).__name__.lower(), thing.name):
-                _check_defined(thing)
-            known = self._known[id(thing)] = (thing, len(self._found) == before)
+            known = self._known[id(thing)] = (thing, self._is_right(thing, places))
         return known[1]
+
+    def _is_right(self, thing: Definition, places: ObjectPlaces) -> bool:
+        try:
+            _check_defined(thing)
+        except MistakeError as mistake:
+            if thing not in self._wrong:
+                place = places.part(type(thing).__name__.lower(), thing.name)
+                self._note(place, mistake.message, mistake.hint)
+            self._wrong.append(thing)
+            return False
+        return True
 
     @contextmanager
     def _at(self, place: Callable[..., Place], *part: object) -> Iterator[None]:

@@ -8,7 +8,8 @@ as long as that very object lives: teams cannot be changed, and `dataclasses.rep
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import islice
 from typing import TypeVar
@@ -54,7 +55,7 @@ def check_team(team: Team) -> None:
         return
     found = _of_the_whole(team) or _mistakes(team) or list(_of_the_scenario(team))
     if found:
-        raise InvalidInputError(dict.fromkeys(found))
+        raise InvalidInputError(_numbered(found))
     note_valid(team)
 
 
@@ -78,7 +79,7 @@ def check_writable(team: Team) -> None:
         place = Place(f"team {shortened(team.name)}")
         found.append(place.mistake("its scenario is no robot's", "write it as scenario.xml, and the team without it"))
     if found:
-        raise InvalidInputError(dict.fromkeys(found))
+        raise InvalidInputError(_numbered(found))
     by_links = priority_order({robot.name: [parent.name for parent in robot.parents] for robot in team.robots})
     if by_links != team.order:
         check_team(replace(team, robots=tuple(team[name] for name in by_links)))
@@ -88,7 +89,7 @@ def check_robot(robot: Robot) -> None:
     """Raise `InvalidInputError` with every mistake of `robot` that can be found without its neighbours."""
     found = Objects().mistakes(robot)
     if found:
-        raise InvalidInputError(dict.fromkeys(found))
+        raise InvalidInputError(_numbered(found))
 
 
 def check_event(team: Team, event: Event) -> None:
@@ -101,7 +102,7 @@ def check_event(team: Team, event: Event) -> None:
         mistake for change in event.changes for mistake in _of_the_change(_robots(team, event), change, place)
     ]
     if found:
-        raise InvalidInputError(dict.fromkeys(found))
+        raise InvalidInputError(_numbered(found))
 
 
 def held_to_rules(field: Callable[[Team, _Ended, float | None], Event | None]) -> Callable[..., Event | None]:
@@ -126,6 +127,17 @@ def is_known_valid(team: Team) -> bool:
     """Whether this very object has been found valid before."""
     known = _valid.get(id(team))
     return known is not None and known() is team
+
+
+def _numbered(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
+    """Yield `found`; of equal diagnostics, those after the first get a number.
+
+    Lines tell two constraints of a file apart. Two objects may have the same name and scope.
+    """
+    seen: Counter[Diagnostic] = Counter()
+    for mistake in found:
+        seen[mistake] += 1
+        yield mistake if seen[mistake] == 1 else replace(mistake, file=f"{mistake.file} (no. {seen[mistake]})")
 
 
 def between(members: Members) -> list[Diagnostic]:

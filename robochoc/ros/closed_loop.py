@@ -12,23 +12,23 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from robochoc.flight.crafts import crafts_of
-from robochoc.flight.mission import VAST_M, Cast, Drone, Leg, Mission, everybody, mission_of
+from robochoc.flight.mission import VAST_M, Drone, Leg, Mission, MissionBuilder, all_robots, mission_of
 from robochoc.flight.reports import Report
 from robochoc.model.change import possible
 from robochoc.model.outcome import Epoch, Outcome
 from robochoc.model.problem import Assignment, Change, Event, Robot, Team
-from robochoc.ros.outlet import Outlet
 from robochoc.ros.sink import Sink
+from robochoc.ros.sink_publisher import SinkPublisher
 from robochoc.ros.situation import BATTERY, Situation
 
 TOGETHER_S = 0.5
 """What is reported within so many seconds of a report that changes the problem belongs to the same event."""
 
 
-class Senses(ABC):
+class Feedback(ABC):
     """How a loop learns of its robots' situation: they fly in a simulation, or a source is listened to."""
 
-    outlets: Sequence[Outlet] = ()
+    outlets: Sequence[SinkPublisher] = ()
     """Where reports are to be published as they come."""
     idle: Callable[[], None] = staticmethod(lambda: None)
     """Called now and then while nothing comes."""
@@ -45,7 +45,7 @@ class Senses(ABC):
         """The time, by the clock of the reports."""
 
     @abstractmethod
-    def decided(self, cast: Cast, leg: Leg, left_s: float | None) -> None:
+    def decided(self, cast: MissionBuilder, leg: Leg, left_s: float | None) -> None:
         """A decision was made and published: from now on, `next` gives what follows of it, for so many seconds."""
 
     @abstractmethod
@@ -53,7 +53,7 @@ class Senses(ABC):
         """The next report, or None: none comes any more. With `until_s`, one that comes no later than that."""
 
 
-class Loop:
+class ClosedLoop:
     """An environment (`robochoc.run.scenario.Environment`) of robots that report their situation.
 
     It publishes each epoch's decision, and turns what the robots report into changes of the problem.
@@ -68,31 +68,31 @@ class Loop:
 
     events: list[Event]
     """What the robots' situation has changed."""
-    outlets: list[Outlet]
+    outlets: list[SinkPublisher]
     """What was published, for each of the sinks."""
 
     def __init__(
         self,
         team: Team,
         sinks: Sequence[Sink] = (),
-        senses: Senses | None = None,
+        senses: Feedback | None = None,
         *,
         frame: str = "map",
         scale: float | None = None,
         battery: float = BATTERY,
     ) -> None:
         self._team = team
-        self._robots = everybody(team)
+        self._robots = all_robots(team)
         self.senses = senses
         self._scale = scale
         self._battery = battery
-        self._cast: Cast | None = None
+        self._cast: MissionBuilder | None = None
         self._situation: Situation | None = None
         self._legs: list[Leg] = []
         self._happened = 0
         self._lost = True
         self.events = []
-        self.outlets = [Outlet(team.name, drones_of(team), sink, frame) for sink in sinks]
+        self.outlets = [SinkPublisher(team.name, drones_of(team), sink, frame) for sink in sinks]
         if senses:
             senses.outlets = [outlet for outlet in self.outlets if senses.simulated or not outlet.live]
 
@@ -139,13 +139,13 @@ class Loop:
 
     # Decisions
 
-    def _new_cast(self, assignment: Assignment) -> Cast:
+    def _new_cast(self, assignment: Assignment) -> MissionBuilder:
         """Who flies, and where they stand: below where they go first, or could go as far as nobody has decided."""
         first = {**_values(self._robots, 0), **assignment}
         near = {**_values(self._robots, 0, VAST_M), **assignment}
         far = {**near, **_values(self._robots, -1, VAST_M)}
         others = [craft for values in (near, far) for robot in self._robots for craft in crafts_of(robot, values)]
-        return Cast(self._robots, first, others=others, scale=self._scale)
+        return MissionBuilder(self._robots, first, others=others, scale=self._scale)
 
     def _decide(self, leg: Leg) -> None:
         at_ns = self.senses.now_ns() if self.senses else time.time_ns()
@@ -160,7 +160,7 @@ class Loop:
             team, _ = possible(team, event.changes)
         return team
 
-    def _sensed(self, senses: Senses, team: Team, cast: Cast) -> Event | None:
+    def _sensed(self, senses: Feedback, team: Team, cast: MissionBuilder) -> Event | None:
         """The event that follows of a decision: the first reports that change `team`."""
         if self._situation is None:
             self._situation = Situation(cast.drones, cast.scale, self._battery)
@@ -177,8 +177,8 @@ class Loop:
 
 def drones_of(team: Team) -> tuple[Drone, ...]:
     """All drones that ever take part, before anything is decided: who they are is known, where they stand is not."""
-    robots = everybody(team)
-    return Cast(robots, _values(robots, 0)).drones
+    robots = all_robots(team)
+    return MissionBuilder(robots, _values(robots, 0)).drones
 
 
 def _values(robots: Sequence[Robot], place: int, span: float | None = None) -> dict[str, int]:

@@ -39,7 +39,7 @@ class NameClashError(Exception):
     """Two topics would have one name in ROS, or a name is too long for it: which, and what to do."""
 
 
-class Names:
+class TopicNames:
     """The names in ROS of what `drones` publish; drones are known by their numbers. Raises `NameClashError`."""
 
     original: Mapping[str, str]

@@ -13,7 +13,7 @@ from robochoc.flight.mission import Drone, Leg
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.mappings import NoMappingError, WaypointMapping, mapping_of, point
-from robochoc.ros.names import REPORTS, Names
+from robochoc.ros.names import REPORTS, TopicNames
 from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.waypoint import Waypoint, waypoints
 
@@ -42,7 +42,7 @@ class Publisher:
             raise NothingToPublishError(
                 on_one_line(f"{told}: give its robot's file a <topic> (docs/reference/format.md)")
             )
-        self.names = Names(drones)
+        self.names = TopicNames(drones)
         self._drones = drones
         self._sinks = sinks
         self._frame = frame

@@ -16,12 +16,12 @@ import numpy.typing as npt
 import pytest
 from PIL import Image
 
+from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import mission_of
-from robochoc.flight.quadrotor.flown import Flown
 from robochoc.view.page import page
 from robochoc.view.scene import Scene, scene_of
+from tests.support.browser_pages import watched_page
 from tests.support.flights import LEG_S, epochs_of_three, five, straight
-from tests.support.pages import watched
 from tests.support.program import ROOT
 from tests.support.sniffer_pages import CONTRAST, NAMELESS, until
 
@@ -35,8 +35,8 @@ Page = Any
 def scene(**how: Any) -> Scene:  # noqa: ANN401 - `straight`'s
     outcome = epochs_of_three(HOSTILE)
     mission = mission_of(outcome, five())
-    flown: Flown = straight(mission, **how)
-    return scene_of(outcome, mission=mission, flown=flown)
+    flown: FlightLog = straight(mission, **how)
+    return scene_of(outcome, mission, flown)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @contextmanager
 def opened(browser: Any, url: str, **options: Any) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
     """The page, once it is drawn. No script may complain, and nothing may be asked for anything."""
-    with watched(browser, **{"viewport": {"width": 700, "height": 560}, **options}) as (page, complaints, asked):
+    with watched_page(browser, **{"viewport": {"width": 700, "height": 560}, **options}) as (page, complaints, asked):
         page.goto(url)
         until(lambda: page.evaluate("Boolean(globalThis.Film)"), "it does not begin")
         yield page
@@ -357,7 +357,7 @@ from robochoc.flight.mission import mission_of
 from robochoc.view.live import serve
 from robochoc.view.scene import scene_of
 outcome, mission = epochs_of_three(), mission_of(epochs_of_three(), five())
-serve(scene_of(outcome, mission=mission, flown=straight(mission)), ready=lambda url: print(url, flush=True))
+serve(scene_of(outcome, mission, straight(mission)), ready=lambda url: print(url, flush=True))
 """
 
 

@@ -10,7 +10,7 @@ import pytest
 from robochoc.formats import read_robot, read_team
 from robochoc.model.change import changed_by
 from robochoc.model.problem import AddAgent, AddConstraint, RemoveAgent, RemoveConstraint, RemoveValue
-from tests.support.entries import entries_of
+from tests.support.journal_entries import entries_of
 from tests.support.program import ROOT, robochoc
 
 RESCUE = ROOT / "docs" / "examples" / "rescue"

@@ -14,38 +14,25 @@ from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
-    Constraint,
     Domain,
     Event,
     Parent,
-    Relation,
     RemoveAgent,
     RemoveConstraint,
     RemoveValue,
     Robot,
-    Semantics,
     Team,
     Variable,
 )
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named, protocol_names
-from tests.conformance.test_conformance import random_schedule
-from tests.support.changes import random_journey, stages
 from tests.support.loose_problems import loosened
 from tests.support.problems import ON_ONE_MACHINE, random_team, solutions, team_of
+from tests.support.random_changes import random_changing_team, stages
+from tests.support.random_options import random_schedule
+from tests.support.small_teams import differ, pair
 
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
 SIMULATED = Options(runtime=Runtime.SIMULATOR, protocol="dynabt")
-
-
-def differ(left: str, right: str, name: str = "C") -> Constraint:
-    return Constraint(name, DIFFERENT, (left, right), (left, right))
-
-
-def pair(*events: Event, values: int = 1) -> Team:
-    """Two robots that want to differ."""
-    team = team_of(dict.fromkeys("AB", range(1, values + 1)), [differ("A", "B")])
-    return replace(team, scenario=events)
 
 
 def agrees(team: Team, options: Options) -> int:
@@ -70,7 +57,7 @@ def agrees(team: Team, options: Options) -> int:
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 10))])
 def test_dynabt_agrees_with_brute_force_after_each_change(batch: int) -> None:
     chance = Random(f"dynabt {batch}")
-    steps = sum(agrees(random_journey(chance), random_dynabt(chance)) for _ in range(100 if batch else 60))
+    steps = sum(agrees(random_changing_team(chance), random_dynabt(chance)) for _ in range(100 if batch else 60))
     assert steps > (900 if batch else 540)
 
 
@@ -84,7 +71,7 @@ def test_any_protocol_begins_anew_after_each_change(protocol: str, batch: int) -
     traits = protocol_named(protocol).traits
     chance = Random(f"anew {protocol} {batch}")
     for _ in range(8):
-        team = random_journey(chance, 6)
+        team = random_changing_team(chance, 6)
         if traits.n_ary and traits.complete:
             agrees(team, replace(random_schedule(chance), protocol=protocol))
 
@@ -93,13 +80,13 @@ def test_any_protocol_begins_anew_after_each_change(protocol: str, batch: int) -
 def test_processes_go_through_epochs_as_well(protocol: str) -> None:
     chance = Random(f"processes {protocol}")
     for _ in range(4):
-        agrees(random_journey(chance, 6), Options(protocol=protocol, timeout=60))
+        agrees(random_changing_team(chance, 6), Options(protocol=protocol, timeout=60))
 
 
 def test_epochs_follow_an_order_that_is_asked_for() -> None:
     chance = Random("order")
     for _ in range(25):
-        team = random_journey(chance, 5, lambda team: loosened(team, chance))
+        team = random_changing_team(chance, 5, lambda team: loosened(team, chance))
         order = chance.choice([*Order, tuple(chance.sample(team.order, len(team.order)))])
         agrees(team, replace(random_dynabt(chance), order=order))
 
@@ -179,7 +166,7 @@ def test_an_event_in_mid_run_comes_at_the_end_if_there_are_not_so_many_messages(
 def test_the_outcome_sums_up_its_epochs() -> None:
     chance = Random("sum")
     for _ in range(10):
-        outcome = solve(random_journey(chance), replace(SIMULATED, seed=chance.getrandbits(30)))
+        outcome = solve(random_changing_team(chance), replace(SIMULATED, seed=chance.getrandbits(30)))
         last = outcome.epochs[-1]
         assert (outcome.verdict, outcome.assignment) == (last.verdict, last.assignment)
         assert outcome.metrics.messages == sum((e.metrics for e in outcome.epochs), Metrics()).messages
@@ -192,7 +179,7 @@ def test_a_problem_that_does_not_change_has_no_epochs() -> None:
 
 @pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_the_journal_says_what_the_metrics_say(runtime: Runtime) -> None:
-    team = random_journey(Random(5), 6)
+    team = random_changing_team(Random(5), 6)
     recorder = Recorder(Header(team=team.name, protocol="dynabt", runtime=runtime, seed=0))
     outcome = solve(team, replace(SIMULATED, runtime=runtime), observer=recorder)
     told = metrics_of(read_journal(recorder.content()).events)

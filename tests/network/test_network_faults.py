@@ -32,8 +32,8 @@ from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.authorities import identity_of
 from tests.support.clocks import waiting
 from tests.support.faults import Run, running, wait_until
-from tests.support.held import CHAIN, Held
 from tests.support.network_runs import NetworkRun, free_endpoint
+from tests.support.paused_abt import CHAIN, PausedABT
 from tests.support.program import ROOT
 from tests.support.relays import Relay
 
@@ -96,7 +96,7 @@ class Team:
 def held_team(folder: Path, conditions: NetworkSettings = NetworkSettings()) -> Iterator[Team]:
     events: list[AnyEvent] = []
     brief = RunParameters(settings={"file": str(folder / "go")})
-    with LocalNetwork(CHAIN, Held, observer=events.append, conditions=conditions, brief=brief) as network:
+    with LocalNetwork(CHAIN, PausedABT, observer=events.append, conditions=conditions, brief=brief) as network:
         team = Team(network, events, folder / "go")
         try:
             yield team
@@ -305,7 +305,7 @@ class Elsewhere:
     def _take_part(self, name: str, patience_s: float) -> None:
         identity = self.identities[name]
         with Transport(self.endpoint, identity, watch=(), patience_s=30) as post:
-            robot = NetworkRobot(CompiledRobot(CHAIN[name]), identity, post, lambda _: Held, Manner(patience_s))
+            robot = NetworkRobot(CompiledRobot(CHAIN[name]), identity, post, lambda _: PausedABT, Manner(patience_s))
             self.endings[name] = robot.run()
 
 

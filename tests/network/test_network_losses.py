@@ -20,8 +20,8 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.checker import objections
 from tests.support.complex_problems import complex_team
-from tests.support.held import Held
 from tests.support.loose_problems import untold_interface
+from tests.support.paused_abt import PausedABT
 
 DIFFER = PREDEFINED["ne"]
 TEAM = complex_team(
@@ -49,7 +49,7 @@ def test_those_who_are_left_go_on_with_the_values_that_they_had(tmp_path: Path) 
     journey = ScenarioRun(TEAM, None, CompiledTeam, lambda: None, parameters=brief)
     played: list[FinishedEpoch] = []
     with LocalNetwork(
-        journey.compiled(), Held, observer=observe, conditions=NetworkSettings(survive=True), brief=brief
+        journey.compiled(), PausedABT, observer=observe, conditions=NetworkSettings(survive=True), brief=brief
     ) as network:
         for one in journey.epochs(network, lambda _: None):
             played.append(one)

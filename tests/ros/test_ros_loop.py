@@ -15,17 +15,17 @@ from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.formats import read_team
 from robochoc.model.outcome import Epoch, Outcome, Verdict
 from robochoc.model.problem import AddAgent, Event, RemoveAgent, RemoveValue, Team
-from robochoc.ros.closed_loop import Loop, drones_of
-from robochoc.ros.listening import Listening
-from robochoc.ros.reading import Reading
+from robochoc.ros.closed_loop import ClosedLoop, drones_of
+from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.sink import Fields, Sink
-from robochoc.ros.source import Heard, Source, SourceError
+from robochoc.ros.source import ReceivedMessage, Source, SourceError
+from robochoc.ros.source_feedback import SourceFeedback
 from robochoc.run import OnLoss, Options, Runtime, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
-from tests.conformance.test_epochs import pair
 from tests.support.clocks import waiting
 from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import ROOT
+from tests.support.small_teams import pair
 
 HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")
 SIMULATED = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
@@ -164,7 +164,7 @@ def test_no_process_outlives_a_field_that_fails(error: BaseException | type[Base
 class Tape(Source):
     """A source that gives what it was given; a live one whenever it comes, for nothing comes of itself."""
 
-    def __init__(self, *messages: Heard, live: bool = False) -> None:
+    def __init__(self, *messages: ReceivedMessage, live: bool = False) -> None:
         super().__init__("tape")
         self.messages = list(messages)
         self.live = live
@@ -173,7 +173,7 @@ class Tape(Source):
     def listen(self, topics: Mapping[str, str]) -> None:
         self.topics = topics
 
-    def next(self, wait_s: float) -> Heard | None:
+    def next(self, wait_s: float) -> ReceivedMessage | None:
         if self.messages:
             return self.messages.pop(0)
         if self.live:
@@ -203,14 +203,14 @@ class Kept(Sink):
         return [topic for topic, _, _ in self.messages]
 
 
-def at(seconds: float, topic: str, fields: Mapping[str, object]) -> Heard:
-    kinds = Reading(drones_of(HANGAR), "map").topics
-    return Heard(topic, kinds.get(topic, ""), fields, round(seconds * SECOND))
+def at(seconds: float, topic: str, fields: Mapping[str, object]) -> ReceivedMessage:
+    kinds = ReportDecoder(drones_of(HANGAR), "map").topics
+    return ReceivedMessage(topic, kinds.get(topic, ""), fields, round(seconds * SECOND))
 
 
-def listened(*messages: Heard, sink: Sink | None = None, team: Team = HANGAR) -> tuple[Outcome, Loop]:
-    senses = Listening(Tape(*messages), Reading(drones_of(team), "map"))
-    loop = Loop(team, [sink] if sink else [], senses)
+def listened(*messages: ReceivedMessage, sink: Sink | None = None, team: Team = HANGAR) -> tuple[Outcome, ClosedLoop]:
+    senses = SourceFeedback(Tape(*messages), ReportDecoder(drones_of(team), "map"))
+    loop = ClosedLoop(team, [sink] if sink else [], senses)
     return solve(team, SIMULATED, environment=loop), loop
 
 
@@ -271,11 +271,11 @@ def test_who_leaves_lands() -> None:
     assert [goal.lands for goal in loop.mission.legs[1].goals.values()] == [True, False, False, False, False, False]
 
 
-def live(patience_s: float, *messages: Heard) -> tuple[Loop, Callable[[], int]]:
-    senses = Listening(Tape(*messages, live=True), Reading(drones_of(HANGAR), "map"), patience_s)
+def live(patience_s: float, *messages: ReceivedMessage) -> tuple[ClosedLoop, Callable[[], int]]:
+    senses = SourceFeedback(Tape(*messages, live=True), ReportDecoder(drones_of(HANGAR), "map"), patience_s)
     waited: list[float] = []
     senses.idle = lambda: waited.append(time.monotonic())
-    return Loop(HANGAR, (), senses), lambda: len(waited)
+    return ClosedLoop(HANGAR, (), senses), lambda: len(waited)
 
 
 def test_a_live_source_is_waited_for_and_somebody_told_so() -> None:
@@ -295,7 +295,7 @@ def test_waiting_is_bounded_by_the_time_for_all() -> None:
 
 def test_the_team_of_a_run_nobody_changed_is_as_its_files_have_it() -> None:
     sink = Kept(live=True)
-    loop = Loop(HANGAR, [sink])
+    loop = ClosedLoop(HANGAR, [sink])
     loop.publish(solve(HANGAR, SIMULATED))
     assert (loop.team, loop.mission) == (HANGAR, None)
     assert loop.outlets[0].told == "6 waypoints, 0 landings"

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from robochoc.flight.places import Places
+from robochoc.flight.point_index import PointIndex
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.model.change import changed
 from robochoc.model.expression import Expression, Type, parse
@@ -26,9 +26,9 @@ from robochoc.model.problem import (
     Variable,
 )
 from robochoc.ros.closed_loop import drones_of
-from robochoc.ros.reading import Reading
+from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.situation import LIES_TIMES, Situation
-from robochoc.ros.source import Heard
+from robochoc.ros.source import ReceivedMessage
 from tests.support.problems import team_of
 
 HUGE = Domain("huge", (range(10**9),))
@@ -213,7 +213,7 @@ somewhere = st.tuples(*[st.floats(-2, 2) | st.sampled_from([-0.5, 0.0, 0.5, 1.0]
 def test_what_is_near_is_found_as_if_all_were_looked_at(
     kept: list[tuple[float, float, float]], asked: list[tuple[tuple[float, float, float], bool]]
 ) -> None:
-    places = Places()
+    places = PointIndex()
     for place in kept:
         places.add(place)
     for there, gone in asked:
@@ -254,13 +254,13 @@ def test_the_team_can_always_take_it_and_what_is_blocked_is_nobodys(heard: list[
 # From raw messages
 
 
-def heard(topic: str, fields: object, at_ns: int = 2_500_000_000) -> Heard:
-    reading = Reading(drones_of(pair()), "map")
-    return Heard(topic, reading.topics.get(topic, ""), fields, at_ns)  # type: ignore[arg-type]  # what comes in
+def heard(topic: str, fields: object, at_ns: int = 2_500_000_000) -> ReceivedMessage:
+    reading = ReportDecoder(drones_of(pair()), "map")
+    return ReceivedMessage(topic, reading.topics.get(topic, ""), fields, at_ns)  # type: ignore[arg-type]  # what comes in
 
 
 def read(topic: str, fields: object) -> Report | None:
-    return Reading(drones_of(pair()), "map").report(heard(topic, fields))
+    return ReportDecoder(drones_of(pair()), "map").report(heard(topic, fields))
 
 
 PLACE = {"x": 1, "y": 2.0, "z": 3.0}
@@ -291,14 +291,14 @@ def test_what_is_missing_is_passed_over(fields: object) -> None:
 
 
 def test_a_place_in_another_frame_is_no_place_of_ours() -> None:
-    reading = Reading(drones_of(pair()), "map")
+    reading = ReportDecoder(drones_of(pair()), "map")
     assert reading.report(heard("/A/blocked", {"header": {"frame_id": "odom"}, "point": PLACE})) is None
     assert reading.strange == {"/A/blocked": "odom"}
     assert reading.report(heard("/A/blocked", {"header": {"frame_id": "/map"}, "point": PLACE})) is not None
 
 
 def test_all_that_drones_may_report_is_listened_to() -> None:
-    topics = Reading(drones_of(pair()), "map").topics
+    topics = ReportDecoder(drones_of(pair()), "map").topics
     assert topics["/A/battery"] == "sensor_msgs/BatteryState"
     assert len(topics) == 10
 

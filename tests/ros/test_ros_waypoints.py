@@ -20,7 +20,7 @@ from robochoc.ros.publisher import NothingToPublishError, Publisher
 from robochoc.ros.recordings.types import UnknownTypeError, types_of
 from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.waypoint import Waypoint
-from tests.support.offered import offered
+from tests.support.installed_packages import install_entry_points
 
 POSE = "geometry_msgs/PoseStamped"
 NOW = 1_700_000_000_250_000_000
@@ -63,7 +63,9 @@ class Heap(Sink):
 
 def installed(monkeypatch: pytest.MonkeyPatch, **places: str) -> None:
     """As if a package offered these mappings: types are written with a double underscore here."""
-    offered(monkeypatch, mappings.GROUP, **{name.replace("__", "/"): place for name, place in places.items()})
+    install_entry_points(
+        monkeypatch, mappings.GROUP, **{name.replace("__", "/"): place for name, place in places.items()}
+    )
     mapping_for.cache_clear()
     monkeypatch.setattr(mappings, "mapping_for", mapping_for.__wrapped__)
 

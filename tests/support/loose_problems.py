@@ -93,7 +93,7 @@ def loose_team(protocol: str, chance: Random, *, costs: bool = False) -> Team:
     return loosened(random_team(chance, n_ary=traits.n_ary), chance)
 
 
-def agrees(team: Team, options: Options, solver: AceProcess | None = None) -> Outcome:
+def check_against_brute_force(team: Team, options: Options, solver: AceProcess | None = None) -> Outcome:
     """Solve `team` and return the outcome; it must be brute force's. `solve` itself has the assignment checked.
 
     A protocol that is not complete need not find the best answer, or any.
@@ -104,7 +104,7 @@ def agrees(team: Team, options: Options, solver: AceProcess | None = None) -> Ou
     if not protocol.traits.complete:
         options = replace(options, messages=ENOUGH)
     outcome = solve(team, options, solver=solver)
-    truth = least(team)
+    truth = minimum_cost(team)
     found = Verdict.OPTIMAL if team.kind is Kind.DISWCSP else Verdict.SOLUTION
     what = (team, options, outcome.verdict, outcome.cost)
     if outcome.assignment:
@@ -150,7 +150,7 @@ def untold_interface() -> Team:
     return Team("untold-interface", (above, robots[1]))
 
 
-def least(team: Team) -> float:
+def minimum_cost(team: Team) -> float:
     """The least cost of a solution, by brute force; without costs 0 for one, and `INFINITE` where there is none."""
     needed = {name for constraint in team.constraints() for name in constraint.variables}
     robots = (

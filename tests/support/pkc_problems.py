@@ -7,9 +7,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from random import Random
 
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.expression import Type, parse
+from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Child, Constraint, Model, Parent, Predicate, Relation, Robot, Semantics, Team
-from tests.support.problems import PREDICATES, team_of
+from robochoc.protocols.protocol import Protocol
+from robochoc.verification.checker import objections
+from tests.support.problems import PREDICATES, solutions, team_of
+from tests.support.program import ROOT
+from tests.support.solver_networks import compiled_by_brute_force
 
 Row = tuple[int, ...]
 """Values of a constraint's variables, in the order of its `variables`."""
@@ -189,3 +196,38 @@ def _replaced(team: Team, holder: str, old: Constraint, new: Constraint) -> Team
         return new if robot.name == holder and constraint is old else constraint
 
     return with_constraints(team, change)
+
+
+SECRETS = ROOT / "docs" / "examples" / "secrets"
+
+
+def pkc_part(pair: str, *forbidden: tuple[int, int], name: str = "C") -> Constraint:
+    """Return one robot's part of a PKC over the variables named by two letters."""
+    called = "R" + "_".join(f"{one}.{other}" for one, other in forbidden)
+    relation = Relation(called, 2, Semantics.CONFLICTS, forbidden)
+    return Constraint(name, relation, tuple(pair), tuple(pair), Model.PKC)
+
+
+def pkc_pair(below: Constraint | None, above: Constraint | None, values: int = 2) -> Team:
+    """Return the team of A above B, which share a PKC of these two parts."""
+    domains = dict.fromkeys("AB", range(1, values + 1))
+    team = team_of(domains, [below or pkc_part("AB")])
+    return team if above is None else with_part(team, "RA", "RB", above)
+
+
+def random_schedule(chance: Random) -> Schedule:
+    """Return a schedule of either kind."""
+    if chance.random() < 0.5:
+        return RandomChannels(chance.getrandbits(32))
+    return Concurrent(chance.getrandbits(32), chance.choice((0, 3, 20, 200)))
+
+
+def check_against_brute_force(team: Team, protocol: type[Protocol], chance: Random) -> Verdict:
+    """Solve `team` by `protocol` on the simulator; the verdict must be brute force's, and a solution must hold."""
+    result = Simulation(compiled_by_brute_force(team), protocol, random_schedule(chance)).run(60)
+    solvable = any(solutions(team))
+    assert result.verdict is (Verdict.SOLUTION if solvable else Verdict.NO_SOLUTION), team
+    if solvable:
+        flat = {name: value for own in result.assignments.values() for name, value in own.items()}
+        assert not list(objections(team, flat))
+    return result.verdict

@@ -10,8 +10,8 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.sfb import SFB, CPAs, SFBSettings
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import told
-from tests.support.trees import Costs, priced
+from tests.support.agents import replies
+from tests.support.pseudo_trees import Costs, priced
 
 CHAIN: Costs = {"AB": (3, 1, 0, 2), "BC": (0, 4, 2, 1), "A": (0, 1)}
 """RA and RB, RB and RC; the cheapest is RA 2, RB 1, RC 1, for 1."""
@@ -49,7 +49,7 @@ def introduced(
         if isinstance(message, CPAs):
             said.append(message)
         else:
-            todo += [(receiver, *one) for one in told(robots[receiver], (sender, message))]
+            todo += [(receiver, *one) for one in replies(robots[receiver], (sender, message))]
     return robots, said
 
 

@@ -20,9 +20,7 @@ from robochoc.cli.reports.failures import invalid_input_fails
 @invalid_input_fails
 def animate(saved: Path, output: Path | None, folder: Path | None, port: int, *, serve: bool) -> None:
     """Make the 3D scene of what `robochoc solve --json` printed, or of the journal that `--journal` wrote."""
-    from robochoc.cli.reports.progress import stages
-    from robochoc.cli.reports.scene import serve_scene, write_page
-    from robochoc.view.scene import scene_of
+    from robochoc.cli.reports.scene import scene_for, serve_scene, write_page
 
     if not (output or serve):
         raise click.UsageError("say where the page goes (-o FILE), or show it live (--serve)")
@@ -31,8 +29,7 @@ def animate(saved: Path, output: Path | None, folder: Path | None, port: int, *,
     refuse_same_places({"-o": output}, {"the result": saved}, teams=[folder] if folder else [])
     outcome = saved_outcome(saved)
     team = team_of(outcome, saved, folder)
-    with stages(outcome.team) as progress:
-        scene = scene_of(outcome, team, progress=progress)
+    scene = scene_for(outcome, team)
     if output:
         write_page(scene, output)
     if serve:

@@ -21,7 +21,7 @@ from robochoc.cli.options.saved import saved_outcome, team_of, team_option
 from robochoc.cli.reports.failures import INVALID, LOST, Failure, invalid_input_fails
 
 if TYPE_CHECKING:
-    from robochoc.flight.flight import Flown
+    from robochoc.flight.flight import FlightLog
     from robochoc.flight.mission import Mission
 
 
@@ -58,10 +58,9 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
         for line in (*published, *too_late(given["failures"], flown)):
             click.echo(line, err=True)
     if html or serve:
-        from robochoc.cli.reports.scene import serve_scene, write_page
-        from robochoc.view.scene import scene_of
+        from robochoc.cli.reports.scene import scene_for, serve_scene, write_page
 
-        scene = scene_of(outcome, team, mission=mission, flown=flown)
+        scene = scene_for(outcome, team, mission=mission, flown=flown)
         if html:
             write_page(scene, html, quiet=as_json)
         if serve:
@@ -69,18 +68,18 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
     click.get_current_context().exit(0 if as_planned(flown) else LOST)
 
 
-def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[Flown, list[str]]:
+def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[FlightLog, list[str]]:
     """What was flown, and what of it was published where."""
     from robochoc.cli.reports.progress import stages
     from robochoc.flight.flight import fly as flight
     from robochoc.formats import on_one_line
-    from robochoc.ros.outlet import Outlet, publish_flight
+    from robochoc.ros.sink_publisher import SinkPublisher, publish_flight
 
     conditions = conditions_of(given, mission)
     with ros_failures_told(), ExitStack() as stack:
         sinks = open_sinks(given["sinks"], stack)
         frame = given["frame"] or FRAME
-        outlets = [Outlet(mission.team, mission.drones, sink, frame) for sink in sinks]
+        outlets = [SinkPublisher(mission.team, mission.drones, sink, frame) for sink in sinks]
         try:
             with stages(mission.team) as progress:
                 flown = flight(mission, conditions, progress)

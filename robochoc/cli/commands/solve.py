@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from robochoc.journal.journal import Header, Recorder
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
-    from robochoc.ros.closed_loop import Loop
+    from robochoc.ros.closed_loop import ClosedLoop
     from robochoc.run.options import Options
     from robochoc.verification.objective import Objective
     from robochoc.view.scene import Scene
@@ -296,11 +296,9 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     for line in told_of(loop) if loop and not wanted.as_json else ():
         click.echo(line, err=True)
     if products.html or products.serve:
-        from robochoc.cli.reports.progress import stages
-        from robochoc.view.scene import scene_of
+        from robochoc.cli.reports.scene import scene_for
 
-        with stages(team.name) as progress:
-            scene = scene_of(outcome, team, mission=flight.mission, flown=flight.flown, progress=progress)
+        scene = scene_for(outcome, team, mission=flight.mission, flown=flight.flown)
         _show(scene, products, quiet=wanted.as_json)
     if outcome.verdict != "unknown":
         return flight.status
@@ -309,7 +307,7 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     return LIMIT
 
 
-def _run(team: Team, options: Options, recorder: Recorder | None, loop: Loop | None) -> Outcome:
+def _run(team: Team, options: Options, recorder: Recorder | None, loop: ClosedLoop | None) -> Outcome:
     """Run with whatever watches, a journal, a line on the terminal, and where decisions go."""
     from robochoc.cli.reports.progress import progress_line, waiting
     from robochoc.run.options import CENTRAL

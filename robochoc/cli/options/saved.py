@@ -87,9 +87,9 @@ def team_of(outcome: Outcome, saved: Path, folder: Path | None) -> Team | None:
 
 def _is_team_of(outcome: Outcome, team: Team) -> bool:
     """Whether all who took part, and all that they decided, are known to `team` or come with its scenario."""
-    from robochoc.flight.mission import everybody
+    from robochoc.flight.mission import all_robots
 
-    robots = everybody(team)
+    robots = all_robots(team)
     names = {robot.name for robot in robots}
     variables = {variable.name for robot in robots for variable in robot.variables}
     epochs = outcome.epochs

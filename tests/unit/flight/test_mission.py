@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.flight.crafts import Craft, crafts_of
-from robochoc.flight.layout import Axis, field_of
+from robochoc.flight.layout import Axis, layout_of
 from robochoc.flight.mission import VAST_M, Mission, mission_of
 from robochoc.model.expression import Apply, Constant, Name
 from robochoc.model.outcome import Epoch, Outcome, Verdict
@@ -141,7 +141,7 @@ def test_an_axis_goes_both_ways(values: list[int], most: int, scaled: int, cell:
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 3), st.integers(0, 2)), min_size=1, max_size=30))
 def test_places_of_a_field_are_apart(cells: list[tuple[int, int, int]]) -> None:
     crew = [Craft(f"c{number}", (x, y), z) for number, (x, y, z) in enumerate(cells)]
-    field = field_of(crew)
+    field = layout_of(crew)
     places = [place for place in field.places(crew) if place]
     assert len(places) == len(crew)
     for spots in (places, field.homes):

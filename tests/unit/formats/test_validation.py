@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import copy
 import gc
+import re
 from dataclasses import replace
 from pathlib import Path
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import robochoc
@@ -317,12 +318,15 @@ def files_of(team: Team) -> dict[str, bytes]:
 
 
 def without_places(messages: list[str]) -> list[str]:
-    """A missing neighbour is a missing file, or a missing robot."""
-    return sorted(one.partition(" has no file")[0].partition(" is not in the team")[0] for one in messages)
+    """A missing neighbour is a missing file, or a missing robot; in a file, the second domain D9 is called D9.2."""
+    renamed = (re.sub(r"\bD9\.\d+", "D9", one) for one in messages)
+    return sorted(one.partition(" has no file")[0].partition(" is not in the team")[0] for one in renamed)
 
 
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32), times=st.integers(1, 2))
+@example(seed=65, times=2)  # two equal domains, both too large
+@example(seed=2645, times=2)  # two constraints of one name and scope, both misplaced
 def test_valid_here_is_valid_there(tmp_path_factory: pytest.TempPathFactory, seed: int, times: int) -> None:
     chance = Random(seed)
     team = draw(seed)

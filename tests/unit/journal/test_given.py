@@ -16,12 +16,12 @@ from robochoc.model.orders import Order, OrderError, in_order
 from robochoc.model.problem import Constraint, Domain, Kind, Relation, Robot, Semantics, Team, Variable
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.explanation import invalidated_by
-from tests.support.changes import random_journey, stages
-from tests.support.complex_changes import random_complex_journey
+from tests.support.complex_changes import random_complex_changing_team
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import random_team, team_of
+from tests.support.random_changes import random_changing_team, stages
 
 FAMILIES = (
     random_team,
@@ -29,8 +29,8 @@ FAMILIES = (
     random_complex_team,
     random_complex_cost_team,
     random_pkc_team,
-    random_journey,
-    random_complex_journey,
+    random_changing_team,
+    random_complex_changing_team,
 )
 PER_FAMILY = 9
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import pytest
 
-from robochoc.formats import PREDEFINED
 from robochoc.model.change import ChangeError, changed, changed_by, rejoined, without
 from robochoc.model.problem import (
     AddAgent,
@@ -15,13 +14,11 @@ from robochoc.model.problem import (
     AddValue,
     Change,
     Child,
-    Constraint,
     Domain,
     Event,
     Kind,
     Model,
     Parent,
-    Predicate,
     RemoveAgent,
     RemoveConstraint,
     RemoveValue,
@@ -29,20 +26,8 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
-from tests.protocols.test_abt import differ, triangle
 from tests.support.problems import team_of
-
-NEQ = PREDEFINED["neq"]
-
-
-def named(name: str, *scope: str) -> Constraint:
-    """The two variables differ; of three, nothing is asked that could not be."""
-    definition = NEQ if len(scope) == 2 else Predicate("any", ("X", "Y", "Z"), NEQ.body)
-    return Constraint(name, definition, scope, scope)
-
-
-def newcomer(*parents: Parent, name: str = "RE", variable: str = "E") -> Robot:
-    return Robot(name, (Variable(variable, Domain("D", (range(1, 3),))),), parents=parents)
+from tests.support.small_teams import differ, named_constraint, newcomer, triangle
 
 
 def links(team: Team) -> dict[str, dict[str, tuple[str, ...]]]:
@@ -75,7 +60,7 @@ def test_a_robot_leaves_with_its_variables_links_and_constraints() -> None:
 
 
 def test_an_n_ary_constraint_goes_with_any_of_its_robots_and_the_links_of_the_others_stay() -> None:
-    team = team_of(dict.fromkeys("ABC", (1, 2)), [named("N", "A", "B", "C")])
+    team = team_of(dict.fromkeys("ABC", (1, 2)), [named_constraint("N", "A", "B", "C")])
     left = without(team, ["RA"])
     assert list(left.constraints()) == []
     assert [parent.name for parent in left["RC"].parents] == ["RB"]
@@ -96,7 +81,7 @@ def test_nobody_leaves_who_is_not_there() -> None:
 
 
 def test_a_robot_comes_last_and_its_parents_list_it() -> None:
-    robot = newcomer(Parent("RA"), Parent("RD", (named("N", "D", "E"),)))
+    robot = newcomer(Parent("RA"), Parent("RD", (named_constraint("N", "D", "E"),)))
     team = changed(triangle(), [AddAgent(robot)])
     assert team.order[-1] == "RE"
     assert team["RE"] == robot
@@ -104,7 +89,7 @@ def test_a_robot_comes_last_and_its_parents_list_it() -> None:
 
 
 def test_a_robot_that_comes_with_an_n_ary_constraint_is_told_by_all() -> None:
-    robot = newcomer(Parent("RA"), Parent("RD", (named("N", "D", "E", "A"),)))
+    robot = newcomer(Parent("RA"), Parent("RD", (named_constraint("N", "D", "E", "A"),)))
     team = changed(triangle(), [AddAgent(robot)])
     assert (links(team)["RA"]["RE"], links(team)["RD"]["RE"]) == (("A",), ("D",))
 
@@ -123,18 +108,22 @@ def test_a_robot_can_come_again() -> None:
         (replace(newcomer(), children=(Child("RA", line=7),)), "'RE' has the child 'RA'", 7),
         (newcomer(Parent("RX", line=8)), "there is no robot 'RX'", 8),
         (
-            newcomer(Parent("RA", (replace(named("N", "B", "E"), line=9),))),
+            newcomer(Parent("RA", (replace(named_constraint("N", "B", "E"), line=9),))),
             "'B' belongs to 'RB', which is no parent",
             9,
         ),
-        (newcomer(Parent("RA", (replace(named("N", "X", "E"), line=9),))), "no robot has the variable 'X'", 9),
         (
-            newcomer(Parent("RA"), Parent("RB", (replace(named("N", "A", "E"), line=9),))),
+            newcomer(Parent("RA", (replace(named_constraint("N", "X", "E"), line=9),))),
+            "no robot has the variable 'X'",
+            9,
+        ),
+        (
+            newcomer(Parent("RA"), Parent("RB", (replace(named_constraint("N", "A", "E"), line=9),))),
             "the scope of 'N' is not of 'RE' and 'RB'",
             9,
         ),
         (
-            newcomer(Parent("RA", (replace(named("N", "A", "B", "E"), line=9),)), Parent("RB")),
+            newcomer(Parent("RA", (replace(named_constraint("N", "A", "B", "E"), line=9),)), Parent("RB")),
             "'N' does not stand with 'RE' under 'RA'",
             9,
         ),
@@ -185,13 +174,13 @@ def test_values_that_cannot_go_or_come() -> None:
 
 
 def test_a_constraint_comes_to_a_pair_that_is_linked() -> None:
-    team = changed(triangle(), [AddConstraint("RC", "RA", named("N", "C", "A"))])
+    team = changed(triangle(), [AddConstraint("RC", "RA", named_constraint("N", "C", "A"))])
     assert [constraint.name for constraint in team["RC"].parents[0].constraints] == ["C", "N"]
     assert links(team) == links(triangle())
 
 
 def test_a_constraint_links_those_who_were_not() -> None:
-    team = changed(triangle(), [AddConstraint("RD", "RB", named("N", "B", "D", "A"))])
+    team = changed(triangle(), [AddConstraint("RD", "RB", named_constraint("N", "B", "D", "A"))])
     assert [parent.name for parent in team["RD"].parents] == ["RC", "RA", "RB"]
     assert (links(team)["RA"]["RD"], links(team)["RB"]["RD"]) == (("A",), ("B",))
 
@@ -203,14 +192,14 @@ def test_a_constraint_goes_and_its_link_stays() -> None:
 
 
 def test_all_of_one_name_go() -> None:
-    team = team_of(dict.fromkeys("AB", (1, 2)), [differ("A", "B"), named("N", "A", "B"), differ("B", "A")])
+    team = team_of(dict.fromkeys("AB", (1, 2)), [differ("A", "B"), named_constraint("N", "A", "B"), differ("B", "A")])
     assert [one.name for one in changed(team, [RemoveConstraint("RB", "RA", "C")]).constraints()] == ["N"]
 
 
 @pytest.mark.parametrize("sides", [("RA", "RB"), ("RA",), ("RB",)])
 def test_both_parts_of_a_partially_known_constraint_go(sides: tuple[str, ...]) -> None:
     above, below = triangle().robots[:2]
-    part = replace(named("P", "A", "B"), model=Model.PKC)
+    part = replace(named_constraint("P", "A", "B"), model=Model.PKC)
     above = replace(above, children=(Child("RB", ("A",), (part,) if "RA" in sides else ()),))
     below = replace(below, parents=(Parent("RA", (part,) if "RB" in sides else ()),), children=())
     team = Team("pair", (above, below))
@@ -225,14 +214,14 @@ def test_both_parts_of_a_partially_known_constraint_go(sides: tuple[str, ...]) -
         (RemoveConstraint("RB", "RC", "C"), "'RB' shares no constraint 'C' with a parent 'RC'"),
         (RemoveConstraint("RX", "RC", "C"), "there is no robot 'RX'"),
         (RemoveConstraint("RA", "RX", "C"), "there is no robot 'RX'"),
-        (AddConstraint("RX", "RA", named("N", "A", "B")), "there is no robot 'RX'"),
-        (AddConstraint("RB", "RX", named("N", "A", "B")), "there is no robot 'RX'"),
-        (AddConstraint("RB", "RB", named("N", "A", "B")), "'RB' is no parent of its own"),
-        (AddConstraint("RB", "RA", named("N", "A", "X")), "no robot has the variable 'X'"),
-        (AddConstraint("RC", "RA", named("N", "A", "B")), "the scope of 'N' is not of 'RC' and 'RA'"),
-        (AddConstraint("RA", "RB", named("N", "A", "B")), "'N' does not stand with 'RA' under 'RB'"),
-        (AddConstraint("RB", "RA", named("N", "A", "B", "C")), "'N' does not stand with 'RB' under 'RA'"),
-        (AddConstraint("RC", "RA", named("N", "A", "B", "C")), "'N' does not stand with 'RC' under 'RA'"),
+        (AddConstraint("RX", "RA", named_constraint("N", "A", "B")), "there is no robot 'RX'"),
+        (AddConstraint("RB", "RX", named_constraint("N", "A", "B")), "there is no robot 'RX'"),
+        (AddConstraint("RB", "RB", named_constraint("N", "A", "B")), "'RB' is no parent of its own"),
+        (AddConstraint("RB", "RA", named_constraint("N", "A", "X")), "no robot has the variable 'X'"),
+        (AddConstraint("RC", "RA", named_constraint("N", "A", "B")), "the scope of 'N' is not of 'RC' and 'RA'"),
+        (AddConstraint("RA", "RB", named_constraint("N", "A", "B")), "'N' does not stand with 'RA' under 'RB'"),
+        (AddConstraint("RB", "RA", named_constraint("N", "A", "B", "C")), "'N' does not stand with 'RB' under 'RA'"),
+        (AddConstraint("RC", "RA", named_constraint("N", "A", "B", "C")), "'N' does not stand with 'RC' under 'RA'"),
     ],
 )
 def test_constraints_that_cannot_come_or_go(change: Change, message: str) -> None:
@@ -289,7 +278,11 @@ def test_what_a_robot_tells_may_follow_from_the_constraints() -> None:
 def test_links_that_came_later_stay_when_a_robot_rejoins() -> None:
     team = triangle()
     later = changed(
-        team, [AddConstraint("RD", "RA", named("N", "A", "D")), AddConstraint("RC", "RA", named("N", "A", "C"))]
+        team,
+        [
+            AddConstraint("RD", "RA", named_constraint("N", "A", "D")),
+            AddConstraint("RC", "RA", named_constraint("N", "A", "C")),
+        ],
     )
     back = rejoined(later, team["RA"])
     assert links(back)["RA"] == {"RB": ("A",), "RC": ("A",), "RD": ("A",)}
@@ -304,7 +297,7 @@ def test_links_that_came_later_stay_when_a_robot_rejoins() -> None:
         (newcomer(name="RD", variable="Z"), "the variable 'D' is gone, and others need it"),
         (newcomer(name="RD", variable="A"), "the variable 'A' belongs to 'RA'"),
         (
-            replace(triangle()["RD"], parents=(Parent("RC", (named("N", "D", "A"),)),)),
+            replace(triangle()["RD"], parents=(Parent("RC", (named_constraint("N", "D", "A"),)),)),
             "the scope of 'N' is not of 'RD' and 'RC'",
         ),
     ],

@@ -15,48 +15,20 @@ from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.orders import Order, OrderError, in_order, neighbours, order_of, reordered
 from robochoc.model.priorities import natural
-from robochoc.model.problem import Child, Constraint, Event, Model, Parent, Predicate, Relation, Robot, Semantics, Team
+from robochoc.model.problem import Child, Constraint, Event, Model, Parent, Relation, Semantics
 from robochoc.protocols.order import PseudoTree
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.complex_problems import complex_team, random_complex_team
-from tests.support.problems import random_team, solutions, team_of
+from tests.support.problems import random_team, shuffled, solutions, team_of, with_unique_definitions
+from tests.support.small_teams import DIFFERENT, graph_team, pkc_team
 
-DIFFER = Relation("differ", 2, Semantics.CONFLICTS, ((1, 1), (2, 2)))
 SIMULATED = Options(runtime=Runtime.SIMULATOR, cache=False)
-
-
-def shuffled(chance: Random, team: Team) -> list[str]:
-    return chance.sample(team.order, len(team.order))
-
-
-def writable(team: Team) -> Team:
-    """`team`, with the relations of each file called R1, R2, ...: unique in a file, not between files."""
-
-    def named(robot: Robot) -> Robot:
-        numbers = itertools.count(1)
-
-        def renamed(constraint: Constraint) -> Constraint:
-            if isinstance(constraint.definition, Predicate):
-                return constraint
-            return replace(constraint, definition=replace(constraint.definition, name=f"R{next(numbers)}"))
-
-        parents = tuple(replace(one, constraints=tuple(map(renamed, one.constraints))) for one in robot.parents)
-        return replace(robot, private=tuple(map(renamed, robot.private)), parents=parents)
-
-    return replace(team, robots=tuple(map(named, team.robots)))
 
 
 def meaning(constraint: Constraint) -> Constraint:
     """`constraint`, whatever its definition is called."""
     return replace(constraint, definition=replace(constraint.definition, name=""))
-
-
-def graph_team(edges: Sequence[str], domains: Mapping[str, int] | None = None) -> Team:
-    """A team of robots `RA`, `RB`, ...; each edge `AB` is a constraint."""
-    names = sorted({*"".join(edges), *(domains or {})})
-    sizes = {name: range(1, 1 + (domains or {}).get(name, 2)) for name in names}
-    return team_of(sizes, [Constraint("C", DIFFER, tuple(edge), tuple(edge)) for edge in edges])
 
 
 def letters(names: Sequence[str]) -> str:
@@ -104,7 +76,7 @@ def test_each_constraint_stands_with_its_lowest_robot_and_the_others_are_its_par
 def test_the_files_of_the_team_are_valid_and_say_the_same(make: type, tmp_path: Path) -> None:
     chance = Random(f"files {make.__name__}")
     for number in range(40):
-        team = writable(make(chance))
+        team = with_unique_definitions(make(chance))
         turned = reordered(team, shuffled(chance, team))
         write_team(turned, tmp_path / str(number))
         again = read_team(tmp_path / str(number))
@@ -191,7 +163,7 @@ def test_a_link_of_a_constraint_that_is_held_elsewhere_goes() -> None:
 
 def test_what_a_child_is_told_beyond_its_constraints_it_goes_on_being_told() -> None:
     team = complex_team({"R1": ["A", "B"], "R2": ["C"], "R3": ["D"]}, {name: [1, 2] for name in "ABCD"}, [])
-    differ = Constraint("C", DIFFER, ("A", "C"), ("A", "C"))
+    differ = Constraint("C", DIFFERENT, ("A", "C"), ("A", "C"))
     first, second, third = team.robots
     told = replace(
         team,
@@ -224,13 +196,6 @@ def test_definitions_of_one_name_in_two_files_do_not_become_one() -> None:
     definitions = {constraint.scope[1]: constraint.definition for constraint in turned["RA"].shared}
     assert {name: one.name for name, one in definitions.items()} == {"B": "R", "C": "R_2", "D": "R_2", "E": "R"}
     assert [meaning(one) for one in turned["RA"].shared] == [meaning(one) for one in given]
-
-
-def pkc_team() -> Team:
-    part = Constraint("C", DIFFER, ("A", "B"), ("A", "B"), model=Model.PKC)
-    team = team_of({"A": (1, 2), "B": (1, 2), "X": (1, 2)}, [part, Constraint("D", DIFFER, ("B", "X"), ("B", "X"))])
-    above = replace(team["RA"], children=(Child("RB", ("A",), (part,)),))
-    return replace(team, robots=(above, team["RB"], team["RX"]))
 
 
 def test_a_partially_known_constraint_stays_as_it_is_held() -> None:
@@ -294,7 +259,7 @@ def test_min_width_has_freuders_width() -> None:
 def order_of_graph(graph: Mapping[str, frozenset[str]], order: Order) -> tuple[str, ...]:
     """`order` of a team with that graph."""
     edges = [(one[1:], other[1:]) for one in graph for other in graph[one] if one < other]
-    constraints = [Constraint("C", DIFFER, edge, edge) for edge in edges]
+    constraints = [Constraint("C", DIFFERENT, edge, edge) for edge in edges]
     return order_of(team_of({name[1:]: (1, 2) for name in sorted(graph)}, constraints), order)
 
 
@@ -310,7 +275,7 @@ def test_dom_deg_begins_with_the_smallest_domain_a_neighbour() -> None:
 
 def test_dom_deg_multiplies_the_domains_of_a_complex_robot() -> None:
     domains = {"A": [1, 2, 3], "B": [1, 2, 3], "C": list(range(8))}
-    constraint = Constraint("C", DIFFER, ("A", "C"), ("A", "C"))
+    constraint = Constraint("C", DIFFERENT, ("A", "C"), ("A", "C"))
     team = complex_team({"R1": ["A", "B"], "R2": ["C"]}, domains, [constraint])
     assert order_of(team, Order.DOM_DEG) == ("R2", "R1")
 

@@ -27,9 +27,7 @@ from robochoc.model.problem import (
 )
 from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
-from tests.protocols.test_abt import triangle
-from tests.unit.model.test_change import named
-from tests.unit.model.test_changed_files import writable
+from tests.support.small_teams import named_constraint, triangle
 
 
 class Losing(Session):
@@ -62,14 +60,14 @@ CHANGES: list[Change] = [
     RemoveConstraint("RC", "RB", "C"),
     RemoveValue("C", 1),
     AddValue("C", 7),
-    AddConstraint("RC", "RB", named("N", "B", "C")),
-    AddConstraint("RD", "RC", named("M", "C", "D")),
+    AddConstraint("RC", "RB", named_constraint("N", "B", "C")),
+    AddConstraint("RD", "RC", named_constraint("M", "C", "D")),
 ]
 
 
 @pytest.fixture
 def team(tmp_path: Path) -> Team:
-    write_team(writable(triangle()), tmp_path / "team")
+    write_team(triangle(), tmp_path / "team")
     return read_team(tmp_path / "team")
 
 

@@ -36,8 +36,8 @@ from robochoc.run import Options, Runtime, solve
 from robochoc.run.scenario import FinishedEpoch, ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import invalidated_by
-from tests.conformance.test_epochs import differ
 from tests.support.problems import team_of
+from tests.support.small_teams import differ
 
 BASE = team_of(dict.fromkeys("ABC", range(1, 4)), [differ("A", "B"), differ("B", "C")])
 DONE = RunResult(Verdict.SOLUTION, None, {}, Metrics({"Ok": 7}))

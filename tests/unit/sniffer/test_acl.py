@@ -20,15 +20,15 @@ from robochoc.services.sl import REQUEST_CAPS, Function, df_on, request
 from robochoc.services.symbolic import Expression, read
 from robochoc.sniffer.acl import ACLError, ACLMessage, parse, text
 from robochoc.sniffer.performatives import ACTS, OTHERWISE, act_of
-from tests.support.program import ROOT
-from tests.support.talks import (
+from tests.support.acl_conversations import (
+    BUNDLED_PROTOCOLS,
     OK,
-    OURS,
     PLATFORM,
     assert_others_read,
     conversation,
     types_of,
 )
+from tests.support.program import ROOT
 
 DOCS = (ROOT / "docs" / "guides" / "acl.md").read_text()
 
@@ -38,7 +38,7 @@ DOCS = (ROOT / "docs" / "guides" / "acl.md").read_text()
 
 def table() -> str:
     speakers: dict[str, list[str]] = {}
-    for protocol in OURS:
+    for protocol in BUNDLED_PROTOCOLS:
         for kind in types_of(protocol_named(protocol)):
             speakers.setdefault(kind.__name__, []).append(protocol)
     rows = [
@@ -49,7 +49,7 @@ def table() -> str:
 
 
 def test_the_table_is_complete_and_has_nothing_else() -> None:
-    ours = {kind.__name__ for name in OURS for kind in types_of(protocol_named(name))}
+    ours = {kind.__name__ for name in BUNDLED_PROTOCOLS for kind in types_of(protocol_named(name))}
     assert set(ACTS) == ours
     assert list(ACTS) == sorted(ACTS)
 

@@ -23,7 +23,7 @@ from robochoc.sniffer.moves import Stage, whole_scene
 from robochoc.sniffer.page import page
 from robochoc.sniffer.trace import Trace
 from tests.support.program import ROOT
-from tests.support.sniffed import header, journal_of, told
+from tests.support.sniffer_server import header, journal_of, run_events
 
 HOSTILE = "</script></title><img src=x onerror=alert(1)>"
 
@@ -129,7 +129,7 @@ def test_all_land_when_another_run_begins() -> None:
 
 
 def test_meshcats_commands_hold_every_drone_and_no_animation() -> None:
-    events, outcome = told()
+    events, outcome = run_events()
     scene = msgspec.json.decode(whole_scene(trace_of(events, outcome)))
     commands = [umsgpack.unpackb(base64.b64decode(command)) for command in scene["commands"]]
     assert {command["type"] for command in commands} == {"set_transform", "set_property", "set_object"}

@@ -27,9 +27,7 @@ from robochoc.services.identifier import AgentIdentifier
 from robochoc.sniffer.acl import ACLError, ACLMessage
 from robochoc.sniffer.conversation import MAX_JSON, Conversation
 from robochoc.sniffer.performatives import ACTS
-from tests.support.cost_problems import random_cost_team
-from tests.support.problems import random_team
-from tests.support.talks import (
+from tests.support.acl_conversations import (
     EVERY_PROTOCOL,
     OK,
     PLATFORM,
@@ -38,6 +36,8 @@ from tests.support.talks import (
     returned,
     types_of,
 )
+from tests.support.cost_problems import random_cost_team
+from tests.support.problems import random_team
 
 # Every message of every protocol
 

@@ -24,10 +24,10 @@ from robochoc.sniffer.feed import Feed
 from robochoc.sniffer.phrases import Setting, row
 from robochoc.sniffer.trace import Trace
 from robochoc.sniffer.words import sentence, wording_of
-from tests.support.changes import random_journey
 from tests.support.complex_problems import random_complex_team
 from tests.support.problems import random_team
-from tests.support.recorded import fed, record
+from tests.support.random_changes import random_changing_team
+from tests.support.recorded_journals import feed_of, record
 
 OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
 PROTOCOLS: list[type[Protocol]] = [*map(protocol_named, OURS), FirstFit]
@@ -152,7 +152,7 @@ REAL = {
 @cache
 def said(protocol: str) -> dict[str, set[str]]:
     """All that is said in a run, by the type of message."""
-    feed = fed(protocol)
+    feed = feed_of(protocol)
     return words_of(feed)
 
 
@@ -242,7 +242,7 @@ def test_robots_with_several_variables_are_told_by_those_that_matter(seed: int) 
 def test_names_follow_the_team_through_its_epochs() -> None:
     found = 0
     for seed in range(40):
-        team = random_journey(Random(seed))
+        team = random_changing_team(Random(seed))
         options = Options(protocol="dynabt", runtime=Runtime.SIMULATOR, cache=False)
         feed = Feed(Trace.of(record(team, options)))
         of = feed.trace.messages

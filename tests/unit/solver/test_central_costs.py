@@ -32,8 +32,8 @@ from robochoc.verification.second_opinion import contradiction
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import (
     cost_of,
-    fewest_aside,
     least_cost,
+    minimum_withdrawal,
     random_complex_cost_team,
     random_cost_team,
     with_costs,
@@ -173,7 +173,7 @@ def test_as_few_as_possible_step_aside_by_weight(batch: int, solver: AceProcess)
     for _ in range(60 if batch else 30):
         team = weighed(random_team(chance) if chance.random() < 0.7 else random_complex_team(chance), chance)
         outcome = solve(team, FEWEST, solver=solver)
-        assert sum(team[name].weight for name in outcome.withdrawn) == fewest_aside(team)
+        assert sum(team[name].weight for name in outcome.withdrawn) == minimum_withdrawal(team)
         assert outcome.verdict is (Verdict.OPTIMAL if outcome.withdrawn else Verdict.SOLUTION)
         assert not list(objections(team, outcome.assignment, outcome.withdrawn))
         aside += bool(outcome.withdrawn)

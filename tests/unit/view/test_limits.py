@@ -6,7 +6,7 @@ import pytest
 
 from robochoc.flight.mission import mission_of
 from robochoc.model.outcome import Epoch, Outcome, Verdict
-from robochoc.view.scene import scene_of
+from tests.support.flights import scene_of
 
 
 @pytest.mark.parametrize(
