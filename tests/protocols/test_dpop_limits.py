@@ -13,7 +13,8 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message, encode
 from robochoc.model.problem import Constraint, Relation, Semantics
-from robochoc.protocols.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
+from robochoc.protocols.dpop import DPOP
+from robochoc.protocols.dpop_messages import UTIL, VALUE, Dimensions, Need, Proceed
 from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
@@ -87,7 +88,7 @@ def test_costs_are_exact_up_to_there(factor: int) -> None:
     assert solve(team, Options(protocol="dpop", runtime=Runtime.SIMULATOR)).cost == 3 * (5 * factor + 4)
 
 
-@pytest.mark.parametrize("withdraw", [None, Withdrawal.FEWEST])
+@pytest.mark.parametrize("withdraw", [None, Withdrawal.MINIMUM])
 def test_a_run_over_the_limit_says_the_same_in_every_runtime(withdraw: Withdrawal | None) -> None:
     team = products("ABCDE", "AB BC AC AD BD CD AE")
     said = []
