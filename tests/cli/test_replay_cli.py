@@ -32,7 +32,7 @@ queens3d-2: abt, runtime simulator, seed 0
 
 @pytest.fixture(scope="module")
 def two() -> Journal:
-    return recorded(queens3d(2), Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.FEWEST))
+    return recorded(queens3d(2), Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MINIMUM))
 
 
 def written(journal: Journal, path: Path) -> Path:

@@ -115,7 +115,7 @@ def test_as_few_as_possible_step_aside(protocol: str) -> None:
         team = random_team(chance, n_ary=protocol_named(protocol).traits.n_ary)
         robots = tuple(replace(robot, weight=chance.choice((1, 1, 2, 3))) for robot in team.robots)
         team = replace(team, robots=robots)
-        options = replace(random_options(team, protocol, chance), withdraw=Withdrawal.FEWEST)
+        options = replace(random_options(team, protocol, chance), withdraw=Withdrawal.MINIMUM)
         outcome = solve(team, options)
         assert sum(team[name].weight for name in outcome.withdrawn) == minimum_withdrawal(team)
         assert outcome.verdict is (Verdict.OPTIMAL if outcome.withdrawn else Verdict.SOLUTION)

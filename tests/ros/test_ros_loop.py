@@ -96,7 +96,7 @@ def test_an_epoch_without_a_solution_may_be_followed_by_one_with() -> None:
 @pytest.mark.parametrize(
     ("options", "named"),
     [
-        (Options(protocol="dynabt", withdraw=Withdrawal.FEWEST), "--withdraw"),
+        (Options(protocol="dynabt", withdraw=Withdrawal.MINIMUM), "--withdraw"),
         (Options(protocol="dynabt", runtime=Runtime.NETWORK), "--runtime network"),
         (Options(protocol="central"), "--protocol central"),
     ],

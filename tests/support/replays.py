@@ -63,7 +63,7 @@ def withdrawal(protocol: str, team: Team, chance: Random) -> Withdrawal | None:
     parts = any(one.model is ConstraintModel.PKC for one in team.constraints())
     fewest = not parts and (traits.complete or not traits.costs)
     maximal = not parts and team.kind is ProblemKind.DISCSP
-    return chance.choice([None, None, *([Withdrawal.FEWEST] * fewest), *([Withdrawal.MAXIMAL] * maximal)])
+    return chance.choice([None, None, *([Withdrawal.MINIMUM] * fewest), *([Withdrawal.MAXIMAL] * maximal)])
 
 
 def recorded(team: Team, options: Options, solver: AceProcess | None = None) -> Journal:

@@ -119,15 +119,15 @@ ros_options = _optional(
         metavar="SINK",
         help=(
             "Publish decisions as waypoints: mcap:FILE (for Foxglove), rosbag:FILE, rosbridge://HOST:PORT, rospy, or"
-            " what is installed (docs/guides/ros.md). May be given several times."
+            " an installed sink. Repeatable."
         ),
     ),
-    click.option("--frame", type=FrameType(), metavar="NAME", help=f"The frame of all places.  [default: {FRAME}]"),
+    click.option("--frame", type=FrameType(), metavar="NAME", help=f"Frame of all positions.  [default: {FRAME}]"),
     click.option(
         "--scale",
         type=Finite(1e-6, 1e6),
         metavar="METRES",
-        help="So long is a unit of the topics' x, y and z.  [default: 1, or less for a vast field]",
+        help="Length of one unit of the problem's x, y and z.  [default: 1, less for a vast field]",
     ),
 )
 """`--ros`, `--frame`, `--scale`."""
@@ -139,16 +139,16 @@ flight_options = _optional(
         multiple=True,
         type=FailureType(),
         metavar="ROBOT[@SECONDS]",
-        help="In the simulated flight, a motor of this robot's drone stops (after 2 s). May be given several times.",
+        help="Stop a motor of this robot's drone (after 2 s). Repeatable.",
     ),
     click.option(
         "--distance",
         type=Finite(0, min_open=True),
         metavar="METRES",
-        help="No two drones of the simulated flight come nearer.  [default: 0.5, or less where places are nearer]",
+        help="Minimum distance between drones.  [default: 0.5, or less where places are nearer]",
     ),
-    click.option("--wind", type=WindType(), metavar="X[,Y,Z]", help="Wind in the simulated flight, in m/s."),
-    click.option("--gusts", type=Finite(0), metavar="M/S", help="Gusts in the simulated flight."),
+    click.option("--wind", type=WindType(), metavar="X[,Y,Z]", help="Wind, in m/s."),
+    click.option("--gusts", type=Finite(0), metavar="M/S", help="Strength of gusts, in m/s."),
 )
 """`--fail`, `--distance`, `--wind`, `--gusts`."""
 
@@ -157,9 +157,8 @@ situation_options = _optional(
         "--situation",
         metavar="SOURCE",
         help=(
-            "What robots report changes the problem, and the team solves again: flight (the decisions are flown in a"
-            " simulation), mcap:FILE, rosbag:FILE, rosbridge://HOST:PORT, rospy, or what is installed"
-            " (docs/guides/ros.md)."
+            "Solve again when robots report a change. SOURCE: flight (decisions are flown in a simulation), mcap:FILE,"
+            " rosbag:FILE, rosbridge://HOST:PORT, rospy or an installed source."
         ),
     ),
     click.option(
@@ -167,16 +166,15 @@ situation_options = _optional(
         type=Finite(0, min_open=True),
         metavar="SECONDS",
         help=(
-            "A robot whose process is stopped (SIGSTOP), or on a network out of reach, for so long is lost (see"
-            " --on-loss).  [default: it is waited for; on a network 10]  With --situation: so long robots have to"
-            " report something after each decision; then the run is over.  [default: 10]"
+            "A robot is lost after not answering for this long.  [default: no limit; on a network 10]  With"
+            " --situation: how long to wait for reports after each decision.  [default: 10]"
         ),
     ),
     click.option(
         "--battery",
         type=Finite(0, 1),
         metavar="LEVEL",
-        help="A robot leaves when a battery of its drones holds less (1 is full).  [default: 0.2]",
+        help="A robot leaves when a battery of its drones falls below this (1: full).  [default: 0.2]",
     ),
     click.option(
         "--obstacle",
@@ -184,7 +182,7 @@ situation_options = _optional(
         multiple=True,
         type=PointType(),
         metavar="X,Y,Z",
-        help="Something in the way of the simulated flight, in the problem's units. May be given several times.",
+        help="An obstacle, in the problem's units. Repeatable.",
     ),
 )
 """`--situation`, `--patience`, `--battery`, `--obstacle`."""

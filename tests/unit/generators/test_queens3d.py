@@ -109,7 +109,7 @@ def test_four_has_no_solution_and_some_can_fly(model: QueensModel, runtime: Runt
 @pytest.mark.parametrize(("model", "most"), [("planar", 10), ("full", 7)])
 def test_of_four_it_is_proven_how_many_can_fly(protocol: str, model: str, most: int, runtime: Runtime) -> None:
     """Whether the fewest are told after it has been found that not all can, or at once."""
-    options = Options(protocol=protocol, runtime=runtime, withdraw=Withdrawal.FEWEST, timeout=60)
+    options = Options(protocol=protocol, runtime=runtime, withdraw=Withdrawal.MINIMUM, timeout=60)
     outcome = solve(queens3d(4, model), options)
     assert outcome.verdict is Verdict.OPTIMAL
     assert outcome.verified

@@ -51,7 +51,7 @@ from tests.support.replays import (
 )
 
 FEW, MANY = 2, 100
-FOUR = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.FEWEST)
+FOUR = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MINIMUM)
 
 
 @pytest.fixture(scope="module")

@@ -56,7 +56,7 @@ def named(refusal: str) -> list[str]:
 
 
 @pytest.mark.parametrize("name", ["dpop", "sfb"])
-@pytest.mark.parametrize("withdraw", [None, Withdrawal.FEWEST])
+@pytest.mark.parametrize("withdraw", [None, Withdrawal.MINIMUM])
 def test_whoever_is_named_takes_costs_that_tables_do_not_hold(name: str, withdraw: Withdrawal | None) -> None:
     team = dear(EXACT)
     said = refused(team, options_for(name, withdraw))
@@ -79,7 +79,7 @@ def test_what_both_refuse_is_told_of_by_both(monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.mark.parametrize("team", [dear(3), partly_known(3)], ids=["costs", "partly known"])
-@pytest.mark.parametrize("withdraw", [None, Withdrawal.FEWEST])
+@pytest.mark.parametrize("withdraw", [None, Withdrawal.MINIMUM])
 def test_whoever_is_named_in_any_refusal_takes_the_team(withdraw: Withdrawal | None, team: Team) -> None:
     sent_to: set[str] = set()
     for offer in offers():

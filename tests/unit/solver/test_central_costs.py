@@ -43,7 +43,7 @@ from tests.support.problems import random_team, team_of
 from tests.support.program import robochoc
 
 CENTRAL = Options(protocol="central")
-FEWEST = replace(CENTRAL, withdraw=Withdrawal.FEWEST)
+FEWEST = replace(CENTRAL, withdraw=Withdrawal.MINIMUM)
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 21))]
 
 
@@ -281,9 +281,9 @@ def test_more_aside_than_need_be_is_refuted(monkeypatch: pytest.MonkeyPatch) -> 
     pairs = [("A", name) for name in ("B", "C", "D")]
     star = team_of(dict.fromkeys("ABCD", (1,)), [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in pairs])
     with pytest.raises(RefutedError, match=r"the least cost, 3, and a judge has found one that costs 1$"):
-        claimed(OnlyTheFirst, star, monkeypatch, withdraw=Withdrawal.FEWEST)
+        claimed(OnlyTheFirst, star, monkeypatch, withdraw=Withdrawal.MINIMUM)
     heavy = replace(star, robots=(replace(star.robots[0], weight=3), *star.robots[1:]))
-    outcome = claimed(OnlyTheFirst, heavy, monkeypatch, withdraw=Withdrawal.FEWEST)
+    outcome = claimed(OnlyTheFirst, heavy, monkeypatch, withdraw=Withdrawal.MINIMUM)
     assert (outcome.withdrawn, outcome.confirmed) == (("RB", "RC", "RD"), True)
 
 
