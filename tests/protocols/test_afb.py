@@ -10,8 +10,9 @@ import robochoc.protocols.afb
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
-from robochoc.protocols.afb import AFB, CPA, FBCPA, FBEstimate, NewSolution, Terminate
+from robochoc.protocols.afb import AFB
 from robochoc.protocols.afb_bounds import Cost
+from robochoc.protocols.afb_messages import CPA, FBCPA, FBEstimate, NewSolution, Terminate
 from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import NO_BRIEF, RunParameters, agent_problems

@@ -13,7 +13,8 @@ from robochoc.model.expression import Type, parse
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics
-from robochoc.protocols.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
+from robochoc.protocols.dpop import DPOP
+from robochoc.protocols.dpop_messages import UTIL, VALUE, Dimensions, Need, Proceed
 from robochoc.run.orchestrator import Options, Runtime, solve
 from tests.support.agents import replies, value
 from tests.support.cost_problems import with_costs

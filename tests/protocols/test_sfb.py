@@ -19,7 +19,8 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.interchangeable import one_by_one
-from robochoc.protocols.sfb import LARGEST, SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
+from robochoc.protocols.sfb import LARGEST, SFB, SFBSettings
+from robochoc.protocols.sfb_messages import Above, Below, CPAs, Explored, Solution
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact import EXACT

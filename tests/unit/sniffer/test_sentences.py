@@ -10,20 +10,21 @@ from functools import cache
 from random import Random
 from typing import Any, get_args
 
-import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robochoc.generators.queens3d import queens3d
+from robochoc.model.message import Message
+from robochoc.model.wording import Wording, listed
+from robochoc.protocols.dfs import Token
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.orchestrator import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.sniffer.feed import Feed
-from robochoc.sniffer.phrases import Setting, row
+from robochoc.sniffer.sentences import sentence
 from robochoc.sniffer.trace import Trace
-from robochoc.sniffer.words import sentence, wording_of
 from tests.support.complex_problems import random_complex_team
 from tests.support.problems import random_team
 from tests.support.random_changes import random_changing_team
@@ -31,7 +32,7 @@ from tests.support.recorded_journals import feed_of, record
 
 OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
 PROTOCOLS: list[type[Protocol]] = [*map(protocol_named, OURS), FirstFit]
-TYPES = sorted(
+TYPES: list[type[Message]] = sorted(
     {kind for protocol in PROTOCOLS for kind in get_args(protocol.messages) or (protocol.messages,)},
     key=lambda kind: (kind.__name__, kind.__module__),
 )
@@ -175,8 +176,8 @@ def test_no_message_of_ours_is_told_as_a_strangers(protocol: str) -> None:
 
 
 @pytest.mark.parametrize("kind", TYPES, ids=lambda kind: f"{kind.__module__}.{kind.__name__}")
-def test_every_type_of_every_protocol_has_its_words(kind: type[msgspec.Struct]) -> None:
-    assert wording_of(kind.__name__, dict.fromkeys(kind.__struct_fields__)) is not None
+def test_every_type_of_every_protocol_has_its_words(kind: type[Message]) -> None:
+    assert kind.in_words is not Message.in_words
 
 
 def test_a_solution_that_is_found_and_who_steps_aside() -> None:
@@ -202,8 +203,9 @@ def test_a_tree_names_the_robots_on_the_branch_only() -> None:
         of = feed.trace.messages
         if feed.trace.kinds[of.kind[message]] == "CPA":
             sender = feed.trace.robots[of.sender[message]]
-            own = feed.names.setting(0, sender, sender)
-            branch = [*own.above[sender], sender]
+            own = feed.names.wording(0, sender, sender)
+            branch = own.branch
+            assert branch[-1] == sender
             values = [value for value, _ in feed.trace.content(message)["assignments"]]
             assert len(values) == len(branch)
             facts = [
@@ -211,7 +213,7 @@ def test_a_tree_names_the_robots_on_the_branch_only() -> None:
                 for robot, value in zip(branch, values, strict=True)
                 for name, one in zip(own.interfaces[robot], value, strict=True)
             ]
-            assert feed.words(message) == f"{sender} says: so far {row(facts)}"
+            assert feed.words(message) == f"{sender} says: so far {listed(facts)}"
     assert all("accept its partial assignment" in one for one in told["Accept"])
 
 
@@ -251,7 +253,7 @@ def test_names_follow_the_team_through_its_epochs() -> None:
             sender = feed.trace.robots[of.sender[message]]
             if sender in joined and feed.trace.kinds[of.kind[message]] == "Ok":
                 found += 1
-                (name,) = feed.names.setting(of.run[message], sender, sender).interfaces[sender]
+                (name,) = feed.names.wording(of.run[message], sender, sender).interfaces[sender]
                 assert feed.words(message).startswith(f"{sender} says: {name} = ")
                 assert name in feed.names.variables(sender)
         if found:
@@ -261,9 +263,13 @@ def test_names_follow_the_team_through_its_epochs() -> None:
 
 # One by one
 
-TWO = Setting(
-    "ABT", "Robot2.1", "Robot1.1", ("Robot1.1", "Robot2.1"), {}, {"Robot1.1": ("V", "W"), "Robot2.1": ("V2.1",)}
-)
+ORDER = ("Robot1.1", "Robot2.1")
+TWO = Wording("Robot2.1", "Robot1.1", ORDER, {"Robot1.1": ("V", "W"), "Robot2.1": ("V2.1",)}, ORDER)
+
+
+def type_with(kind: str, content: Mapping[str, Any]) -> type[Message]:
+    """A type of that name with those fields; of several, any."""
+    return next(one for one in TYPES if one.__name__ == kind and set(one.__struct_fields__) == {*content})
 
 
 @pytest.mark.parametrize(
@@ -311,22 +317,22 @@ TWO = Setting(
     ],
 )  # fmt: skip
 def test_the_rarer_things_that_are_said(kind: str, content: dict[str, Any], words: str) -> None:
-    assert sentence(kind, content, TWO) == f"Robot2.1 says: {words}"
+    assert sentence(kind, content, TWO, type_with(kind, content)) == f"Robot2.1 says: {words}"
 
 
 def test_long_contents_are_cut() -> None:
     names = [f"R{place}" for place in range(20)]
-    told = sentence("Token", {"visited": names}, TWO)
+    told = sentence("Token", {"visited": names}, TWO, Token)
     assert told.endswith("holds R0, R1, R2, R3, R4, R5, R6, R7 and 12 more already")
-    assert len(sentence("Token", {"visited": ["x" * 500] * 9}, TWO)) == 1000
+    assert len(sentence("Token", {"visited": ["x" * 500] * 9}, TWO, Token)) == 1000
 
 
 def test_a_users_own_type_is_told_by_its_fields() -> None:
     content = {"price": 3, "item": "x" * 100, "many": list(range(50)), "few": [1, 2]}
-    told = sentence("Bid", content, TWO)
+    told = sentence("Bid", content, TWO, None)
     assert told == f"Robot2.1 says Bid (inform): price = 3, item = {'x' * 59}…, many = 50 entries and few = [1,2]"
-    assert sentence("Ok", {"value": [3]}, TWO, ours=False) == "Robot2.1 says Ok (inform): value = [3]"
-    assert sentence("Bye", {}, TWO) == "Robot2.1 says Bye (inform)"
+    assert sentence("Ok", {"value": [3]}, TWO, None) == "Robot2.1 says Ok (inform): value = [3]"
+    assert sentence("Bye", {}, TWO, None) == "Robot2.1 says Bye (inform)"
 
 
 anything = st.recursive(
@@ -340,9 +346,9 @@ anything = st.recursive(
 
 @given(st.sampled_from(TYPES), st.data())
 @settings(max_examples=100, deadline=None)
-def test_there_are_words_for_whatever_a_journal_holds(kind: type[msgspec.Struct], data: st.DataObject) -> None:
+def test_there_are_words_for_whatever_a_journal_holds(kind: type[Message], data: st.DataObject) -> None:
     content: Mapping[str, Any] = {name: data.draw(anything) for name in kind.__struct_fields__}
-    told = sentence(kind.__name__, content, TWO)
+    told = sentence(kind.__name__, content, TWO, kind)
     assert told.startswith("Robot2.1 says")
     assert len(told) <= 1000
     assert told.isprintable()

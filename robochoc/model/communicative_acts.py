@@ -1,12 +1,13 @@
-"""The communicative acts of FIPA00037, the library of what a message can do: its performative."""
+"""The communicative acts of FIPA00037: what a robot does by saying a message."""
 
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import NamedTuple
 
 
 class Performative(StrEnum):
-    """What the sender of a message does by it. Written in capitals, and read in any."""
+    """The name of a communicative act. Written in capitals, and read in any case."""
 
     ACCEPT_PROPOSAL = "accept-proposal"
     AGREE = "agree"
@@ -30,3 +31,14 @@ class Performative(StrEnum):
     REQUEST_WHEN = "request-when"
     REQUEST_WHENEVER = "request-whenever"
     SUBSCRIBE = "subscribe"
+
+
+class Act(NamedTuple):
+    """The act of a type of message: its performative, and the reason for it."""
+
+    performative: Performative
+    why: str
+
+
+INFORM = Act(Performative.INFORM, "every message tells the receiver something")
+"""The act of a message whose class declares no other."""
