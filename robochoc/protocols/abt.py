@@ -96,6 +96,7 @@ class ABT(Backtracking):
         paper="Yokoo et al. 1992; Bessiere et al. 2005; PKC: Brito et al. 2009",
         partially_known=True,
         privacy="constraints of lower robots; of PKCs every robot's part, but for the pairs that were asked about",
+        use_when="no costs: the default",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

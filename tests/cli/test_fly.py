@@ -240,7 +240,7 @@ def test_the_page_and_names_that_are_hostile(tmp_path: Path) -> None:
     assert len(result.stdout.splitlines()) == 6
     content = page.read_bytes()
     assert b"<img" not in content
-    assert b'id="film"' in content
+    assert b'id="playback"' in content
 
 
 # What is refused

@@ -41,10 +41,10 @@ class Says:
 
     def __init__(self, *events: ScenarioEvent | None) -> None:
         self.events = list(events)
-        self.told: list[tuple[tuple[str, ...], EpochOutcome, float | None]] = []
+        self.summary: list[tuple[tuple[str, ...], EpochOutcome, float | None]] = []
 
     def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
-        self.told.append((team.order, epoch, left_s))
+        self.summary.append((team.order, epoch, left_s))
         return self.events.pop(0) if self.events else None
 
 
@@ -57,8 +57,8 @@ def test_a_field_is_told_each_epoch_and_says_the_next(runtime: Runtime) -> None:
     field = Says(ScenarioEvent((RemoveValue("A", 1),)), ScenarioEvent((RemoveAgent("RB"),)))
     outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=runtime), field=field)
     assert openings(outcome) == ["the start", "A without 1", "-RB"]
-    assert [(order, left_s) for order, _, left_s in field.told] == [(("RA", "RB"), None)] * 2 + [(("RA",), None)]
-    assert [epoch for _, epoch, _ in field.told] == [*outcome.epochs]
+    assert [(order, left_s) for order, _, left_s in field.summary] == [(("RA", "RB"), None)] * 2 + [(("RA",), None)]
+    assert [epoch for _, epoch, _ in field.summary] == [*outcome.epochs]
     assert all(epoch.verified for epoch in outcome.epochs)
     assert outcome.assignment == {"A": 2}
 
@@ -116,21 +116,21 @@ def test_when_the_time_is_over_nothing_that_comes_is_heeded() -> None:
     field = Slow(ScenarioEvent((RemoveValue("A", 1),)))
     outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1), field=field)
     assert (outcome.verdict, openings(outcome)) == (Verdict.UNKNOWN, ["the start", "A without 1"])
-    assert field.told[-1][2] == 0
+    assert field.summary[-1][2] == 0
     assert "--timeout" in (outcome.reason or "")
 
 
 def test_when_all_messages_are_sent_nothing_that_comes_is_heeded() -> None:
     field = Says()
     outcome = solve(HANGAR, replace(SIMULATED, messages=3), field=field)
-    assert (outcome.verdict, field.told[-1][2]) == (Verdict.UNKNOWN, 0)
+    assert (outcome.verdict, field.summary[-1][2]) == (Verdict.UNKNOWN, 0)
 
 
 class Striking(Says):
     """Kills a robot's process while the team waits."""
 
     def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
-        if not self.told:
+        if not self.summary:
             victim = next(process for process in multiprocessing.active_children() if process.name == "RB")
             victim.kill()
             victim.join()
@@ -212,8 +212,8 @@ def at(seconds: float, topic: str, fields: Mapping[str, object]) -> ReceivedMess
 
 
 def listened(*messages: ReceivedMessage, sink: Sink | None = None, team: Team = HANGAR) -> tuple[Outcome, ClosedLoop]:
-    senses = SourceFeedback(Tape(*messages), ReportDecoder(drones_of(team), "map"))
-    loop = ClosedLoop(team, [sink] if sink else [], senses)
+    feedback = SourceFeedback(Tape(*messages), ReportDecoder(drones_of(team), "map"))
+    loop = ClosedLoop(team, [sink] if sink else [], feedback)
     return solve(team, SIMULATED, field=loop), loop
 
 
@@ -261,13 +261,13 @@ def test_what_was_heard_over_a_ros_is_not_said_there_again() -> None:
     sink = Kept(live=True)
     _, loop = listened(at(100, "/port/blocked", PORTS), sink=sink)
     assert set(sink.topics()) == {f"/{name.lower()}/waypoint" for name in HANGAR.order}
-    assert loop.outlets[0].told == "12 waypoints, 0 landings"
+    assert loop.publishers[0].summary == "12 waypoints, 0 landings"
 
 
 def test_who_leaves_lands() -> None:
     sink = Kept()
     _, loop = listened(at(1, "/fin/out_of_order", {"data": "a motor"}), sink=sink)
-    assert loop.outlets[0].told == "11 waypoints, 1 landing, 1 report"
+    assert loop.publishers[0].summary == "11 waypoints, 1 landing, 1 report"
     assert loop.mission is not None
     assert [drone.name for drone in loop.mission.drones] == sorted(HANGAR.order)
     assert [leg.opened_by for leg in loop.mission.legs] == ["the start", "-Fin"]
@@ -275,10 +275,10 @@ def test_who_leaves_lands() -> None:
 
 
 def live(patience_s: float, *messages: ReceivedMessage) -> tuple[ClosedLoop, Callable[[], int]]:
-    senses = SourceFeedback(Tape(*messages, live=True), ReportDecoder(drones_of(HANGAR), "map"), patience_s)
+    feedback = SourceFeedback(Tape(*messages, live=True), ReportDecoder(drones_of(HANGAR), "map"), patience_s)
     waited: list[float] = []
-    senses.idle = lambda: waited.append(time.monotonic())
-    return ClosedLoop(HANGAR, (), senses), lambda: len(waited)
+    feedback.idle = lambda: waited.append(time.monotonic())
+    return ClosedLoop(HANGAR, (), feedback), lambda: len(waited)
 
 
 def test_a_live_source_is_waited_for_and_somebody_told_so() -> None:
@@ -301,7 +301,7 @@ def test_the_team_of_a_run_nobody_changed_is_as_its_files_have_it() -> None:
     loop = ClosedLoop(HANGAR, [sink])
     loop.publish(solve(HANGAR, SIMULATED))
     assert (loop.team, loop.mission) == (HANGAR, None)
-    assert loop.outlets[0].told == "6 waypoints, 0 landings"
+    assert loop.publishers[0].summary == "6 waypoints, 0 landings"
 
 
 def test_a_field_for_whoever_uses_the_library() -> None:

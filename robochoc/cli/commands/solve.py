@@ -277,11 +277,11 @@ def _run(team: Team, options: Options, recorder: Recorder | None, loop: ClosedLo
     from robochoc.run.orchestrator import CENTRAL
     from robochoc.run.orchestrator import solve as run
 
-    told = loop and (loop.senses or (team.dynamic and options.protocol != CENTRAL))
+    told = loop and (loop.feedback or (team.dynamic and options.protocol != CENTRAL))
     with progress_line(team.name) as progress:
         show = shown_and_flushed(recorder, progress)
-        if loop and loop.senses and show:
-            loop.senses.idle = waiting(show)
+        if loop and loop.feedback and show:
+            loop.feedback.idle = waiting(show)
         outcome = run(team, options, observer=recorder, progress=show, field=loop if told else None)
     if recorder:
         recorder.outcome = outcome
