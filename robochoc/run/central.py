@@ -6,16 +6,16 @@ import time
 from dataclasses import replace
 from typing import NamedTuple
 
-from robochoc.model.change import changed_by, describe_change
+from robochoc.model.change import describe_change, team_after_events
 from robochoc.model.outcome import Metrics, Outcome, Verdict
-from robochoc.model.problem import Kind, Team
+from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.context import RunContext
 from robochoc.run.evaluation import Answer, check
 from robochoc.run.incumbent import absent
 from robochoc.run.options import CENTRAL, Options, Withdrawal
 from robochoc.solver.central import CentralSolver, Judgement
 from robochoc.solver.failures import SolverLostError
-from robochoc.verification.checker import cost
+from robochoc.verification.checker import assignment_cost
 from robochoc.verification.objective import withdrawal_cost
 from robochoc.verification.second_opinion import total_cost
 
@@ -45,10 +45,10 @@ def solve_centrally(team: Team, context: RunContext, header: Outcome) -> Outcome
     last = len(team.scenario)
     with AceProcess(always=options.local.always_ace) as warm:
         solver = context.central_solver(warm)
-        decisions = [_decide(solver, changed_by(team, number), options) for number in range(last + 1)]
+        decisions = [_decide(solver, team_after_events(team, number), options) for number in range(last + 1)]
     answer, solutions = decisions[-1]
     epochs = tuple(
-        decision.answer.as_epoch(changed_by(team, number).order, _opened_by(team, number))
+        decision.answer.as_epoch(team_after_events(team, number).order, _opened_by(team, number))
         for number, decision in enumerate(decisions)
     )
     spent = sum((epoch.metrics for epoch in epochs), Metrics())
@@ -81,7 +81,7 @@ def _answer(solver: CentralSolver, team: Team, options: Options) -> Answer:
     """Return the solver's answer; as few robots as possible withdraw, if that is asked for and necessary."""
     price = None
     judgement = None
-    if options.withdraw is not Withdrawal.FEWEST or team.kind is Kind.DISCSP:
+    if options.withdraw is not Withdrawal.FEWEST or team.kind is ProblemKind.DISCSP:
         judgement = solver.judge(team)
     if judgement is None or (options.withdraw is not None and judgement.verdict is Verdict.NO_SOLUTION):
         price = int(withdrawal_cost(team))
@@ -98,9 +98,9 @@ def _answer_of(judgement: Judgement, team: Team, price: int | None, options: Opt
             raise SolverLostError(f"the constraint solver's answer costs {total:,}, and it says {judgement.cost:,}")
     if verdict is Verdict.UNKNOWN and judgement.bound is not None:
         bound = judgement.bound // (price or 1)
-    if verdict is Verdict.OPTIMAL and team.kind is Kind.DISCSP and not absent(team, assignment):
+    if verdict is Verdict.OPTIMAL and team.kind is ProblemKind.DISCSP and not absent(team, assignment):
         verdict = Verdict.SOLUTION
     found = judgement.cost is not None or verdict is Verdict.SOLUTION
     withdrawn = absent(team, assignment) if found and options.withdraw else ()
-    paid = cost(team, assignment) if found else None
+    paid = assignment_cost(team, assignment) if found else None
     return Answer(verdict, assignment=assignment, cost=paid, withdrawn=withdrawn, bound=bound, verified=found)

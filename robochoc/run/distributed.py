@@ -13,7 +13,7 @@ from dataclasses import replace
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.communication.run_result import RunResult
 from robochoc.model.outcome import Metrics, Outcome, Verdict
-from robochoc.model.problem import Kind
+from robochoc.model.problem import ProblemKind
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.evaluation import Answer, Search, evaluate
 from robochoc.run.options import Options
@@ -35,7 +35,7 @@ class Deployment(ABC):
 
     @property
     @abstractmethod
-    def kind(self) -> Kind:
+    def kind(self) -> ProblemKind:
         """Whether the team's problem has costs."""
 
     @property

@@ -11,18 +11,18 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from robochoc.communication.run_result import RunResult
-from robochoc.model.outcome import Epoch, Metrics, Outcome, PseudoTreeNode, Thoroughness, Verdict
-from robochoc.model.problem import Kind, Team
+from robochoc.model.outcome import CheckCounts, EpochOutcome, Metrics, Outcome, PseudoTreeNode, Verdict
+from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.incumbent import absent, best_of, bound_of, joined, tree_of
 from robochoc.run.withdrawal import Phase
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.verification.checker import RefutedError, cost, could_join, objections
+from robochoc.verification.checker import RefutedError, assignment_cost, needlessly_withdrawn, violations
 
 
 class CheckedAssignment(NamedTuple):
     """An assignment that was checked.
 
-    `withdrawn` are the robots without values. `verified`: no hard constraint is broken. `thoroughness` is set where
+    `withdrawn` are the robots without values. `verified`: no hard constraint is broken. `check_counts` is set where
     robots have checked. `reason` says why there is no assignment, or why it was not checked.
     """
 
@@ -30,7 +30,7 @@ class CheckedAssignment(NamedTuple):
     cost: float | None = None
     withdrawn: tuple[str, ...] = ()
     verified: bool = True
-    thoroughness: Thoroughness | None = None
+    check_counts: CheckCounts | None = None
     reason: str | None = None
 
 
@@ -63,9 +63,9 @@ class Answer:
     tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
     verified: bool = False
     confirmed: bool = False
-    checked: Thoroughness | None = None
+    checked: CheckCounts | None = None
     reason: str | None = None
-    epochs: tuple[Epoch, ...] = ()
+    epochs: tuple[EpochOutcome, ...] = ()
     ended: bool = False
 
     def then(self, second: Answer) -> Answer:
@@ -78,9 +78,9 @@ class Answer:
             epochs=self.epochs,
         )
 
-    def as_epoch(self, robots: tuple[str, ...], opened_by: str = "the start", lost: Sequence[str] = ()) -> Epoch:
+    def as_epoch(self, robots: tuple[str, ...], opened_by: str = "the start", lost: Sequence[str] = ()) -> EpochOutcome:
         """Return the epoch that ended with this answer."""
-        return Epoch(
+        return EpochOutcome(
             verdict=self.verdict,
             robots=robots,
             opened_by=opened_by,
@@ -116,7 +116,7 @@ class Answer:
         )
 
 
-def evaluate(phase: Phase, search: Search, kind: Kind) -> Answer:
+def evaluate(phase: Phase, search: Search, kind: ProblemKind) -> Answer:
     """Return the answer of a `search` in `phase`, for a problem of this `kind`.
 
     A protocol that minimises costs has an assignment whenever it is asked. Whether that is proven depends on the
@@ -142,7 +142,7 @@ def evaluate(phase: Phase, search: Search, kind: Kind) -> Answer:
         withdrawn=found.withdrawn,
         bound=bound,
         verified=found.verified,
-        checked=found.thoroughness,
+        checked=found.check_counts,
         reason=found.reason,
     )
 
@@ -178,7 +178,7 @@ def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: Comp
     withdrawn = absent(team, assignment) if phase.withdrawal else ()
     check(team, assignment, withdrawn, maximal=proven)
     in_order = {name: assignment[name] for name in team.variables if name in assignment}
-    return CheckedAssignment(in_order, cost(team, assignment), withdrawn)
+    return CheckedAssignment(in_order, assignment_cost(team, assignment), withdrawn)
 
 
 def check(team: Team, assignment: Mapping[str, int], withdrawn: Sequence[str] = (), *, maximal: bool = True) -> None:
@@ -193,21 +193,23 @@ def check(team: Team, assignment: Mapping[str, int], withdrawn: Sequence[str] = 
     Raises:
         RefutedError: when something is wrong.
     """
-    faults = [*objections(team, assignment, withdrawn)]
+    faults = [*violations(team, assignment, withdrawn)]
     if maximal:
-        faults += [f"{name} has stepped aside and could be added" for name in could_join(team, assignment, withdrawn)]
+        faults += [
+            f"{name} has stepped aside and could be added" for name in needlessly_withdrawn(team, assignment, withdrawn)
+        ]
     if faults:
         raise RefutedError(f"the checker refutes the answer for {team.name}: {faults[0]} ({len(faults)} objections)")
 
 
-def _verdict_of(phase: Phase, result: RunResult, kind: Kind, found: CheckedAssignment) -> Verdict:
+def _verdict_of(phase: Phase, result: RunResult, kind: ProblemKind, found: CheckedAssignment) -> Verdict:
     """Return the verdict on what was found."""
     if is_proven(phase, result):
-        minimum = phase.traits.costs and phase.traits.complete and (found.withdrawn or kind is Kind.DISWCSP)
+        minimum = phase.traits.costs and phase.traits.complete and (found.withdrawn or kind is ProblemKind.DISWCSP)
         return Verdict.OPTIMAL if minimum else Verdict.SOLUTION
     if not found.verified:
         return Verdict.UNKNOWN
-    if kind is Kind.DISCSP and not phase.withdrawal:
+    if kind is ProblemKind.DISCSP and not phase.withdrawal:
         return Verdict.SOLUTION
     return result.verdict
 

@@ -18,32 +18,31 @@ from typing import NamedTuple
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.formats import InvalidInputError, read_robot
-from robochoc.model import outcome
 from robochoc.model.change import (
     ChangeError,
-    changed,
-    changed_by,
-    concerns,
+    affected_robots,
+    apply_changes,
+    apply_possible_changes,
     describe_change,
-    possible,
-    rejoined,
-    without,
+    rejoin,
+    team_after_events,
+    without_robots,
 )
-from robochoc.model.orders import reordered
-from robochoc.model.outcome import Verdict
-from robochoc.model.problem import AddAgent, Change, Event, Robot, Team
+from robochoc.model.orders import with_priorities
+from robochoc.model.outcome import EpochOutcome, Verdict
+from robochoc.model.problem import AddAgent, Change, Robot, ScenarioEvent, Team
 from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import Invalidated, invalidated_by
 
 Compile = Callable[[Team], CompiledTeam]
 
-Environment = Callable[[Team, outcome.Epoch, float | None], Event | None]
+Environment = Callable[[Team, EpochOutcome, float | None], ScenarioEvent | None]
 """The robots' surroundings: a function that gets each epoch's answer, and returns the next change of the problem.
 
 Args:
     Team: the epoch's team.
-    Epoch: how the epoch ended, once the answer was checked against every constraint.
+    EpochOutcome: how the epoch ended, once the answer was checked against every constraint.
     float | None: how many seconds are left (None: no limit; 0: what it returns is ignored).
 
 Returns:
@@ -104,7 +103,7 @@ class ScenarioRun:
                 happen to them too, and they join at the end of the order.
             parameters: what all robots are given beside the problem.
         """
-        self.team = self._full = changed_by(team, events=0)
+        self.team = self._full = team_after_events(team, events=0)
         self.withdrawn: list[str] = []
         self.failed_returns: list[str] = []
         self._files = team
@@ -120,7 +119,7 @@ class ScenarioRun:
 
     def ordered_team(self) -> Team:
         """Return the team as the robots see it: in the order of the run. Raises `OrderError`."""
-        return self.team if self._order is None else reordered(self.team, self._order)
+        return self.team if self._order is None else with_priorities(self.team, self._order)
 
     def compiled(self) -> CompiledTeam:
         """Return the team as the robots see it, compiled. Raises `OrderError`, and what compiling raises."""
@@ -165,7 +164,7 @@ class ScenarioRun:
         return result
 
     @property
-    def _next(self) -> Event | None:
+    def _next(self) -> ScenarioEvent | None:
         """The event that comes next; None where no more is known."""
         return self._files.scenario[self._happened] if self._happened < len(self._files.scenario) else None
 
@@ -174,7 +173,7 @@ class ScenarioRun:
         """Whether the time is over, or all messages have been sent."""
         return self._left_s() == 0 or (self._messages is not None and self._messages <= 0)
 
-    def add_event(self, event: Event) -> None:
+    def add_event(self, event: ScenarioEvent) -> None:
         """Add `event` to the end of the scenario. Changes in it that are not possible then are left out."""
         self._files = replace(self._files, scenario=(*self._files.scenario, event))
         self._has_added_events = True
@@ -184,23 +183,23 @@ class ScenarioRun:
         self.withdrawn += lost
         self._update_team(())
 
-    def _describe(self, event: Event) -> str:
+    def _describe(self, event: ScenarioEvent) -> str:
         """Return in a few words what of `event` can still happen."""
         out = set(self.withdrawn)
-        changes = possible(self._full, event.changes)[1] if self._has_added_events else event.changes
-        words = [describe_change(change) for change in changes if out.isdisjoint(concerns(self._full, change))]
+        changes = apply_possible_changes(self._full, event.changes)[1] if self._has_added_events else event.changes
+        words = [describe_change(change) for change in changes if out.isdisjoint(affected_robots(self._full, change))]
         return ", ".join(words) or "nothing"
 
-    def _apply(self, event: Event) -> Collection[str]:
+    def _apply(self, event: ScenarioEvent) -> Collection[str]:
         """Let `event` happen, and return the robots that join. After losses, impossible changes are left out."""
         self._happened += 1
         changes: Sequence[Change] = event.changes
         if self._after_losses:
-            self._full = changed_by(self._files, self._happened)
+            self._full = team_after_events(self._files, self._happened)
         elif self._has_added_events:
-            self._full, changes = possible(self._full, changes)
+            self._full, changes = apply_possible_changes(self._full, changes)
         else:
-            self._full = changed(self._full, changes)
+            self._full = apply_changes(self._full, changes)
         return [change.robot.name for change in changes if isinstance(change, AddAgent)]
 
     def _lose(self, lost: Mapping[str, str]) -> Collection[str]:
@@ -217,14 +216,14 @@ class ScenarioRun:
                     self.failed_returns.append(f"{name} could not come back: {why}")
         self.withdrawn += [name for name in lost if name not in back]
         if back:
-            self._full = changed_by(self._files, self._happened)
+            self._full = team_after_events(self._files, self._happened)
             self._order = self._order or self.team.order
         return back
 
     def _update_team(self, joining: Collection[str]) -> None:
         """Update the team and its order: the robots that are `joining` come last."""
         self.withdrawn = [name for name in self.withdrawn if name in self._full and name not in joining]
-        self.team = without(self._full, self.withdrawn)
+        self.team = without_robots(self._full, self.withdrawn)
         if self._order is not None:
             stay = [name for name in self._order if name in self.team and name not in joining]
             self._order = (*stay, *(name for name in self.team.order if name not in stay))
@@ -242,7 +241,7 @@ class ScenarioRun:
         """Replace the robot `name` by what its file says now, as if it had said so from the beginning."""
         robot = read_robot(Path(self.team[name].file))
         if name in self._files:
-            self._files = rejoined(self._files, robot)
+            self._files = rejoin(self._files, robot)
         else:
             self._files = replace(self._files, scenario=tuple(_with_joining(e, robot) for e in self._files.scenario))
 
@@ -256,7 +255,7 @@ def _describe_loss(lost: Iterable[str], back: Collection[str]) -> str:
     return "; ".join(words)
 
 
-def _with_joining(event: Event, robot: Robot) -> Event:
+def _with_joining(event: ScenarioEvent, robot: Robot) -> ScenarioEvent:
     """Return `event`; where a robot of that name joins, it is `robot`."""
     changes = (AddAgent(robot) if isinstance(c, AddAgent) and c.robot.name == robot.name else c for c in event.changes)
     return replace(event, changes=tuple(changes))

@@ -8,10 +8,9 @@ from functools import partial
 
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.communication.session import Epoch, Session
-from robochoc.model import outcome
-from robochoc.model.orders import Order, favourable, order_of
-from robochoc.model.outcome import Metrics, Verdict
-from robochoc.model.problem import INFINITE, Kind, Team
+from robochoc.model.orders import Order, compute_order, with_dom_deg_order
+from robochoc.model.outcome import EpochOutcome, Metrics, Verdict
+from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import Deployment
 from robochoc.run.evaluation import Answer, Search, check_with_files
@@ -35,14 +34,14 @@ class ThisMachine(Deployment):
         """Prepare the run of `team`. Raises `OrderError`."""
         options = context.options
         self.options = options
-        self.epochs: list[outcome.Epoch] = []
+        self.epochs: list[EpochOutcome] = []
         self._team = team
         self._context = context
         self._environment = environment
         self._dynamic = team.dynamic or environment is not None
         self._compiler = context.team_compiler()
         self._start_events = StartEvents(context.observer)
-        order = order_of(team, options.order, options.seed) if isinstance(options.order, Order) else options.order
+        order = compute_order(team, options.order, options.seed) if isinstance(options.order, Order) else options.order
         self._scenario = ScenarioRun(
             team,
             order,
@@ -54,7 +53,7 @@ class ThisMachine(Deployment):
         )
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> ProblemKind:
         """See `Deployment.kind`."""
         return self._scenario.team.kind
 
@@ -95,7 +94,7 @@ class ThisMachine(Deployment):
         """See `Deployment.search`."""
         team = self._scenario.ordered_team()
         if phase.takes_over and phase.traits.costs and self.options.order is None:
-            team = favourable(team)  # to be fast: nobody has asked for another order
+            team = with_dom_deg_order(team)  # to be fast: nobody has asked for another order
         epoch = Epoch(self._compiler.compile(team, every=True), brief=phase.parameters)
         self._start_events.report(phase.protocol, EpochStart(epoch))
         with self._session(phase, epoch.compiled) as session:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
 from robochoc.solver.central import CentralSolver, Judgement
-from robochoc.verification.checker import RefutedError, cost, has_local_solution
+from robochoc.verification.checker import RefutedError, assignment_cost, has_local_solution
 
 
 def confirmed(
@@ -64,4 +64,4 @@ def contradiction(opinion: Judgement, total: float) -> str | None:
 def total_cost(team: Team, assignment: Mapping[str, int], withdrawal_cost: float | None) -> float:
     """Return what `assignment` costs, and the robots without values, at a withdrawal cost for one of weight 1."""
     withdrawn = (robot for robot in team.robots if robot.variables[0].name not in assignment)
-    return cost(team, assignment) + (withdrawal_cost or 0) * sum(robot.weight for robot in withdrawn)
+    return assignment_cost(team, assignment) + (withdrawal_cost or 0) * sum(robot.weight for robot in withdrawn)

@@ -18,7 +18,7 @@ from robochoc.run.registry import protocol_named
 from robochoc.run.scenario import FinishedEpoch, ScenarioRun
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 from tests.support.complex_problems import complex_team
 from tests.support.loose_problems import untold_interface
 from tests.support.paused_abt import PausedABT
@@ -69,4 +69,4 @@ def test_who_is_asked_to_show_more_is_not_misread() -> None:
     with LocalNetwork(team, protocol_named("abt")) as network:
         result = network.search(60)
     assert result.verdict is Verdict.SOLUTION
-    assert not list(objections(team, {**result.assignments["A"], **result.assignments["B"]}))
+    assert not list(violations(team, {**result.assignments["A"], **result.assignments["B"]}))

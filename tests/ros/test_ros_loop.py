@@ -13,8 +13,8 @@ import pytest
 from robochoc.api import Problem
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.formats import read_team
-from robochoc.model.outcome import Epoch, Outcome, Verdict
-from robochoc.model.problem import AddAgent, Event, RemoveAgent, RemoveValue, Team
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.problem import AddAgent, RemoveAgent, RemoveValue, ScenarioEvent, Team
 from robochoc.ros.closed_loop import ClosedLoop, drones_of
 from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.sink import Fields, Sink
@@ -39,11 +39,11 @@ PORTS = {"point": {"x": 3.0, "y": 1.0, "z": 3.0}}
 class Says:
     """A field that says what it was told to say, and keeps what it is told."""
 
-    def __init__(self, *events: Event | None) -> None:
+    def __init__(self, *events: ScenarioEvent | None) -> None:
         self.events = list(events)
-        self.summary: list[tuple[tuple[str, ...], Epoch, float | None]] = []
+        self.summary: list[tuple[tuple[str, ...], EpochOutcome, float | None]] = []
 
-    def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
+    def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
         self.summary.append((team.order, epoch, left_s))
         return self.events.pop(0) if self.events else None
 
@@ -54,7 +54,7 @@ def openings(outcome: Outcome) -> list[str]:
 
 @pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_a_field_is_told_each_epoch_and_says_the_next(runtime: Runtime) -> None:
-    field = Says(Event((RemoveValue("A", 1),)), Event((RemoveAgent("RB"),)))
+    field = Says(ScenarioEvent((RemoveValue("A", 1),)), ScenarioEvent((RemoveAgent("RB"),)))
     outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=runtime), environment=field)
     assert openings(outcome) == ["the start", "A without 1", "-RB"]
     assert [(order, left_s) for order, _, left_s in field.summary] == [(("RA", "RB"), None)] * 2 + [(("RA",), None)]
@@ -64,17 +64,20 @@ def test_a_field_is_told_each_epoch_and_says_the_next(runtime: Runtime) -> None:
 
 
 def test_what_cannot_be_is_passed_over() -> None:
-    field = Says(Event((RemoveAgent("RX"), RemoveValue("A", 9), RemoveValue("A", 1))), Event((RemoveAgent("RX"),)))
+    field = Says(
+        ScenarioEvent((RemoveAgent("RX"), RemoveValue("A", 9), RemoveValue("A", 1))),
+        ScenarioEvent((RemoveAgent("RX"),)),
+    )
     outcome = solve(pair(values=3), SIMULATED, environment=field)
     assert openings(outcome) == ["the start", "A without 1", "nothing"]
     team = pair(values=3)
-    there = Says(Event((AddAgent(team["RB"]),)))
+    there = Says(ScenarioEvent((AddAgent(team["RB"]),)))
     assert openings(solve(team, SIMULATED, environment=there)) == ["the start", "nothing"]
 
 
 def test_the_files_own_events_come_first() -> None:
-    team = pair(Event((RemoveValue("A", 1),)), values=3)
-    outcome = solve(team, SIMULATED, environment=Says(Event((RemoveValue("A", 2), RemoveValue("A", 1)))))
+    team = pair(ScenarioEvent((RemoveValue("A", 1),)), values=3)
+    outcome = solve(team, SIMULATED, environment=Says(ScenarioEvent((RemoveValue("A", 2), RemoveValue("A", 1)))))
     assert openings(outcome) == ["the start", "A without 1", "A without 2"]
     assert outcome.events == 2
 
@@ -86,7 +89,9 @@ def test_without_a_field_a_problem_that_does_not_change_has_no_epochs() -> None:
 
 def test_an_epoch_without_a_solution_may_be_followed_by_one_with() -> None:
     values = tuple(RemoveValue("A", value) for value in (1, 2, 3))
-    outcome = solve(pair(values=3), SIMULATED, environment=Says(Event(values), Event((RemoveAgent("RA"),))))
+    outcome = solve(
+        pair(values=3), SIMULATED, environment=Says(ScenarioEvent(values), ScenarioEvent((RemoveAgent("RA"),)))
+    )
     assert [epoch.verdict for epoch in outcome.epochs] == ["solution", "no-solution", "solution"]
 
 
@@ -105,12 +110,12 @@ def test_what_a_changing_problem_cannot_have_is_refused(options: Options, named:
 
 def test_when_the_time_is_over_nothing_that_comes_is_heeded() -> None:
     class Slow(Says):
-        def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
+        def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
             assert left_s is not None
             time.sleep(left_s)
             return super().__call__(team, epoch, left_s)
 
-    field = Slow(Event((RemoveValue("A", 1),)))
+    field = Slow(ScenarioEvent((RemoveValue("A", 1),)))
     outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1), environment=field)
     assert (outcome.verdict, openings(outcome)) == (Verdict.UNKNOWN, ["the start", "A without 1"])
     assert field.summary[-1][2] == 0
@@ -126,7 +131,7 @@ def test_when_all_messages_are_sent_nothing_that_comes_is_heeded() -> None:
 class Striking(Says):
     """Kills a robot's process while the team waits."""
 
-    def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
+    def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
         if not self.summary:
             victim = next(process for process in multiprocessing.active_children() if process.name == "RB")
             victim.kill()
@@ -137,7 +142,7 @@ class Striking(Says):
 @pytest.mark.skipif(sys.platform != "linux", reason="as the runtime's other tests of faults")
 def test_a_robot_that_dies_while_the_team_waits_is_lost() -> None:
     options = Options(protocol="dynabt")
-    event = Event((RemoveValue("A", 1),))
+    event = ScenarioEvent((RemoveValue("A", 1),))
     with pytest.raises(RobotsLostError) as lost:
         solve(pair(values=3), options, environment=Striking(event))
     assert "RB" in lost.value.robots
@@ -149,7 +154,7 @@ def test_a_robot_that_dies_while_the_team_waits_is_lost() -> None:
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, SourceError("the robots cannot be heard any more")])
 def test_no_process_outlives_a_field_that_fails(error: BaseException | type[BaseException]) -> None:
-    def fails(_team: Team, _epoch: Epoch, _left_s: float | None) -> Event | None:
+    def fails(_team: Team, _epoch: EpochOutcome, _left_s: float | None) -> ScenarioEvent | None:
         assert len(multiprocessing.active_children()) == 2
         raise error
 
@@ -241,7 +246,7 @@ def test_reports_that_change_nothing_open_no_epoch() -> None:
 
 
 def test_what_is_known_to_come_is_not_asked_for_again() -> None:
-    team = replace(HANGAR, scenario=(Event((RemoveAgent("Fin"),)),))
+    team = replace(HANGAR, scenario=(ScenarioEvent((RemoveAgent("Fin"),)),))
     outcome, _ = listened(at(1, "/fin/out_of_order", {"data": ""}), at(3, "/fin/battery", {"percentage": 0}), team=team)
     assert openings(outcome) == ["the start", "-Fin"]
 
@@ -302,6 +307,6 @@ def test_the_team_of_a_run_nobody_changed_is_as_its_files_have_it() -> None:
 
 
 def test_a_field_for_whoever_uses_the_library() -> None:
-    field = Says(Event((RemoveValue("port", 3),)))
+    field = Says(ScenarioEvent((RemoveValue("port", 3),)))
     outcome = Problem(HANGAR).solve("dynabt", "simulator", environment=field)
     assert openings(outcome) == ["the start", "port without 3"]

@@ -19,7 +19,7 @@ from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.communication.run_result import RunResult
 from robochoc.journal.events import Began, Observer
 from robochoc.model.outcome import ALL_ROBOTS, Outcome, Verdict
-from robochoc.model.problem import Domain, Kind, Team, Variable
+from robochoc.model.problem import Domain, ProblemKind, Team, Variable
 from robochoc.run.distributed import Deployment
 from robochoc.run.evaluation import CheckedAssignment, Search, is_proven
 from robochoc.run.incumbent import joined
@@ -51,7 +51,7 @@ class Machines(Deployment):
         self._values: dict[str, dict[str, int]] = {}
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> ProblemKind:
         """See `Deployment.kind`."""
         return team_of(self._master, self._name).kind
 
@@ -119,7 +119,7 @@ class Machines(Deployment):
         held, cost = self._master.checked(self._values)
         self._refuse_contradictions()
         if held and (phase.withdrawal or not without):
-            return CheckedAssignment(joined(self._values), cost, without, thoroughness=state.thoroughness)
+            return CheckedAssignment(joined(self._values), cost, without, check_counts=state.check_counts)
         if is_proven(phase, result):
             against = "; ".join(state.objections) or f"{listed(without)} has no value"
             source = f"{result.witness} says that" if result.witness else "all fell quiet, so that"
