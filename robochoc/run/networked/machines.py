@@ -119,7 +119,7 @@ class Machines(Deployment):
         held, cost = self._master.checked(self._values)
         self._refuse_contradictions()
         if held and (phase.withdrawal or not without):
-            return CheckedAssignment(joined(self._values), cost, without, check_counts=state.check_counts)
+            return CheckedAssignment(joined(self._values), cost, without, check_counts=state.thoroughness)
         if is_proven(phase, result):
             against = "; ".join(state.objections) or f"{listed(without)} has no value"
             source = f"{result.witness} says that" if result.witness else "all fell quiet, so that"
