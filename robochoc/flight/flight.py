@@ -105,20 +105,20 @@ class Flight:
         self._simulation = QuadrotorSimulation(self.names, self._homes, self._ground, conditions)
         self._hovers = False
 
-    def fly(self, title: str, goals: Mapping[int, Goal], *, heed: bool = False) -> tuple[Report, ...]:
+    def fly(self, title: str, goals: Mapping[int, Goal], *, stop_on_report: bool = False) -> tuple[Report, ...]:
         """One leg, from where everybody is, to these goals by drones' numbers; who has none stays.
 
-        With `heed` everybody stops and hovers as soon as somebody has something to report; this is returned, and the
-        goals are not reached. Raises `ValueError` where two goals are nearer to each other than the distance to keep,
-        somebody has too far to fly, or what lies there leaves no way.
+        With `stop_on_report` everybody stops and hovers as soon as somebody has something to report; this is returned,
+        and the goals are not reached. Raises `ValueError` where two goals are nearer to each other than the distance to
+        keep, somebody has too far to fly, or what lies there leaves no way.
         """
         began = time.perf_counter()
         with np.errstate(all="ignore"):  # the simulation looks for numbers that are none
-            targets = self._targets(goals)
+            leg_goals = self._leg_goals(goals)
             if not self._legs:
                 self._stay()
             begins_s = self._simulation.now_s
-            reports = self._leg(targets, heed=heed)
+            reports = self._leg(leg_goals, stop_on_report=stop_on_report)
         self._legs.append(LegTimes(title, begins_s, self._simulation.now_s))
         self._hovers = False
         self._wall_s += time.perf_counter() - began
@@ -142,8 +142,8 @@ class Flight:
             legs=tuple(self._legs),
             events=tuple(simulation.events),
             errors_m=self._errors(),
-            nearest=simulation.watch.nearest,
-            nearest_fallen=simulation.watch.nearest_fallen,
+            nearest=simulation.separation.nearest,
+            nearest_fallen=simulation.separation.nearest_fallen,
             distance=self._distance,
             obstacles=self.conditions.obstacles,
             seen_s=tuple(self._seen_s),
@@ -161,7 +161,7 @@ class Flight:
         for _ in range(round(_STILL_S / DT)):
             self._simulation.advance()
 
-    def _targets(self, goals: Mapping[int, Goal]) -> LegGoals:
+    def _leg_goals(self, goals: Mapping[int, Goal]) -> LegGoals:
         if strange := [number for number in goals if not 0 <= number < len(self.names)]:
             raise ValueError(f"there are {len(self.names)} drones, from number 0 on, and no number {strange[0]}")
         simulation = self._simulation
@@ -171,64 +171,66 @@ class Flight:
             self._distance = min(self._distance, _distance([places]))
         moved = [(x, y, z) for x, y, z in (places - self._origin).tolist()]
         goals = {number: replace(goal, at=at) for (number, goal), at in zip(goals.items(), moved, strict=True)}
-        targets = LegGoals(self.names, goals, simulation.reference[:3].T, simulation.lost, self._distance)
+        leg_goals = LegGoals(self.names, goals, simulation.reference[:3].T, simulation.lost, self._distance)
         self._asked.update(goals)
-        return targets
+        return leg_goals
 
-    def _leg(self, targets: LegGoals, *, heed: bool) -> tuple[Report, ...]:
-        """Plan and fly; without `heed`, again and again as long as obstacles are found."""
+    def _leg(self, leg_goals: LegGoals, *, stop_on_report: bool) -> tuple[Report, ...]:
+        """Plan and fly; without `stop_on_report`, again and again as long as obstacles are found."""
         simulation = self._simulation
         told = len(simulation.broken)
-        wishes = targets.places.copy()
-        delays = start_delays(targets.goals, self._homes)
+        wishes = leg_goals.places.copy()
+        delays = start_delays(leg_goals.goals, self._homes)
         reports: list[Report] = []
         while True:
-            course, watched = self._course(targets, wishes, delays)
-            seen = self._follow(course, watched, told if heed else None)
+            trajectory, watched = self._trajectory(leg_goals, wishes, delays)
+            seen = self._follow(trajectory, watched, told if stop_on_report else None)
             reports += seen
-            if heed or not seen:
+            if stop_on_report or not seen:
                 break
             wishes = simulation.reference[:3].T.copy()
             delays = np.zeros_like(delays)
         failed = [OutOfOrder(self.names[drone], why, at_s) for drone, why, at_s in simulation.broken[told:]]
-        if not (heed and (reports or failed)):
+        if not (stop_on_report and (reports or failed)):
             self._tell_unfinished()
-        return tuple(sorted([*reports, *failed], key=lambda report: report.at_s)) if heed else ()
+        return tuple(sorted([*reports, *failed], key=lambda report: report.at_s)) if stop_on_report else ()
 
-    def _course(self, targets: LegGoals, wishes: Array, delays: Array) -> tuple[Trajectory, list[ObstacleEncounter]]:
+    def _trajectory(
+        self, leg_goals: LegGoals, wishes: Array, delays: Array
+    ) -> tuple[Trajectory, list[ObstacleEncounter]]:
         """The plan from where everybody is wanted now, and whom it brings near to obstacles that nobody knows of."""
         simulation = self._simulation
         starts = simulation.reference[:3].T.copy()
-        check_ways(self.names, starts, targets.places)
-        keep = self._keep(targets.planned(starts))
-        ends = np.array([goal.at for goal in targets.goals.values()]).reshape(-1, 3)
+        check_ways(self.names, starts, leg_goals.places)
+        keep = self._keep(leg_goals.planned(starts))
+        ends = np.array([goal.at for goal in leg_goals.goals.values()]).reshape(-1, 3)
         known = self._known | (nearest_distances(self._obstacles, ends) >= keep)
         fallen = simulation.places[simulation.lost & ~simulation.falling]
         points = np.vstack((fallen, self._obstacles[known]))
         radii = np.concatenate((np.full(len(fallen), self._distance), np.full(int(known.sum()), keep)))
         hazards = Hazards(points, radii)
-        for drone, what in targets.give_way(hazards, wishes, self._ground):
-            simulation.tell(drone, what)
-        planned = targets.planned(starts, hazards)
-        simulation.leave(planned - self._distance)
-        who = targets.who
+        for drone, what in leg_goals.give_way(hazards, wishes, self._ground):
+            simulation.log_event(drone, what)
+        planned = leg_goals.planned(starts, hazards)
+        simulation.set_spare_distance(planned - self._distance)
+        who = leg_goals.who
         self._progress(f"ways for {len(who)} drones are looked for")
         try:
             way = plan_routes(
                 starts[who],
-                targets.places[who],
+                leg_goals.places[who],
                 distance=planned,
-                standing=targets.standing(hazards, starts, planned),
-                waits=delays[who],
+                standing=leg_goals.standing(hazards, starts, planned),
+                delays=delays[who],
                 limits=LIMITS,
                 ground=self._ground,
             )
         except (TooCloseError, NoRouteError) as refused:
             raise ValueError(self._told(refused, who)) from refused
         check_length(len(self.names), simulation.now_s + way.duration_s)
-        course = Trajectory(way, who, simulation.reference)
+        trajectory = Trajectory(way, who, simulation.reference)
         unknown = {int(number): self._obstacles[number] for number in np.flatnonzero(~known)}
-        return course, encounters(course, unknown, keep)
+        return trajectory, encounters(trajectory, unknown, keep)
 
     def _told(self, refused: TooCloseError | NoRouteError, who: npt.NDArray[np.intp]) -> str:
         """The same with the names of those that it is about: the plan knows only their places in `who`."""
@@ -243,8 +245,8 @@ class Flight:
         """How far to stay from obstacles."""
         return max(KEEP_M, planned)
 
-    def _follow(self, course: Trajectory, watched: Sequence[ObstacleEncounter], told: int | None) -> list[Blocked]:
-        """Fly the course to its end, or to where it was stopped for what is seen.
+    def _follow(self, trajectory: Trajectory, watched: Sequence[ObstacleEncounter], told: int | None) -> list[Blocked]:
+        """Fly the trajectory to its end, or to where it was stopped for what is seen.
 
         Unless `told` is None, it is stopped as well once more than so many have broken down.
         """
@@ -253,42 +255,44 @@ class Flight:
         waited = 0.0
         while True:
             late = waited > _LATE_S
-            simulation.advance(course, late=late)
+            simulation.advance(trajectory, late=late)
             if not simulation.is_sampled:
                 continue
-            self._progress(f"leg {len(self._legs) + 1}, {course.s:.1f} s of {course.plan.duration_s:.1f} s flown")
-            reports += self._look(course, watched)
+            self._progress(
+                f"leg {len(self._legs) + 1}, {trajectory.s:.1f} s of {trajectory.plan.duration_s:.1f} s flown"
+            )
+            reports += self._look(trajectory, watched)
             if reports or (told is not None and len(simulation.broken) > told):
-                course.stop()
-            if course.over:
-                course.refer()
+                trajectory.stop()
+            if trajectory.over:
+                trajectory.refer()
                 if reports and told is None:
                     return reports
                 if simulation.settled(_NEAR_M, _SLOW_M_S) or waited > SETTLING_S:
                     return reports
                 waited += 1 / SAMPLE_RATE_HZ
 
-    def _look(self, course: Trajectory, watched: Sequence[ObstacleEncounter]) -> list[Blocked]:
+    def _look(self, trajectory: Trajectory, watched: Sequence[ObstacleEncounter]) -> list[Blocked]:
         """Which obstacles are seen now that nobody knew of, and by whom."""
         simulation = self._simulation
         reports = []
         for number, drone, until, keep in watched:
-            if self._known[number] or simulation.lost[drone] or course.s > until:
+            if self._known[number] or simulation.lost[drone] or trajectory.s > until:
                 continue
             gap = float(np.sqrt(np.square(simulation.places[drone] - self._obstacles[number]).sum()))
             if gap <= max(SIGHT_M, keep + LIMITS.speed * STOP_S / 2 + _LOOK_M):
                 self._known[number] = True
                 self._seen_s[number] = simulation.now_s
                 place = self.conditions.obstacles[number]
-                simulation.tell(drone, f"sees an obstacle at ({', '.join(f'{x:g}' for x in place)})")
+                simulation.log_event(drone, f"sees an obstacle at ({', '.join(f'{x:g}' for x in place)})")
                 reports.append(Blocked(self.names[drone], place, simulation.now_s))
         return reports
 
     def _tell_unfinished(self) -> None:
-        apart = self._simulation.gaps()
+        apart = self._simulation.tracking_errors()
         worst = int(apart.argmax())
         if apart[worst] > _FAR_M:
-            self._simulation.tell(worst, f"is {apart[worst]:.2f} m from where it is wanted as the leg ends")
+            self._simulation.log_event(worst, f"is {apart[worst]:.2f} m from where it is wanted as the leg ends")
 
 
 def fly(

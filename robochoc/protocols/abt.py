@@ -26,7 +26,7 @@ forbids (`_refuse_below`). Such a value is forgotten once it is refused, as that
 same again, is sure to come. Without a PKC nothing changes.
 
 >>> from robochoc.generators.queens3d import queens3d
->>> from robochoc.run.orchestrator import Options, Runtime, solve
+>>> from robochoc.run import Options, Runtime, solve
 >>> outcome = solve(queens3d(4), Options(protocol="abt", runtime=Runtime.SIMULATOR))
 >>> outcome.verdict.value, outcome.witness
 ('no-solution', 'Robot1.1')
@@ -96,6 +96,7 @@ class ABT(Backtracking):
         paper="Yokoo et al. 1992; Bessiere et al. 2005; PKC: Brito et al. 2009",
         partially_known=True,
         privacy="constraints of lower robots; of PKCs every robot's part, but for the pairs that were asked about",
+        use_when="no costs: the default",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -138,7 +138,11 @@ class ABTDORetro(Backtracking):
 
     messages = Ok | Nogood | Order | AddLink
     traits = Traits(
-        concludes=ENDS_WITH_PROOF, paper="Zivan & Meisels 2006; Zivan et al. 2009", shared_scopes=True, privacy="none"
+        concludes=ENDS_WITH_PROOF,
+        paper="Zivan & Meisels 2006; Zivan et al. 2009",
+        shared_scopes=True,
+        privacy="none",
+        use_when="no costs, and no good static order is known",
     )
     order: CurrentOrder
 

@@ -108,6 +108,7 @@ class AFCng(Protocol):
         concludes=ENDS_WITH_PROOF,
         paper="Ezzahir et al. 2009; Wahbi, Ezzahir, Bessiere, Bouyakhf 2013",
         privacy="constraints of lower robots",
+        use_when="no costs, hard problem: few messages and checks",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

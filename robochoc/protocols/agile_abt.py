@@ -125,7 +125,13 @@ class AgileABT(Backtracking):
     """
 
     messages = Ok | Nogood | Order | AddLink
-    traits = Traits(concludes=ENDS_WITH_PROOF, paper="Bessiere et al. 2011", shared_scopes=True, privacy="none")
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Bessiere et al. 2011",
+        shared_scopes=True,
+        privacy="none",
+        use_when="no costs, and no good static order is known; large messages",
+    )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

@@ -134,7 +134,11 @@ class AWC(Protocol):
 
     messages = Ok | Nogood | AddLink
     traits = Traits(
-        concludes=ENDS_WITH_PROOF, paper="Yokoo 1995; Yokoo et al. 1998", shared_scopes=True, privacy="none"
+        concludes=ENDS_WITH_PROOF,
+        paper="Yokoo 1995; Yokoo et al. 1998",
+        shared_scopes=True,
+        privacy="none",
+        use_when="to compare: ABT with max-degree order is faster here",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -103,6 +103,7 @@ class DisFC(Protocol):
         partially_known=True,
         shared_scopes=True,
         privacy="values; of PKCs every robot's part, but for the rows of values taken",
+        use_when="values are private, or constraints are (PKC)",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -110,6 +110,7 @@ class DPOP(TreeProtocol):
         writes_to_non_neighbours=False,
         tables=True,
         privacy="constraints of others, but for sums",
+        use_when="costs, small induced width: number of messages is linear",
     )
     settings: DPOPSettings = DPOPSettings()
 

@@ -64,6 +64,7 @@ class DSA(CycleProtocol):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="costs, large team: good answers fast, no proof",
     )
 
     def begin(self) -> None:

@@ -49,6 +49,7 @@ class DynABT(ABT, DynamicProtocol):
         paper="Omomowo, Arana, Ahriz 2008",
         dynamic=True,
         privacy="constraints of lower robots",
+        use_when="the problem changes during the run",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

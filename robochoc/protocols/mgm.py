@@ -99,6 +99,7 @@ class MGM(Gainers):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="as DSA, and the cost never rises; ends in a local optimum",
     )
 
     def begin(self) -> None:

@@ -142,6 +142,7 @@ class MGM2(Gainers):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="as MGM: better answers, more messages",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -138,6 +138,7 @@ class SFB(Protocol):
         costs=True,
         shared_scopes=True,
         tables=True,
+        use_when="costs: the default; few messages",
     )
     settings: SFBSettings = SFBSettings()
 

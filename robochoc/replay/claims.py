@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 
 import msgspec
@@ -16,12 +17,14 @@ from robochoc.communication.run_result import RunResult
 from robochoc.journal.entries import STAMPED_LATE
 from robochoc.journal.events import AnyEvent, Lost, Received, Sent
 from robochoc.journal.journal import Header, Journal, metrics_of
-from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.replay.rebuild import RebuiltRobots
 from robochoc.replay.steps import RecordedRun
-from robochoc.run.evaluation import evaluate, evaluate_withdrawal
+from robochoc.run.evaluation import Search, check_with_files, evaluate
 from robochoc.run.options import CENTRAL
 from robochoc.run.registry import protocol_by_class
+from robochoc.run.withdrawal import Phase
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.domain import TooManySolutionsError
 from robochoc.verification.checker import RefutedError
 
@@ -43,7 +46,7 @@ class ReplayedRun:
     """A run that was played to its end: who played it, and the answer that follows; None where nothing can be said."""
 
     run: RecordedRun
-    answer: Epoch | Outcome | None
+    answer: EpochOutcome | Outcome | None
 
 
 def played(run: RecordedRun, ensemble: RebuiltRobots, outcome: Outcome | None) -> ReplayedRun:
@@ -92,7 +95,9 @@ def _beginning(header: Header, runs: Sequence[RecordedRun], placed_by: str | Non
         yield Contradiction(what="the header's order", recorded=header.order, replayed=order)
 
 
-def _answers(whose: str, recorded: Epoch | Outcome, replayed: Epoch | Outcome | None) -> Iterator[Contradiction]:
+def _answers(
+    whose: str, recorded: EpochOutcome | Outcome, replayed: EpochOutcome | Outcome | None
+) -> Iterator[Contradiction]:
     if replayed is None or recorded.verdict is Verdict.UNKNOWN:  # limits are not in a journal
         return
     yield from _differing(whose, recorded, replayed, ("verdict", "assignment", "cost"))
@@ -109,7 +114,7 @@ def _differing(whose: str, recorded: object, replayed: object, names: Sequence[s
             yield Contradiction(what=whose + name, recorded=left, replayed=right)
 
 
-def _answer(run: RecordedRun, ensemble: RebuiltRobots, outcome: Outcome) -> Epoch | Outcome | None:
+def _answer(run: RecordedRun, ensemble: RebuiltRobots, outcome: Outcome) -> EpochOutcome | Outcome | None:
     """What the robots of `run` have come to, as a run would tell it; None where the journal does not say enough."""
     given = run.given
     if given is None or given.why or len(ensemble.hosts) < len(ensemble.compiled.team.robots):
@@ -123,14 +128,18 @@ def _answer(run: RecordedRun, ensemble: RebuiltRobots, outcome: Outcome) -> Epoc
         0.0,
     )
     result.findings.update({name: one.findings for name, one in protocols.items()})
-    traits, team = ensemble.protocol.traits, ensemble.compiled.team
+    team = ensemble.compiled.team
+    withdrawal = given.aside is not None or _places(run, outcome)
+    phase = Phase("", ensemble.protocol, RunParameters(aside=given.aside), withdrawal)
+    check = partial(check_with_files, phase, result, team, ensemble.compiled)
     try:
-        if given.aside is not None or _places(run, outcome):
-            bare = Outcome(outcome.team, outcome.protocol, outcome.runtime, outcome.seed, Verdict.UNKNOWN)
-            return evaluate_withdrawal(bare, team, result, ensemble.compiled, given.aside)
-        return evaluate(Epoch(result.verdict, team.order), team, result, traits, ensemble.compiled)
+        answer = evaluate(phase, Search(result, check), team.kind)
     except (RefutedError, TooManySolutionsError):
-        return Epoch(Verdict.UNKNOWN, team.order)
+        return EpochOutcome(Verdict.UNKNOWN, team.order)
+    if not withdrawal:
+        return answer.as_epoch(team.order)
+    bare = Outcome(outcome.team, outcome.protocol, outcome.runtime, outcome.seed, Verdict.UNKNOWN)
+    return answer.as_outcome(bare, ())
 
 
 def _places(run: RecordedRun, outcome: Outcome) -> bool:

@@ -12,8 +12,8 @@ from robochoc.communication.session import Epoch
 from robochoc.journal.events import Given, Lost
 from robochoc.journal.given import GivenProblemError, TeamReader, brief_of, void_of
 from robochoc.journal.journal import Header
-from robochoc.model.change import ChangeError, changed_by, still_showing, without
-from robochoc.model.orders import Order, OrderError, order_of, reordered
+from robochoc.model.change import ChangeError, keep_interfaces, team_after_events, without_robots
+from robochoc.model.orders import Order, OrderError, compute_order, with_priorities
 from robochoc.model.problem import Robot, Team
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.replay.steps import RecordedRun
@@ -154,7 +154,7 @@ class Rebuilder:
         if run.began is not None and isinstance(run.began.epoch, int):
             raise CannotReplayError("the journal does not say what the robots were given when their problem changed")
         try:
-            filed = self._ordered(changed_by(self._means.team, events=0))
+            filed = self._ordered(team_after_events(self._means.team, events=0))
             team = self._left(filed)
         except (OrderError, ChangeError, ValueError) as why:
             raise CannotReplayError(f"the team cannot be brought into the order of the run: {why}") from why
@@ -170,16 +170,16 @@ class Rebuilder:
         """Return `team` in the order of the run. Raises `OrderError`, `ValueError`."""
         order = self._header.order if self._header else None
         if isinstance(order, str):
-            order = order_of(team, Order(order), self._header.seed if self._header else 0)
+            order = compute_order(team, Order(order), self._header.seed if self._header else 0)
         if isinstance(order, tuple):
-            return reordered(team, order)
+            return with_priorities(team, order)
         return team
 
     def _left(self, team: Team) -> Team:
         """Return `team` without the robots that were lost before. On a network the others show what they did show."""
-        left = without(team, [name for name in self._lost if name in team])
+        left = without_robots(team, [name for name in self._lost if name in team])
         on_network = self._header is not None and self._header.runtime == "network"
-        return still_showing(left, team) if on_network else left
+        return keep_interfaces(left, team) if on_network else left
 
     def _compiled(self, team: Team) -> CompiledTeam:
         """Return `team` with those compiled who play; what did not change is not compiled again."""

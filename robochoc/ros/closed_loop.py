@@ -14,9 +14,9 @@ from dataclasses import replace
 from robochoc.flight.crafts import crafts_of
 from robochoc.flight.mission import VAST_M, Drone, Leg, Mission, MissionBuilder, all_robots, mission_of
 from robochoc.flight.reports import Report
-from robochoc.model.change import possible
-from robochoc.model.outcome import Epoch, Outcome
-from robochoc.model.problem import Assignment, Change, Event, Robot, Team
+from robochoc.model.change import apply_possible_changes
+from robochoc.model.outcome import EpochOutcome, Outcome
+from robochoc.model.problem import Assignment, Change, Robot, ScenarioEvent, Team
 from robochoc.ros.sink import Sink
 from robochoc.ros.sink_publisher import SinkPublisher
 from robochoc.ros.situation import BATTERY, Situation
@@ -28,7 +28,7 @@ TOGETHER_S = 0.5
 class Feedback(ABC):
     """How a loop learns of its robots' situation: they fly in a simulation, or a source is listened to."""
 
-    outlets: Sequence[SinkPublisher] = ()
+    publishers: Sequence[SinkPublisher] = ()
     """Where reports are to be published as they come."""
     idle: Callable[[], None] = staticmethod(lambda: None)
     """Called now and then while nothing comes."""
@@ -45,7 +45,7 @@ class Feedback(ABC):
         """The time, by the clock of the reports."""
 
     @abstractmethod
-    def decided(self, cast: MissionBuilder, leg: Leg, left_s: float | None) -> None:
+    def decided(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:
         """A decision was made and published: from now on, `next` gives what follows of it, for so many seconds."""
 
     @abstractmethod
@@ -54,26 +54,26 @@ class Feedback(ABC):
 
 
 class ClosedLoop:
-    """A field (`robochoc.run.scenario.Field`) that publishes each epoch's decision, and senses what the robots report.
+    """An environment of a run: publishes each decision, and opens an epoch when robots report a change.
 
-    `team` is as its files have it. Without `senses`, nothing changes the problem. What is published goes into `sinks`
-    (opened, and closed, by others), with the times of `senses`. What was heard over a ROS is not said there again, or
+    `team` is as its files have it. Without `feedback`, nothing changes the problem. What is published goes into `sinks`
+    (opened, and closed, by others), with the times of `feedback`. What was heard over a ROS is not said there again, or
     we would hear ourselves: recordings alone get it. `frame` is of places, `scale` in metres a unit of the
     problem (None: `mission.py` says), `battery` the level below which a drone is out of order.
 
     Raises `NameClashError`, `NoMappingError`, `NothingToPublishError`; calls raise `SinkError` and `SourceError`.
     """
 
-    events: list[Event]
+    events: list[ScenarioEvent]
     """What the robots' situation has changed."""
-    outlets: list[SinkPublisher]
+    publishers: list[SinkPublisher]
     """What was published, for each of the sinks."""
 
     def __init__(
         self,
         team: Team,
         sinks: Sequence[Sink] = (),
-        senses: Feedback | None = None,
+        feedback: Feedback | None = None,
         *,
         frame: str = "map",
         scale: float | None = None,
@@ -81,33 +81,35 @@ class ClosedLoop:
     ) -> None:
         self._team = team
         self._robots = all_robots(team)
-        self.senses = senses
+        self.feedback = feedback
         self._scale = scale
         self._battery = battery
-        self._cast: MissionBuilder | None = None
+        self._builder: MissionBuilder | None = None
         self._situation: Situation | None = None
         self._legs: list[Leg] = []
         self._happened = 0
         self._lost = True
         self.events = []
-        self.outlets = [SinkPublisher(team.name, drones_of(team), sink, frame) for sink in sinks]
-        if senses:
-            senses.outlets = [outlet for outlet in self.outlets if senses.simulated or not outlet.live]
+        self.publishers = [SinkPublisher(team.name, drones_of(team), sink, frame) for sink in sinks]
+        if feedback:
+            feedback.publishers = [
+                publisher for publisher in self.publishers if feedback.simulated or not publisher.live
+            ]
 
-    def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
+    def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
         """Publish what `epoch` has decided for `team`, and see what follows of it within `left_s` seconds."""
         self._happened += not self._lost
         self._lost = bool(epoch.lost)
-        cast = self._cast = self._cast or self._new_cast(epoch.assignment)
-        leg = cast.leg(epoch)
+        builder = self._builder = self._builder or self._new_builder(epoch.assignment)
+        leg = builder.leg(epoch)
         self._legs.append(leg)
         self._decide(leg)
-        if self.senses is None:
+        if self.feedback is None:
             return None
-        self.senses.decided(cast, leg, left_s)
+        self.feedback.decided(builder, leg, left_s)
         if epoch.lost or left_s == 0:
             return None
-        event = self._sensed(self.senses, self._coming(team), cast)
+        event = self._sensed(self.feedback, self._coming(team), builder)
         if event:
             self.events.append(event)
         return event
@@ -127,17 +129,17 @@ class ClosedLoop:
     @property
     def mission(self) -> Mission | None:
         """What was asked of the drones so far; None before the first epoch is over."""
-        return self._cast.mission(self._team.name, self._legs) if self._cast else None
+        return self._builder.mission(self._team.name, self._legs) if self._builder else None
 
     @property
     def notes(self) -> list[str]:
         """What was reported and could not be heeded, in clear sentences."""
-        heard = self.senses.notes if self.senses else []
+        heard = self.feedback.notes if self.feedback else []
         return [*heard, *(self._situation.notes if self._situation else [])]
 
     # Decisions
 
-    def _new_cast(self, assignment: Assignment) -> MissionBuilder:
+    def _new_builder(self, assignment: Assignment) -> MissionBuilder:
         """Who flies, and where they stand: below where they go first, or could go as far as nobody has decided."""
         first = {**_values(self._robots, 0), **assignment}
         near = {**_values(self._robots, 0, VAST_M), **assignment}
@@ -146,31 +148,31 @@ class ClosedLoop:
         return MissionBuilder(self._robots, first, others=others, scale=self._scale)
 
     def _decide(self, leg: Leg) -> None:
-        at_ns = self.senses.now_ns() if self.senses else time.time_ns()
-        for outlet in self.outlets:
-            outlet.decide(leg, at_ns)
+        at_ns = self.feedback.now_ns() if self.feedback else time.time_ns()
+        for publisher in self.publishers:
+            publisher.decide(leg, at_ns)
 
     # The situation
 
     def _coming(self, team: Team) -> Team:
         """`team` after all that is already known to come."""
         for event in self.team.scenario[self._happened :]:
-            team, _ = possible(team, event.changes)
+            team, _ = apply_possible_changes(team, event.changes)
         return team
 
-    def _sensed(self, senses: Feedback, team: Team, cast: MissionBuilder) -> Event | None:
+    def _sensed(self, feedback: Feedback, team: Team, builder: MissionBuilder) -> ScenarioEvent | None:
         """The event that follows of a decision: the first reports that change `team`."""
         if self._situation is None:
-            self._situation = Situation(cast.drones, cast.scale, self._battery)
+            self._situation = Situation(builder.drones, builder.scale, self._battery)
         changes: list[Change] = []
         until_s = None
-        while (report := senses.next(until_s)) is not None:
-            found = self._situation.heed(team, report)
+        while (report := feedback.next(until_s)) is not None:
+            found = self._situation.changes(team, report)
             if found:
                 changes += found
-                team, _ = possible(team, found)
+                team, _ = apply_possible_changes(team, found)
                 until_s = report.at_s + TOGETHER_S if until_s is None else until_s
-        return Event(tuple(changes)) if changes else None
+        return ScenarioEvent(tuple(changes)) if changes else None
 
 
 def drones_of(team: Team) -> tuple[Drone, ...]:

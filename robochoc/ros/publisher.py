@@ -101,7 +101,7 @@ class Publisher:
         return {"stamp": at_ns, "frame_id": self._frame}
 
     def _report(self, number: int, token: str, fields: Fields, at_ns: int) -> None:
-        self._publish(f"{self.names.space(number)}/{token}", REPORTS[token], fields, at_ns)
+        self._publish(f"{self.names.namespace(number)}/{token}", REPORTS[token], fields, at_ns)
 
     def _publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
         for sink in self._sinks:

@@ -37,7 +37,7 @@ class ReportDecoder:
         names = TopicNames(drones)
         self._frame = frame.removeprefix("/")
         self._told = {
-            f"{names.space(number)}/{token}": (drone.name, token)
+            f"{names.namespace(number)}/{token}": (drone.name, token)
             for number, drone in enumerate(drones)
             for token in REPORTS
         }

@@ -15,7 +15,7 @@ from robochoc.flight.mission import Drone, Goal, Leg, MissionBuilder
 from robochoc.flight.reports import OutOfOrder, Report
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.closed_loop import TOGETHER_S, Feedback
-from robochoc.ros.sink_publisher import Broadcast, nanoseconds
+from robochoc.ros.sink_publisher import FlightBroadcast, nanoseconds
 
 MOST_NAMES = 12
 """So many drones stand in a message."""
@@ -95,19 +95,19 @@ class SimulatedFeedback(Feedback):
     _waiting: deque[Report] = field(default_factory=deque)
     _known: set[Report] = field(default_factory=set)
     _now_s: float = 0.0
-    _broadcast: Broadcast = field(default_factory=Broadcast)
+    _broadcast: FlightBroadcast = field(default_factory=FlightBroadcast)
 
     def now_ns(self) -> int:
         """See `Feedback.now_ns`: the flight's own time."""
         return nanoseconds(self._now_s)
 
-    def decided(self, cast: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - it is fast
+    def decided(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - it is fast
         """See `Feedback.decided`."""
         if self._flight is None:
-            homes = np.array([drone.home for drone in cast.drones], dtype=float).reshape(-1, 3)
+            homes = np.array([drone.home for drone in builder.drones], dtype=float).reshape(-1, 3)
             try:
-                conditions = self.surroundings.conditions(cast.drones, cast.scale)
-                names = [drone.name for drone in cast.drones]
+                conditions = self.surroundings.conditions(builder.drones, builder.scale)
+                names = [drone.name for drone in builder.drones]
                 self._flight = Flight(names, homes, conditions, lambda _: self.idle())
             except ValueError as refused:
                 raise CannotFlyError(on_one_line(str(refused))) from refused
@@ -140,7 +140,7 @@ class SimulatedFeedback(Feedback):
 
     def _fly(self, flight: Flight, leg: Leg) -> None:
         """Fly until somebody has something new to report, or all are where they are to be."""
-        reports = self._go(flight, leg, leg.goals, heed=True)
+        reports = self._go(flight, leg, leg.goals, stop_on_report=True)
         new = self._new(reports)
         if reports and not new:
             self._go(flight, leg, leg.goals)
@@ -154,10 +154,12 @@ class SimulatedFeedback(Feedback):
         self._waiting.extend(new)
         self._tell(flown, new)
 
-    def _go(self, flight: Flight, leg: Leg, goals: Mapping[int, Goal], *, heed: bool = False) -> tuple[Report, ...]:
+    def _go(
+        self, flight: Flight, leg: Leg, goals: Mapping[int, Goal], *, stop_on_report: bool = False
+    ) -> tuple[Report, ...]:
         self._calls[-1] += 1
         try:
-            return flight.fly(leg.opened_by, goals, heed=heed)
+            return flight.fly(leg.opened_by, goals, stop_on_report=stop_on_report)
         except ValueError as refused:
             raise CannotFlyError(on_one_line(f"the decision cannot be flown: {refused}")) from refused
 
@@ -176,8 +178,8 @@ class SimulatedFeedback(Feedback):
     def _tell(self, flown: FlightLog, reports: Sequence[Report]) -> None:
         """Publish what was flown since the last time, and what was reported meanwhile, as time goes by."""
         self._now_s = float(flown.times[-1]) if len(flown.times) else self._now_s
-        if self.outlets:
-            self._broadcast.tell(self.outlets, flown, reports, self._now_s)
+        if self.publishers:
+            self._broadcast.publish(self.publishers, flown, reports, self._now_s)
 
 
 def _what(report: Report) -> Report:

@@ -1,4 +1,4 @@
-"""An outlet: one sink of a run, and how much was published there."""
+"""An publisher: one sink of a run, and how much was published there."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class SinkPublisher:
         self._publisher.poses(positions, attitudes, nanoseconds(at_s))
 
     @property
-    def told(self) -> str:
+    def summary(self) -> str:
         """What was published, in a few words: `10 waypoints, 6 landings`."""
         first = ("waypoint", "landing")
         words = [
@@ -57,46 +57,46 @@ class SinkPublisher:
         return ", ".join(words)
 
 
-class Broadcast:
-    """Tells outlets of a flight as its time goes by: what is reported, and where everybody is, `POSES_HZ` a second."""
+class FlightBroadcast:
+    """Publishes a flight as its time goes by: reports, and all poses `POSES_HZ` times a second."""
 
     def __init__(self) -> None:
         self._ticks = 0
 
-    def tell(
-        self, outlets: Sequence[SinkPublisher], flown: FlightLog, reports: Sequence[Report], until_s: float
+    def publish(
+        self, publishers: Sequence[SinkPublisher], flown: FlightLog, reports: Sequence[Report], until_s: float
     ) -> None:
         """Publish what was not yet told of `flown` up to `until_s`, and `reports` among it. Raises `SinkError`."""
         untold = deque(reports)
         while (at_s := self._ticks / POSES_HZ) <= until_s:
             while untold and untold[0].at_s <= at_s:
-                _report(outlets, untold.popleft())
+                _report(publishers, untold.popleft())
             after = min(int(np.searchsorted(flown.times, at_s)), len(flown.times) - 1)
-            for outlet in outlets:
-                outlet.poses(flown.positions[after], flown.attitudes[after], at_s)
+            for publisher in publishers:
+                publisher.poses(flown.positions[after], flown.attitudes[after], at_s)
             self._ticks += 1
         for report in untold:
-            _report(outlets, report)
+            _report(publishers, report)
 
 
-def publish_flight(mission: Mission, flown: FlightLog, outlets: Sequence[SinkPublisher]) -> None:
+def publish_flight(mission: Mission, flown: FlightLog, publishers: Sequence[SinkPublisher]) -> None:
     """Publish a whole flight: each leg's waypoints as it begins, poses, and who falls. Raises `SinkError`."""
-    if not outlets:
+    if not publishers:
         return
     fallen = {number for number, error in enumerate(flown.errors_m) if np.isnan(error)}
     falls = {one.drone: one for one in reversed(flown.events) if one.drone in fallen}
     reports = sorted((OutOfOrder(flown.names[n], one.what, one.at_s) for n, one in falls.items()), key=lambda r: r.at_s)
-    broadcast = Broadcast()
+    broadcast = FlightBroadcast()
     begins_s = [0.0, *(times.begins_s for times in flown.legs[1:]), flown.simulated_s]
     for leg, (begin_s, end_s) in zip(mission.legs, pairwise(begins_s), strict=True):
-        for outlet in outlets:
-            outlet.decide(leg, nanoseconds(begin_s))
-        broadcast.tell(outlets, flown, [one for one in reports if begin_s < one.at_s <= end_s], end_s)
+        for publisher in publishers:
+            publisher.decide(leg, nanoseconds(begin_s))
+        broadcast.publish(publishers, flown, [one for one in reports if begin_s < one.at_s <= end_s], end_s)
 
 
-def _report(outlets: Sequence[SinkPublisher], report: Report) -> None:
-    for outlet in outlets:
-        outlet.report(report)
+def _report(publishers: Sequence[SinkPublisher], report: Report) -> None:
+    for publisher in publishers:
+        publisher.report(report)
 
 
 def nanoseconds(at_s: float) -> int:

@@ -72,7 +72,7 @@ class Situation:
         self._taken: dict[tuple[str, int], set[Point]] = {}
         self.notes = []
 
-    def heed(self, team: Team, report: Report) -> tuple[Change, ...]:
+    def changes(self, team: Team, report: Report) -> tuple[Change, ...]:
         """What `report` changes in `team`, which can take these changes; nothing if its robot is not there."""
         drone = self._drones.get(report.drone)
         if drone is None or drone.robot not in team:

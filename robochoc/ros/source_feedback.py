@@ -63,7 +63,7 @@ class SourceFeedback(Feedback):
         """See `Feedback.now_ns`: the wall clock's, or that of the recording."""
         return time.time_ns() if self._source.live or self._now_ns is None else self._now_ns
 
-    def decided(self, cast: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - the robots were told
+    def decided(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - the robots were told
         """See `Feedback.decided`."""
         limits = [left_s, self._patience_s if self._source.live else None]
         wait_s = min((limit for limit in limits if limit is not None), default=None)
@@ -80,8 +80,8 @@ class SourceFeedback(Feedback):
             self._held = report
             return None
         if report is not None:
-            for outlet in self.outlets:
-                outlet.report(report)
+            for publisher in self.publishers:
+                publisher.report(report)
         return report
 
     def _pulled(self, deadline: float | None) -> Report | None:

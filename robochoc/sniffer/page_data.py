@@ -17,8 +17,8 @@ from typing import Any, assert_never
 import msgspec
 
 from robochoc.formats.result import result_json
-from robochoc.model.outcome import Epoch, Outcome, Verdict
-from robochoc.model.priorities import natural
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.priorities import natural_key
 from robochoc.sniffer.acl import text
 from robochoc.sniffer.acl_messages import AclMessages
 from robochoc.sniffer.columns import packed
@@ -253,7 +253,7 @@ def _by(outcome: Outcome) -> str:
     return f", as {outcome.ruled_out if outcome.verdict is Verdict.NO_SOLUTION else f'{outcome.witness} has concluded'}"
 
 
-def _epochs(epochs: Sequence[Epoch]) -> str:
+def _epochs(epochs: Sequence[EpochOutcome]) -> str:
     """How many there were, and how each of the first ones ended."""
     ends = [f"{_cut(epoch.lost, 3)} lost" if epoch.lost else _said(epoch.verdict) for epoch in epochs[:MOST_EPOCHS]]
     more = len(epochs) - len(ends)
@@ -261,6 +261,6 @@ def _epochs(epochs: Sequence[Epoch]) -> str:
 
 
 def _cut(names: Sequence[str], most: int = 8) -> str:
-    shown = sorted(names, key=natural)
+    shown = sorted(names, key=natural_key)
     more = f" and {len(shown) - most} more" if len(shown) > most else ""
     return ", ".join(shown[:most]) + more

@@ -17,7 +17,7 @@ import msgspec
 from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts
 from robochoc.flight.layout import Layout, Point, layout_of
 from robochoc.formats import InvalidInputError, robot_in
-from robochoc.model.priorities import natural
+from robochoc.model.priorities import natural_key
 from robochoc.model.problem import Assignment, Robot
 from robochoc.sniffer.page_data import BadRequestError
 from robochoc.sniffer.trace import Trace
@@ -56,10 +56,10 @@ class TraceScene:
 
     def __init__(self, trace: Trace, robots: Mapping[str, Robot]) -> None:
         self._trace = trace
-        self._robots = {name: robots.get(name) for name in sorted({*trace.robots, *robots}, key=natural)}
+        self._robots = {name: robots.get(name) for name in sorted({*trace.robots, *robots}, key=natural_key)}
         crew = [(name, craft) for name in self._robots for craft in self._crafts(name, {})]
         crew = crew if len(crew) <= _MOST_DRONES else []
-        order = sorted(range(len(crew)), key=lambda place: (natural(crew[place][1].name), crew[place][1].name))
+        order = sorted(range(len(crew)), key=lambda place: (natural_key(crew[place][1].name), crew[place][1].name))
         self._owners = [crew[place][0] for place in order]
         crafts = [crew[place][1] for place in order]
         self._field: Layout = layout_of(crafts, self._others())

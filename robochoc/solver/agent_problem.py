@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-from robochoc.model.problem import Domain, Model, Robot, Team
+from robochoc.model.problem import ConstraintModel, Domain, Robot, Team
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, as_compiled
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.explanation import Known, held
@@ -85,7 +85,7 @@ def agent_problems(
         for robot in team.robots:
             for one in held(robot):
                 for owner in {team.owner[name] for name in one.constraint.variables} - {robot.name}:
-                    if one.constraint.model is not Model.PKC:
+                    if one.constraint.model is not ConstraintModel.PKC:
                         copies[owner].append(one)
     secretive: dict[str, list[str]] = {robot.name: [] for robot in team.robots}
     for robot in team.robots:

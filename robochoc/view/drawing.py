@@ -31,7 +31,7 @@ _WHITE: Colour = (1, 1, 1)
 _MARGIN = 0.8
 """Ground around the outermost drones, in cells."""
 _EYE = np.array([0.7, -1.0, 0.42])
-"""Where the camera looks from: in front of row 1, a little to the right, from above."""
+"""Where the camera states from: in front of row 1, a little to the right, from above."""
 _FIELD_OF_VIEW_DEG = 28
 _ROOM = 1.06
 """Of the view, for what the scene itself fills: the axes' labels need some."""
@@ -56,17 +56,17 @@ _OPACITIES = {"body": 0.35, "edges": 0.9}
 
 
 def commands(scene: Scene) -> list[bytes]:
-    """The packed commands that make meshcat's viewer show `scene` and play its film once."""
-    if scene.film is None:
+    """The packed commands that make meshcat's viewer show `scene` and play its playback once."""
+    if scene.playback is None:
         return _drawn(scene, [drone.end for drone in scene.drones]).commands
-    recorder = _drawn(scene, [drone.home for drone in scene.drones])
-    _draw_obstacles(recorder, [place for _, place in scene.film.obstacles])
-    _animate(recorder, scene.drones, scene.film)
-    return recorder.commands
+    meshcat = _drawn(scene, [drone.home for drone in scene.drones])
+    _draw_obstacles(meshcat, [place for _, place in scene.playback.obstacles])
+    _animate(meshcat, scene.drones, scene.playback)
+    return meshcat.commands
 
 
 def still(scene: Scene) -> list[bytes]:
-    """The same without the film: every drone stays at home."""
+    """The same without the playback: every drone stays at home."""
     return _drawn(scene, [drone.home for drone in scene.drones]).commands
 
 
@@ -93,19 +93,19 @@ def cell_of(scene: Scene) -> float:
 
 def _drawn(scene: Scene, points: Sequence[Point]) -> MeshcatCommands:
     """Everything, each drone at its point of `points`."""
-    recorder = MeshcatCommands()
+    meshcat = MeshcatCommands()
     extent, radius = _measured(scene)
-    _aim(recorder, extent, radius)
-    _draw_ground(recorder, scene, extent)
-    _draw_box(recorder, scene.axes)
-    _label_axes(recorder, scene.axes, _TEXT * radius)
-    _draw_drones(recorder, scene.drones, points, radius)
-    return recorder
+    _aim(meshcat, extent, radius)
+    _draw_ground(meshcat, scene, extent)
+    _draw_box(meshcat, scene.axes)
+    _label_axes(meshcat, scene.axes, _TEXT * radius)
+    _draw_drones(meshcat, scene.drones, points, radius)
+    return meshcat
 
 
 def _measured(scene: Scene) -> tuple[_Corners, float]:
     """What the scene takes up, and the radius of the sphere around that."""
-    points = [point for drone in scene.drones for point in (drone.home, drone.place, drone.aside) if point]
+    points = [point for drone in scene.drones for point in (drone.home, drone.place, drone.landing) if point]
     everything = np.array([*points, *_box(scene.axes)])
     margin = np.array([_MARGIN, _MARGIN, 0])
     extent = np.array([everything.min(axis=0) - margin, everything.max(axis=0) + margin])
@@ -120,21 +120,21 @@ def _corners(extent: _Corners) -> _Corners:
     return np.array([*product(*extent.T)])
 
 
-def _aim(recorder: MeshcatCommands, extent: _Corners, radius: float) -> None:
+def _aim(meshcat: MeshcatCommands, extent: _Corners, radius: float) -> None:
     """Scale any scene to radius 1 around the origin, where the lights are, and have the camera see all of it."""
     x, y, z = (float(part) for part in -extent.mean(axis=0) / radius)
-    recorder.place("", (x, y, z), (1 / radius, 1 / radius, 1 / radius))
+    meshcat.place("", (x, y, z), (1 / radius, 1 / radius, 1 / radius))
     for default in ("/Grid", "/Axes"):
-        recorder.set(default, "visible", value=False)
+        meshcat.set(default, "visible", value=False)
     around = (_corners(extent) - extent.mean(axis=0)) / radius
     x, y, z = (float(part) for part in _from_where_to_see(around))
     camera = "/Cameras/default/rotated/<object>"
-    recorder.set(camera, "fov", _FIELD_OF_VIEW_DEG)
-    recorder.set(camera, "position", [x, z, -y])  # the camera's own y is up
+    meshcat.set(camera, "fov", _FIELD_OF_VIEW_DEG)
+    meshcat.set(camera, "position", [x, z, -y])  # the camera's own y is up
 
 
 def _from_where_to_see(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Where, in the direction of `_EYE`, a camera that looks at the origin just has all `corners` in a square view."""
+    """Where, in the direction of `_EYE`, a camera that states at the origin just has all `corners` in a square view."""
     back: npt.NDArray[np.float64] = _EYE / np.linalg.norm(_EYE)
     right = np.cross([0, 0, 1], back)
     right /= np.linalg.norm(right)
@@ -143,21 +143,21 @@ def _from_where_to_see(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float
     return back * float(distance.max())
 
 
-def _draw_ground(recorder: MeshcatCommands, scene: Scene, extent: _Corners) -> None:
+def _draw_ground(meshcat: MeshcatCommands, scene: Scene, extent: _Corners) -> None:
     """A plane, and on it each drone's pad in the colour of its row."""
     (left, front, _), (right, back, _) = extent
     corners = np.array([[left, front, 0], [right, front, 0], [right, back, 0], [left, back, 0]])
     plane = Shape(corners, np.array([[0, 1, 2], [0, 2, 3]]), np.ones((4, 3)))
-    recorder.mesh("ground/plane", plane, _GROUND, opacity=0.3)
-    recorder.place("ground/plane", (0, 0, scene.ground - 0.02))
+    meshcat.mesh("ground/plane", plane, _GROUND, opacity=0.3)
+    meshcat.place("ground/plane", (0, 0, scene.ground - 0.02))
     if scene.drones:
         paint = paints(scene.drones)
         pads = [disc(drone.home, 0.36, colour) for drone, colour in zip(scene.drones, paint, strict=True)]
-        recorder.mesh("ground/pads", joined(pads), _WHITE, opacity=0.45)
-        recorder.place("ground/pads", (0, 0, -0.01))
+        meshcat.mesh("ground/pads", joined(pads), _WHITE, opacity=0.45)
+        meshcat.place("ground/pads", (0, 0, -0.01))
 
 
-def _draw_box(recorder: MeshcatCommands, axes: Sequence[Axis]) -> None:
+def _draw_box(meshcat: MeshcatCommands, axes: Sequence[Axis]) -> None:
     """The edges, the walls behind and below with their grid, and very faintly every cell."""
     low, high = _box(axes)
     walls = [np.arange(a, b + 0.5) for a, b in zip(low, high, strict=True)]
@@ -169,17 +169,17 @@ def _draw_box(recorder: MeshcatCommands, axes: Sequence[Axis]) -> None:
         "edges": ([wall[[0, -1]] for wall in walls], 0.9),
     }
     for name, (lines, opacity) in parts.items():
-        recorder.segments(f"box/{name}", _lattice(lines), _LINE, opacity)
+        meshcat.segments(f"box/{name}", _lattice(lines), _LINE, opacity)
 
 
-def _label_axes(recorder: MeshcatCommands, axes: Sequence[Axis], height: float) -> None:
+def _label_axes(meshcat: MeshcatCommands, axes: Sequence[Axis], height: float) -> None:
     """Each named axis' name and numbers, beside the edge of the box that is nearest to the viewer."""
     for number, axis, origin, name_at in _beside(axes, height):
         for at, text in axis.ticks:
             spot = origin.copy()
             spot[number] = at
-            _write(recorder, f"axes/{axis.name} {text}", text, spot, height)
-        _write(recorder, f"axes/{axis.name}", axis.name, name_at, 1.2 * height)
+            _write(meshcat, f"axes/{axis.name} {text}", text, spot, height)
+        _write(meshcat, f"axes/{axis.name}", axis.name, name_at, 1.2 * height)
 
 
 def _beside(axes: Sequence[Axis], height: float) -> Iterator[tuple[int, Axis, _Corner, _Corner]]:
@@ -209,48 +209,48 @@ def _lattice(walls: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64
 
 
 def _draw_drones(
-    recorder: MeshcatCommands, drones: Sequence[DrawnDrone], points: Sequence[Point], radius: float
+    meshcat: MeshcatCommands, drones: Sequence[DrawnDrone], points: Sequence[Point], radius: float
 ) -> None:
     texts = _texts([drone.name for drone in drones], _READABLE * radius)
     drawn = zip(drones, points, texts, paints(drones), strict=True)
     for number, (drone, point, text, colour) in enumerate(drawn):
         path = path_of(number, drone.name)
-        recorder.mesh(f"{path}/body", quadrotor(), colour)
-        recorder.place(f"{path}/body", HUB)
+        meshcat.mesh(f"{path}/body", quadrotor(), colour)
+        meshcat.place(f"{path}/body", HUB)
         height = min(_TEXT * radius, _NAME_WIDTH / label(text).aspect)
-        _write(recorder, f"{path}/name", text, np.array([0, 0, 0.42]), height)
-        recorder.place(path, point)
+        _write(meshcat, f"{path}/name", text, np.array([0, 0, 0.42]), height)
+        meshcat.place(path, point)
 
 
-def _draw_obstacles(recorder: MeshcatCommands, obstacles: Sequence[Point]) -> None:
+def _draw_obstacles(meshcat: MeshcatCommands, obstacles: Sequence[Point]) -> None:
     for number, place in enumerate(obstacles, 1):
-        recorder.mesh(f"obstacles/{number}/body", box(place, _IN_THE_WAY), RED, opacity=_OPACITIES["body"])
+        meshcat.mesh(f"obstacles/{number}/body", box(place, _IN_THE_WAY), RED, opacity=_OPACITIES["body"])
         sides = [np.array([at - _IN_THE_WAY / 2, at + _IN_THE_WAY / 2]) for at in place]
-        recorder.segments(f"obstacles/{number}/edges", _lattice(sides), RED, _OPACITIES["edges"])
+        meshcat.segments(f"obstacles/{number}/edges", _lattice(sides), RED, _OPACITIES["edges"])
 
 
-def _animate(recorder: MeshcatCommands, drones: Sequence[DrawnDrone], film: Playback) -> None:
+def _animate(meshcat: MeshcatCommands, drones: Sequence[DrawnDrone], playback: Playback) -> None:
     paint = paints(drones)
     tracks: list[Track] = []
     for number, (drone, colour) in enumerate(zip(drones, paint, strict=True)):
         path = path_of(number, drone.name)
-        tracks += _moves(path, film, number)
-        if film.looks[number]:
-            tracks.append(_painting(f"{path}/body/<object>", film.looks[number], colour))
-    for number, (seen_s, _) in enumerate(film.obstacles, 1):
+        tracks += _moves(path, playback, number)
+        if playback.states[number]:
+            tracks.append(_painting(f"{path}/body/<object>", playback.states[number], colour))
+    for number, (seen_s, _) in enumerate(playback.obstacles, 1):
         if seen_s > 0:
             tracks += [
                 _appearing(f"obstacles/{number}/{part}/<object>", seen_s, opacity)
                 for part, opacity in _OPACITIES.items()
             ]
     if tracks:
-        recorder.animate(tracks, FPS)
+        meshcat.animate(tracks, FPS)
 
 
-def _moves(path: str, film: Playback, number: int) -> Iterator[Track]:
+def _moves(path: str, playback: Playback, number: int) -> Iterator[Track]:
     """How a drone moves and tilts, if it does at all."""
-    frames = FPS * film.times
-    positions, attitudes = film.positions[:, number], film.attitudes[:, number]
+    frames = FPS * playback.times
+    positions, attitudes = playback.positions[:, number], playback.attitudes[:, number]
     if np.linalg.norm(positions - positions[0], axis=1).max() > _CLOSE:
         yield Track(path, "position", "vector3", _keys(frames, positions, position_keys(frames, positions, _CLOSE)))
     if angle(attitudes, attitudes[0]).max() > _ALIKE:
@@ -262,10 +262,10 @@ def _keys(frames: Samples, values: Samples, keys: Keys) -> list[tuple[float, lis
     return [*zip(frames[keys].round(6).tolist(), values[keys].tolist(), strict=True)]
 
 
-def _painting(path: str, looks: Sequence[tuple[float, DroneState]], colour: Colour) -> Track:
+def _painting(path: str, states: Sequence[tuple[float, DroneState]], colour: Colour) -> Track:
     """How a drone changes its colour."""
     keys: list[tuple[float, Colour]] = [(0, colour)]
-    for at_s, look in looks:
+    for at_s, look in states:
         begin, now = max(FPS * at_s, keys[-1][0]), keys[-1][1]
         keys += [(begin, now), (begin + _FADE, tint(look, colour))]
     return Track(path, "material.color", "color", keys)
@@ -286,11 +286,11 @@ def _texts(names: Sequence[str], readable: float) -> list[str]:
     return [name[len(word) :] for name in names] if numbered else list(names)
 
 
-def _write(recorder: MeshcatCommands, path: str, text: str, at: npt.NDArray[np.float64], height: float) -> None:
+def _write(meshcat: MeshcatCommands, path: str, text: str, at: npt.NDArray[np.float64], height: float) -> None:
     picture = label(text)
     x, y, z = (float(part) for part in at)
-    recorder.sprite(path, picture.svg)
-    recorder.place(path, (x, y, z), (height * picture.aspect, height, 1))
+    meshcat.sprite(path, picture.svg)
+    meshcat.place(path, (x, y, z), (height * picture.aspect, height, 1))
 
 
 def paints(drones: Sequence[DrawnDrone]) -> list[Colour]:
@@ -301,11 +301,11 @@ def paints(drones: Sequence[DrawnDrone]) -> list[Colour]:
 
 
 def tint(look: DroneState, colour: Colour) -> Colour:
-    """What a drone looks like, if it is of that `colour` by itself."""
+    """What a drone states like, if it is of that `colour` by itself."""
     match look:
         case DroneState.FLIES:
             return colour
-        case DroneState.ASIDE:
+        case DroneState.WITHDRAWN:
             return GREY
         case DroneState.FALLEN:
             return RED

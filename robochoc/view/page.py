@@ -42,7 +42,7 @@ def _filled(scene: Scene, embedded: str, connections: str) -> bytes:
             title=_text(scene.title),
             facts="".join(f"<dt>{_text(name)}</dt><dd>{_text(fact)}</dd>" for name, fact in scene.facts),
             commands=embedded,
-            film=playback_json(scene),
+            playback=playback_json(scene),
             viewer=viewer,
             player=player,
         )

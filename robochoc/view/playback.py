@@ -25,10 +25,10 @@ _Array = npt.NDArray[np.float64]
 
 
 class DroneState(StrEnum):
-    """What a drone looks like: in the colour of its row, or grey, or red."""
+    """What a drone states like: in the colour of its row, or grey, or red."""
 
     FLIES = "flies"
-    ASIDE = "aside"
+    WITHDRAWN = "withdrawn"
     FALLEN = "fallen"
 
 
@@ -54,7 +54,7 @@ class EventMark:
 class Playback:
     """A flight to be shown. Arrays have a row for each of T times, and in it one for each of N drones.
 
-    `looks` are for each drone its changes, in order: from when on it looks how.
+    `states` are for each drone its changes, in order: from when on it states how.
     """
 
     times: _Array
@@ -62,7 +62,7 @@ class Playback:
     """(T, N, 3)"""
     attitudes: _Array
     """(T, N, 4): unit quaternions x, y, z, w."""
-    looks: tuple[tuple[tuple[float, DroneState], ...], ...]
+    states: tuple[tuple[tuple[float, DroneState], ...], ...]
     chapters: tuple[Chapter, ...] = ()
     marks: tuple[EventMark, ...] = ()
     obstacles: tuple[tuple[float, Point], ...] = ()
@@ -75,14 +75,14 @@ class Playback:
 
 
 def playback_of(mission: Mission, flown: FlightLog) -> Playback:
-    """How `flown` looks in the box of `mission`, whose drones it flew."""
+    """How `flown` states in the box of `mission`, whose drones it flew."""
     marks = [EventMark(event.at_s, event.drone, event.what) for event in flown.events]
     obstacles = [in_cells(mission, np.array(place)) for place in flown.obstacles]
     return Playback(
         flown.times,
         in_cells(mission, flown.positions),
         flown.attitudes,
-        tuple(tuple(_looks(number, mission, flown)) for number in range(len(mission.drones))),
+        tuple(tuple(_states(number, mission, flown)) for number in range(len(mission.drones))),
         tuple(_chapters(mission, flown)),
         tuple(sorted(marks, key=lambda mark: mark.at_s)),
         tuple(
@@ -104,13 +104,13 @@ def fell(flown: FlightLog) -> dict[int, FlightEvent]:
     return {number: own[-1] for number, own in told.items()}
 
 
-def _looks(number: int, mission: Mission, flown: FlightLog) -> Iterator[tuple[float, DroneState]]:
+def _states(number: int, mission: Mission, flown: FlightLog) -> Iterator[tuple[float, DroneState]]:
     fallen = fell(flown).get(number)
     falls_s = fallen.at_s if fallen else np.inf
     now = DroneState.FLIES
     for leg, begins_s in _begun(mission, flown):
         goal = leg.goals.get(number)
-        then = now if goal is None else DroneState.ASIDE if goal.lands else DroneState.FLIES
+        then = now if goal is None else DroneState.WITHDRAWN if goal.lands else DroneState.FLIES
         if then is not now and begins_s < falls_s:
             yield begins_s, then
             now = then

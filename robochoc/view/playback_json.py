@@ -23,31 +23,31 @@ def playback_json(scene: Scene) -> str:
         "corners": [[round(part, 5) for part in corner] for corner in corners(scene)],
         "cell": round(cell_of(scene), 5),
         "drones": [*_drones(scene)],
-        **(_story(scene.film) if scene.film else {"duration": 0, "chapters": [], "marks": []}),
+        **(_story(scene.playback) if scene.playback else {"duration": 0, "chapters": [], "marks": []}),
     }
     return json.dumps(whole, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def _drones(scene: Scene) -> Iterator[dict[str, Any]]:
-    looks = scene.film.looks if scene.film else ((),) * len(scene.drones)
-    drawn = zip(scene.drones, paints(scene.drones), looks, strict=True)
+    states = scene.playback.states if scene.playback else ((),) * len(scene.drones)
+    drawn = zip(scene.drones, paints(scene.drones), states, strict=True)
     for number, (drone, colour, changes) in enumerate(drawn):
         yield {
             "name": printable(drone.name),
             "path": path_of(number, drone.name),
             "colour": web(colour),
-            "looks": [[round(at_s, 3), look.value, web(tint(look, colour))] for at_s, look in changes],
+            "states": [[round(at_s, 3), look.value, web(tint(look, colour))] for at_s, look in changes],
         }
 
 
-def _story(film: Playback) -> dict[str, Any]:
+def _story(playback: Playback) -> dict[str, Any]:
     return {
-        "duration": round(film.duration_s, 4),
+        "duration": round(playback.duration_s, 4),
         "chapters": [
             {"at": round(chapter.begins_s, 3), "opened": printable(chapter.opened_by), "says": chapter.says}
-            for chapter in film.chapters
+            for chapter in playback.chapters
         ],
         "marks": [
-            {"at": round(mark.at_s, 3), "drone": mark.drone, "says": printable(mark.says)} for mark in film.marks
+            {"at": round(mark.at_s, 3), "drone": mark.drone, "says": printable(mark.says)} for mark in playback.marks
         ],
     }

@@ -28,26 +28,26 @@ class DrawnDrone:
     """Its row: drones of a row look alike."""
     home: Point
     place: Point | None = None
-    aside: Point | None = None
+    landing: Point | None = None
 
     @property
     def end(self) -> Point:
         """Where it is to be in the end."""
-        return self.place or self.aside or self.home
+        return self.place or self.landing or self.home
 
 
 @dataclass(frozen=True)
 class Scene:
     """One run, ready to be drawn. `facts` is the caption: pairs of a label and what it says, in plain text.
 
-    Without a `film`, drones are where they are to be in the end.
+    Without a `playback`, drones are where they are to be in the end.
     """
 
     title: str
     facts: tuple[tuple[str, str], ...]
     drones: tuple[DrawnDrone, ...]
     axes: tuple[Axis, Axis, Axis]
-    film: Playback | None = None
+    playback: Playback | None = None
 
     @property
     def ground(self) -> float:
@@ -77,8 +77,8 @@ def scene_of(
     drones = tuple(_drones(flown_mission))
     title = f"{outcome.team}: {_headline(outcome, mission, drones)}"
     flight = _flight_facts(flown, why_not, is_to_scale=flown_mission is mission)
-    film = playback_of(flown_mission, flown) if flown else None
-    return Scene(title, (*_facts(outcome, mission), *flight), drones, mission.axes, film)
+    playback = playback_of(flown_mission, flown) if flown else None
+    return Scene(title, (*_facts(outcome, mission), *flight), drones, mission.axes, playback)
 
 
 def _headline(outcome: Outcome, mission: Mission, drones: Sequence[DrawnDrone]) -> str:
@@ -100,7 +100,7 @@ def _drones(mission: Mission) -> Iterator[DrawnDrone]:
         end = _cell(mission, goal.at) if goal else None
         home = _cell(mission, drone.home)
         if goal and goal.lands:
-            yield DrawnDrone(drone.name, drone.group, home, aside=end)
+            yield DrawnDrone(drone.name, drone.group, home, landing=end)
         else:
             yield DrawnDrone(drone.name, drone.group, home, place=end)
 

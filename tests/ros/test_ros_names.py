@@ -46,7 +46,7 @@ def test_names_are_legal_and_lead_back_or_are_refused(offered: list[tuple[str, s
     for number, each in enumerate(drones):
         known = names.waypoint(number)
         assert (known is None) == (each.topic is None)
-        assert names.original[known or names.space(number)] == (each.topic.name if each.topic else each.name)
+        assert names.original[known or names.namespace(number)] == (each.topic.name if each.topic else each.name)
 
 
 @given(st.from_regex(r"(/[A-Za-z](_?[A-Za-z0-9]){0,5}){1,3}", fullmatch=True))
@@ -79,7 +79,7 @@ def test_the_space_is_the_first_token_if_it_is_the_drones_own() -> None:
     names = TopicNames(
         [drone("A", "/drone3.1/waypoint3.1"), drone("B", "/fleet/b"), drone("C", "/fleet/c"), drone("D.1", None)]
     )
-    assert [names.space(number) for number in range(4)] == ["/drone3_1", "/fleet/b", "/fleet/c", "/D_1"]
+    assert [names.namespace(number) for number in range(4)] == ["/drone3_1", "/fleet/b", "/fleet/c", "/D_1"]
     assert names.waypoint(3) is None
     assert names.reports()["/drone3_1/battery"] == "sensor_msgs/BatteryState"
 
@@ -87,7 +87,7 @@ def test_the_space_is_the_first_token_if_it_is_the_drones_own() -> None:
 def test_a_waypoint_that_is_called_like_a_report_is_no_report() -> None:
     names = TopicNames([drone("A", "/a/pose")])
     assert names.waypoint(0) == "/a/pose"
-    assert names.space(0) == "/a/pose"
+    assert names.namespace(0) == "/a/pose"
 
 
 def test_a_clash_names_topics_robots_and_the_way_out() -> None:

@@ -92,11 +92,11 @@ def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[Flight
     with ros_failures_told(), ExitStack() as stack:
         sinks = open_sinks(given["sinks"], stack)
         frame = given["frame"] or FRAME
-        outlets = [SinkPublisher(mission.team, mission.drones, sink, frame) for sink in sinks]
+        publishers = [SinkPublisher(mission.team, mission.drones, sink, frame) for sink in sinks]
         try:
             with stages(mission.team) as progress:
                 flown = flight(mission, conditions, progress)
         except ValueError as refused:
             raise Failure(INVALID, on_one_line(f"{saved}: it cannot be flown: {refused}")) from refused
-        publish_flight(mission, flown, outlets)
-    return flown, [f"{outlet.place}: {outlet.told}" for outlet in outlets]
+        publish_flight(mission, flown, publishers)
+    return flown, [f"{publisher.place}: {publisher.summary}" for publisher in publishers]

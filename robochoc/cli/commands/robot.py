@@ -11,7 +11,7 @@ import click
 from robochoc.cli.options.local_problems import limits, local_options
 from robochoc.cli.options.network import identity_option, master_option, network_failures_told, patience_option
 from robochoc.cli.options.paths import InputPath
-from robochoc.cli.options.ros import outlets, ros_options
+from robochoc.cli.options.ros import robot_publisher, ros_options
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.options.tokens import token_options
 from robochoc.cli.reports.failures import LIMIT, LOST, Failure
@@ -75,7 +75,7 @@ def robot(
                     progress(Progress(0, _seconds() - began, words))
 
             itself = read_robot(file)  # before its token is spent
-            published = stack.enter_context(outlets(itself, given))
+            published = stack.enter_context(robot_publisher(itself, given))
             stage(f"looking for the master at {place}")
             proof = identity_of(file.stem, place, identity, token, given["patience"])
             manner = Manner(given["patience"], sniffed=given["sniff"], stage=stage)

@@ -328,13 +328,13 @@ def looped(ros: Ros, team: Team, seed: int) -> Iterator[ClosedLoop | None]:
     from robochoc.ros.situation import BATTERY
 
     with flights_told() if ros.situation == FLIGHT else nullcontext(), ros_failures_told(), ExitStack() as stack:
-        senses = _senses(ros, drones_of(team), seed, stack) if ros.situation else None
+        feedback = _feedback(ros, drones_of(team), seed, stack) if ros.situation else None
         battery = BATTERY if ros.battery is None else ros.battery
         sinks = open_sinks(ros.sinks, stack)
-        yield ClosedLoop(team, sinks, senses, frame=ros.frame, scale=ros.scale, battery=battery)
+        yield ClosedLoop(team, sinks, feedback, frame=ros.frame, scale=ros.scale, battery=battery)
 
 
-def _senses(ros: Ros, drones: Sequence[Drone], seed: int, stack: ExitStack) -> Feedback:
+def _feedback(ros: Ros, drones: Sequence[Drone], seed: int, stack: ExitStack) -> Feedback:
     """What `--situation` asks for."""
     if ros.situation == FLIGHT:
         from robochoc.ros.simulated_feedback import SimulatedFeedback
@@ -354,7 +354,7 @@ def _senses(ros: Ros, drones: Sequence[Drone], seed: int, stack: ExitStack) -> F
 
 
 @contextmanager
-def outlets(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assignment], list[str]]]:
+def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assignment], list[str]]]:
     """Takes --ros, --frame and --scale out of `given`: what `robot` alone is to publish, and where.
 
     Gives a function for the run's end, by the master's words, and the robot's own decision: it publishes that, and says
@@ -377,8 +377,8 @@ def outlets(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assi
 
         def publish(why: str, assignment: Assignment) -> list[str]:
             leg = leg_of_robot(robot, why, assignment, scale)
-            for outlet in found:
-                outlet.decide(leg, time.time_ns())
-            return [f"{outlet.place}: {outlet.told}" for outlet in found]
+            for publisher in found:
+                publisher.decide(leg, time.time_ns())
+            return [f"{publisher.place}: {publisher.summary}" for publisher in found]
 
         yield publish

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def told_of(loop: ClosedLoop) -> list[str]:
     """What was published where, and what could not be heeded: a line each."""
-    return [*(f"{outlet.place}: {outlet.told}" for outlet in loop.outlets), *loop.notes]
+    return [*(f"{publisher.place}: {publisher.summary}" for publisher in loop.publishers), *loop.notes]
 
 
 class Flight(NamedTuple):
@@ -49,5 +49,5 @@ def _flown_by(loop: ClosedLoop) -> tuple[Mission, FlightLog] | None:
     """What a simulated flight has flown; None where nothing was."""
     from robochoc.ros.simulated_feedback import SimulatedFeedback
 
-    flown = loop.senses.flown() if isinstance(loop.senses, SimulatedFeedback) else None
+    flown = loop.feedback.flown() if isinstance(loop.feedback, SimulatedFeedback) else None
     return (loop.mission, flown) if loop.mission and flown else None

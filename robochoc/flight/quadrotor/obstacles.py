@@ -23,16 +23,16 @@ class ObstacleEncounter(NamedTuple):
     keep: float
 
 
-def encounters(course: Trajectory, obstacles: dict[int, Array], keep: float) -> list[ObstacleEncounter]:
+def encounters(trajectory: Trajectory, obstacles: dict[int, Array], keep: float) -> list[ObstacleEncounter]:
     """Everybody whom the plan brings nearer than `keep` to one of the `obstacles`, by their numbers."""
     if not obstacles:
         return []
-    times = np.append(np.arange(0.0, course.plan.duration_s, _LOOK_S), course.plan.duration_s)
-    places = np.stack([course.plan.at(float(s)).position for s in times])
+    times = np.append(np.arange(0.0, trajectory.plan.duration_s, _LOOK_S), trajectory.plan.duration_s)
+    places = np.stack([trajectory.plan.at(float(s)).position for s in times])
     found = []
     for number, obstacle in obstacles.items():
         near = np.square(places - obstacle).sum(2) < (keep + _LOOK_M) ** 2
         for place in np.flatnonzero(near.any(0)).tolist():
             until = float(times[np.flatnonzero(near[:, place])[-1]])
-            found.append(ObstacleEncounter(number, int(course.who[place]), until, keep))
+            found.append(ObstacleEncounter(number, int(trajectory.who[place]), until, keep))
     return found

@@ -33,7 +33,7 @@ class SeparationMonitor:
         self._second: npt.NDArray[np.intp] = self._pairs[1]
         self._sound = 0
 
-    def see(self, places: Array, at_s: float) -> None:
+    def observe(self, places: Array, at_s: float) -> None:
         """Everybody's place (3, N) at a time."""
         if not len(self._pairs[0]):
             return
@@ -49,7 +49,7 @@ class SeparationMonitor:
         if sound < len(squares):
             self.nearest_fallen = self._nearer(self.nearest_fallen, squares[sound:], sound, at_s)
 
-    def lose(self, lost: Mask) -> None:
+    def exclude(self, lost: Mask) -> None:
         """From now on these have fallen, or fall."""
         self._lost = lost.copy()
         self._anchor = None

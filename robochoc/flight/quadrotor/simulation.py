@@ -49,7 +49,7 @@ class QuadrotorSimulation:
         self.hop_m = _HOP_M[1]
         self.broken: list[tuple[int, str, float]] = []
         """Who cannot fly any more: its number, why, since when."""
-        self.watch = SeparationMonitor(number)
+        self.separation = SeparationMonitor(number)
         self.lost: Mask = np.zeros(number, dtype=np.bool_)
         """Who falls or has fallen."""
         self._names = names
@@ -64,7 +64,7 @@ class QuadrotorSimulation:
         self._places: list[Array] = []
         self._axes: list[Array] = []
         self._note()
-        self.watch.see(self._bodies.state[:3], 0.0)
+        self.separation.observe(self._bodies.state[:3], 0.0)
 
     @property
     def now_s(self) -> float:
@@ -94,18 +94,18 @@ class QuadrotorSimulation:
         calm = np.where(low, self._bodies.stands, (gaps < near**2) & (speeds < slow**2)) | self.lost
         return bool(calm.all()) and not self.falling.any()
 
-    def gaps(self) -> Array:
+    def tracking_errors(self) -> Array:
         """(N,): how far everybody is from its reference; 0 for the lost."""
         gaps = np.sqrt(np.square(self.reference[:3] - self._bodies.state[:3]).sum(0))
         return np.where(self.lost, 0.0, gaps)
 
-    def advance(self, course: Trajectory | None = None, *, late: bool = False) -> None:
-        """One step along `course`. Who is to land and is `late` does so where it is."""
+    def advance(self, trajectory: Trajectory | None = None, *, late: bool = False) -> None:
+        """One step along `trajectory`. Who is to land and is `late` does so where it is."""
         while self._due and self._due[-1].at_s <= self.now_s:
             self._fail(self._due.pop())
-        if course is not None:
-            course.refer()
-            course.advance(DT)
+        if trajectory is not None:
+            trajectory.refer()
+            trajectory.advance(DT)
         bodies = self._bodies
         low = self.reference[2] <= self._ground + _TOUCH_M
         moving = np.logical_or.reduce(self.reference[3:6] != 0)
@@ -119,15 +119,15 @@ class QuadrotorSimulation:
             self._rescue()
         if self.broken or bodies.fallen.any():
             self._look_after_the_lost()
-        self.watch.see(bodies.state[:3], self.now_s)
+        self.separation.observe(bodies.state[:3], self.now_s)
         if self.is_sampled:
             self._note()
 
-    def leave(self, spare: float) -> None:
+    def set_spare_distance(self, spare: float) -> None:
         """From now on plans keep `spare` metres besides the distance."""
         self.hop_m = min(max(_HOP * spare, _HOP_M[0]), _HOP_M[1])
 
-    def tell(self, drone: int, what: str) -> None:
+    def log_event(self, drone: int, what: str) -> None:
         """Note a happening now."""
         self.events.append(FlightEvent(self.now_s, drone, what))
 
@@ -159,9 +159,9 @@ class QuadrotorSimulation:
     def _lose(self, drone: int, why: str) -> None:
         self.lost[drone] = True
         self._off |= self._bodies.fallen
-        self.watch.lose(self.lost)
+        self.separation.exclude(self.lost)
         self.broken.append((drone, why, self.now_s))
-        self.tell(drone, why)
+        self.log_event(drone, why)
 
     def _look_after_the_lost(self) -> None:
         bodies = self._bodies
@@ -169,7 +169,7 @@ class QuadrotorSimulation:
         for drone in np.flatnonzero(bodies.fallen & ~self._down).tolist():
             self._down[drone] = self._off[drone] = True
             if self.lost[drone]:
-                self.tell(drone, "hits the ground")
+                self.log_event(drone, "hits the ground")
             else:
                 self._lose(drone, "has hit the ground")
 

@@ -50,13 +50,13 @@ def plan_routes(
     *,
     distance: float,
     standing: Array | None = None,
-    waits: Array | None = None,
+    delays: Array | None = None,
     limits: MotionLimits | None = None,
     ground: float = 0.0,
 ) -> RoutePlan:
     """How N drones fly from `starts` (N, 3) to `goals` (N, 3), never nearer to each other than `distance`.
 
-    They keep it from the `standing` points (M, 3) too. Drone i does not begin before second `waits[i]`; who has the
+    They keep it from the `standing` points (M, 3) too. Drone i does not begin before second `delays[i]`; who has the
     same start and goal stays there, unless `moves.py` finds no other way. Nobody flies below `ground`, but for starts
     and goals that are there. The result is the same each time. Lengths are in metres.
 
@@ -65,19 +65,19 @@ def plan_routes(
     """
     starts, goals = _points(starts, "starts"), _points(goals, "goals")
     standing = np.empty((0, 3)) if standing is None else _points(standing, "standing")
-    waits = np.zeros(len(starts)) if waits is None else np.asarray(waits, dtype=float)
-    if len(goals) != len(starts) or waits.shape != (len(starts),):
+    delays = np.zeros(len(starts)) if delays is None else np.asarray(delays, dtype=float)
+    if len(goals) != len(starts) or delays.shape != (len(starts),):
         raise ValueError(
-            f"{len(starts)} starts, {len(goals)} goals and waits of shape {waits.shape} do not go together"
+            f"{len(starts)} starts, {len(goals)} goals and delays of shape {delays.shape} do not go together"
         )
-    if not (0 < distance < math.inf and math.isfinite(ground) and np.isfinite(waits).all()):
-        raise ValueError(f"distance {distance}, ground {ground} and all waits must be finite, the distance positive")
+    if not (0 < distance < math.inf and math.isfinite(ground) and np.isfinite(delays).all()):
+        raise ValueError(f"distance {distance}, ground {ground} and all delays must be finite, the distance positive")
     check_spacing(starts, standing, distance, "start")
     check_spacing(goals, standing, distance, "goal")
     heights = np.concatenate((starts[:, 2], goals[:, 2], standing[:, 2], [ground]))
     space = Space(distance, ground, float(heights.max()) + 2 * distance)
-    table = _Timetable(starts, space, limits or MotionLimits(), waits)
-    for move in moves_between(starts, goals, standing, space, waits):
+    table = _Timetable(starts, space, limits or MotionLimits(), delays)
+    for move in moves_between(starts, goals, standing, space, delays):
         table.add(move)
     return table.plan()
 
@@ -120,13 +120,13 @@ class _Entry:
 class _Timetable:
     """The moves that are scheduled, and where everybody rests in between."""
 
-    def __init__(self, starts: Array, space: Space, limits: MotionLimits, waits: Array) -> None:
+    def __init__(self, starts: Array, space: Space, limits: MotionLimits, delays: Array) -> None:
         self._starts = starts
         self._space = space
         self._limits = limits
         self._step = min(_STEP_S, math.sqrt(4 * _BULGE * space.distance / limits.acceleration))
         self._enough = space.distance + limits.acceleration * self._step**2 / 4
-        self._first: list[int] = np.ceil(np.maximum(waits, 0) / self._step).astype(int).tolist()
+        self._first: list[int] = np.ceil(np.maximum(delays, 0) / self._step).astype(int).tolist()
         self._entries: list[_Entry] = []
         self._drones = np.empty(0, dtype=np.int64)
         self._latest = 0

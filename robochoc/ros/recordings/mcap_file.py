@@ -68,14 +68,14 @@ class McapSink(RecordingSink):
         self._schemas: dict[str, int] = {}
         self._channels: dict[tuple[str, str], int] = {}
         self._sequence: dict[int, int] = {}
-        with self.told():
+        with self.sink_errors():
             self._writer = Writer(self.file.stream, _CHUNK_BYTES, CompressionType.ZSTD, enable_data_crcs=True)
             self._writer.start("ros2")
 
     def explain(self, original: Mapping[str, str]) -> None:
         """Keep the table in the file, and each name at its topic."""
         super().explain(original)
-        with self.told():
+        with self.sink_errors():
             self._writer.add_metadata(NAMES, dict(original))
 
     def write(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:

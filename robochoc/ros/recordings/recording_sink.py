@@ -33,7 +33,7 @@ class RecordingSink(Sink):
             raise SinkError(f"a recording needs the name of its file, as in {self.ending}")
         self.original: Mapping[str, str] = MappingProxyType({})
         self._open = False
-        with self.told():
+        with self.sink_errors():
             self.file = Unfinished(Path(place))
         self._open = True
 
@@ -52,14 +52,14 @@ class RecordingSink(Sink):
     def advertise(self, topics: Mapping[str, str]) -> None:
         """See that all these types are known."""
         for topic, kind in topics.items():
-            with self.told(topic):
+            with self.sink_errors(topic):
                 types_of(self.version).definition(kind)
 
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
         """Append a message, received when it is published."""
         if not 0 <= at_ns < _END_OF_TIME:
             raise SinkError(on_one_line(f"{self.place}: {topic}: a recording has no time {at_ns}"))
-        with self.told(topic):
+        with self.sink_errors(topic):
             self.write(topic, kind, fields, at_ns)
 
     def close(self) -> None:
@@ -67,7 +67,7 @@ class RecordingSink(Sink):
         if self._open:
             self._open = False
             try:
-                with self.told():
+                with self.sink_errors():
                     self.finish()
                     self.file.keep()
             finally:
@@ -79,7 +79,7 @@ class RecordingSink(Sink):
         self.file.discard()
 
     @contextmanager
-    def told(self, topic: str = "") -> Iterator[None]:
+    def sink_errors(self, topic: str = "") -> Iterator[None]:
         """Whatever is wrong is told with the file's name, and the topic's."""
         where = f"{self.place}: {topic}" if topic else self.place
         try:

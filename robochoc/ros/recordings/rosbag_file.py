@@ -49,7 +49,7 @@ class RosbagSink(RecordingSink):
         super().__init__(place)
         self._connections: dict[tuple[str, str], Connection] = {}
         self._sequence: dict[int, int] = {}
-        with self.told():
+        with self.sink_errors():
             self._writer = Writer(Path(place) / "bag")  # what the library opens must not exist
             self._writer.path = cast("Path", _Opened(self.file.stream))
             self._writer.open()

@@ -153,7 +153,7 @@ def test_who_is_out_of_all_bounds_is_given_up() -> None:
     simulation = flight._simulation  # noqa: SLF001 - nothing that can be asked for gets it there
     flight.fly("up", UP)
     simulation._bodies.rates[:, 0] = math.nan  # noqa: SLF001
-    (report,) = flight.fly("and on", {1: Goal((2.0, 0.0, 1.0))}, heed=True)
+    (report,) = flight.fly("and on", {1: Goal((2.0, 0.0, 1.0))}, stop_on_report=True)
     assert isinstance(report, OutOfOrder)
     assert (report.drone, report.why) == ("a", "has got out of all bounds")
     flight.fly("at last", {1: Goal((2.0, 0.0, 1.0))})
@@ -193,7 +193,7 @@ def test_a_failure_is_reported_and_the_next_leg_keeps_away() -> None:
     flight = Flight(
         ["a", "b", "c"], homes, FlightConditions(failures=(MotorFailure("b", 2.0, 3), MotorFailure("c", 900.0)))
     )
-    (report,) = flight.fly("up", goals, heed=True)
+    (report,) = flight.fly("up", goals, stop_on_report=True)
     assert isinstance(report, OutOfOrder)
     assert (report.drone, report.why) == ("b", "motor 3 has stopped")
     assert report.at_s == pytest.approx(2, abs=DT)
@@ -202,7 +202,7 @@ def test_a_failure_is_reported_and_the_next_leg_keeps_away() -> None:
     assert stopped.times[-1] < 6
     lies = stopped.positions[-1, 1]
     spot = (float(lies[0]), float(lies[1]) + 0.1, 0.0)
-    assert flight.fly("down", {0: Goal(spot, lands=True), 1: Goal((1.0, 0.0, 3.0))}, heed=True) == ()
+    assert flight.fly("down", {0: Goal(spot, lands=True), 1: Goal((1.0, 0.0, 3.0))}, stop_on_report=True) == ()
     flown = flight.flown()
     assert math.isnan(flown.errors_m[1])
     assert 0.3 < flown.errors_m[0] < 2
@@ -242,12 +242,12 @@ def test_an_obstacle_is_seen_reported_and_kept_away_from(obstacle: Point, start:
     homes = np.array([[*start, 0.0], [2, 0, 0]])
     goals = {0: Goal((0.0, 0.0, 3.0)), 1: Goal((2.0, 0.0, 3.0))}
     flight = Flight(["a", "b"], homes, FlightConditions(obstacles=(obstacle,)))
-    (report,) = flight.fly("up", goals, heed=True)
+    (report,) = flight.fly("up", goals, stop_on_report=True)
     assert isinstance(report, Blocked)
     assert (report.drone, report.place) == ("a", obstacle)
     stopped = flight.flown()
     assert stopped.errors_m[0] > 0.1
-    assert flight.fly("again", goals, heed=True) == ()
+    assert flight.fly("again", goals, stop_on_report=True) == ()
     flown = flight.flown()
     assert np.linalg.norm(flown.positions - obstacle, axis=2).min() >= 0.5
     assert flown.errors_m[1] < 0.01
@@ -331,7 +331,7 @@ def test_who_is_wanted_along_the_ground_keeps_away_from_who_is_above() -> None:
     simulation = QuadrotorSimulation(["a"], np.zeros((1, 3)), 0.0, FlightConditions())
     heights = []
     for spare in (0.1, 0.05, 0.0):
-        simulation.leave(spare)
+        simulation.set_spare_distance(spare)
         heights.append(simulation.hop_m)
     assert heights == pytest.approx([0.08, 0.04, 0.01])
 

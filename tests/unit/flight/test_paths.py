@@ -46,7 +46,7 @@ def fly(
     limits: MotionLimits = LIMITS,
 ) -> Motion:
     """Plan, and check all that holds of any plan."""
-    planned = plan_routes(starts, goals, distance=distance, standing=standing, waits=waits, limits=limits)
+    planned = plan_routes(starts, goals, distance=distance, standing=standing, delays=waits, limits=limits)
     flown = motions(planned)
     assert nearest(flown.position, standing) >= distance - 1e-9
     assert (flown.position[0] == starts).all()
@@ -111,7 +111,7 @@ def test_rows_that_rise_go_straight_up_and_only_wait_as_they_are_told() -> None:
     flown = fly(GRID, goals, 0.5, waits=waits)
     assert (flown.position[..., :2] == GRID[:, :2]).all()
     ends = waits + LIMITS.durations(levels.astype(float))
-    assert plan_routes(GRID, goals, distance=0.5, waits=waits).duration_s == pytest.approx(ends.max(), abs=0.05)
+    assert plan_routes(GRID, goals, distance=0.5, delays=waits).duration_s == pytest.approx(ends.max(), abs=0.05)
 
 
 def test_a_team_changes_its_columns_and_levels() -> None:
@@ -226,7 +226,9 @@ def test_a_team_of_nobody_flies_nowhere() -> None:
     assert planned.at(0).position.shape == (0, 3)
 
 
-@pytest.mark.parametrize("wrong", [{"distance": 0.0}, {"distance": np.nan}, {"waits": np.zeros(2)}, {"ground": np.inf}])
+@pytest.mark.parametrize(
+    "wrong", [{"distance": 0.0}, {"distance": np.nan}, {"delays": np.zeros(2)}, {"ground": np.inf}]
+)
 def test_arguments_without_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must be finite|do not go together"):
         plan_routes(GRID[:1], GRID[:1], **{"distance": 1.0, **wrong})  # type: ignore[arg-type]

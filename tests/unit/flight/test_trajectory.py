@@ -1,4 +1,4 @@
-"""What a flight is made of: wind, the nearest two, attitudes, free spots, targets, the clock."""
+"""What a flight is made of: wind, the nearest two, attitudes, free spots, leg_goals, the clock."""
 
 from __future__ import annotations
 
@@ -40,30 +40,30 @@ def test_gusts_have_the_spread_that_is_asked_for_and_come_again_from_their_seed(
 def test_no_pair_is_ever_nearer_than_the_watch_says(seed: int, number: int, pace: float) -> None:
     chance = np.random.default_rng(seed)
     places = chance.uniform(-2, 2, (3, number))
-    watch = SeparationMonitor(number)
+    monitor = SeparationMonitor(number)
     lost = np.zeros(number, dtype=np.bool_)
     best = [math.inf, math.inf]
     first, second = np.triu_indices(number, 1)
     for step in range(40):
         if step == 20:
             lost[chance.integers(number)] = True
-            watch.lose(lost)
-        watch.see(places, step)
+            monitor.exclude(lost)
+        monitor.observe(places, step)
         apart = np.sqrt(np.square(places[:, first] - places[:, second]).sum(0))
         falls = lost[first] | lost[second]
         best = [min(best[0], apart[~falls].min(initial=math.inf)), min(best[1], apart[falls].min(initial=math.inf))]
-        for found, expected in zip((watch.nearest, watch.nearest_fallen), best, strict=True):
+        for found, expected in zip((monitor.nearest, monitor.nearest_fallen), best, strict=True):
             assert (found.distance_m if found else math.inf) == expected
         places += chance.uniform(-pace, pace, (3, number))
 
 
 def test_the_watch_says_who_and_when() -> None:
-    watch = SeparationMonitor(3)
+    monitor = SeparationMonitor(3)
     for step, x in enumerate((4.0, 2.5, 1.5, 2.0)):
-        watch.see(np.array([[0, 9, x], [0, 0, 0], [0, 0, 0]]), step * 1.0)
-    assert watch.nearest == ClosestApproach(1.5, 0, 2, 2.0)
+        monitor.observe(np.array([[0, 9, x], [0, 0, 0], [0, 0, 0]]), step * 1.0)
+    assert monitor.nearest == ClosestApproach(1.5, 0, 2, 2.0)
     lone = SeparationMonitor(1)
-    lone.see(np.zeros((3, 1)), 0.0)
+    lone.observe(np.zeros((3, 1)), 0.0)
     assert lone.nearest is None
 
 
@@ -107,18 +107,18 @@ def test_goals_give_way_to_what_lies_there_and_who_stays_gives_way_to_goals() ->
     names = ["a", "b", "c"]
     starts = np.array([[0, 0, 2.0], [3, 0, 0], [3, 0, 4]])
     goals = {0: Goal((3.0, 0.0, 3.9)), 1: Goal((0.0, 0.0, 0.0), lands=True)}
-    targets = LegGoals(names, goals, starts, np.zeros(3, dtype=np.bool_), 0.5)
+    leg_goals = LegGoals(names, goals, starts, np.zeros(3, dtype=np.bool_), 0.5)
     hazards = Hazards(np.array([[0.1, 0, 0]]), np.array([0.5]))
-    told = targets.give_way(hazards, targets.places.copy(), 0.0)
+    told = leg_goals.give_way(hazards, leg_goals.places.copy(), 0.0)
     assert [number for number, _ in told] == [1, 2]
     assert told[0][1].startswith("lands ")
-    assert targets.places[1, 2] == 0
-    assert not hazards.meet(targets.places[1])
-    assert np.linalg.norm(targets.places[2] - targets.places[0]) >= 0.5
-    assert targets.planned(starts) == pytest.approx(0.6)
+    assert leg_goals.places[1, 2] == 0
+    assert not hazards.meet(leg_goals.places[1])
+    assert np.linalg.norm(leg_goals.places[2] - leg_goals.places[0]) >= 0.5
+    assert leg_goals.planned(starts) == pytest.approx(0.6)
     assert (
-        targets.standing(hazards, starts, 0.6).shape == (0, 3)
-        or nearest_distances(hazards.points, targets.places)[0] >= 0.6
+        leg_goals.standing(hazards, starts, 0.6).shape == (0, 3)
+        or nearest_distances(hazards.points, leg_goals.places)[0] >= 0.6
     )
 
 
@@ -135,18 +135,18 @@ def test_who_lands_begins_first_and_then_row_by_row() -> None:
 def test_the_clock_stops_smoothly_and_within_limits() -> None:
     reference = np.zeros((9, 1))
     way = plan_routes(np.array([[0.0, 0, 1]]), np.array([[8.0, 0, 1]]), distance=0.5)
-    course = Trajectory(way, np.array([0]), reference)
+    trajectory = Trajectory(way, np.array([0]), reference)
     rows = []
     for step in range(round(4 / DT)):
         if step * DT >= 2.5:
-            course.stop()
-        rows.append(course.refer()[:, 0].copy())
-        course.advance(DT)
+            trajectory.stop()
+        rows.append(trajectory.refer()[:, 0].copy())
+        trajectory.advance(DT)
     x, speed, push = (np.array(rows)[:, row] for row in (0, 3, 6))
     assert np.abs(np.gradient(x, DT) - speed)[2:-2].max() < 0.02
     assert np.abs(np.gradient(speed, DT) - push)[2:-2].max() < 0.1
     assert np.abs(push).max() < 1.5 / STOP_S * MotionLimits().speed + MotionLimits().acceleration
-    assert course.over
+    assert trajectory.over
     assert not speed[-1]
     stopping = x[-1] - x[round(2.5 / DT)]
     assert 0.5 < stopping <= MotionLimits().speed * STOP_S / 2 + 0.02

@@ -12,7 +12,7 @@ import pytest
 
 from robochoc.journal.events import AnyEvent, Began, Concluded, Given, Improved, Lost, Refused, Sent, Settled
 from robochoc.journal.journal import Header, Journal
-from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.sniffer.acl import parse
 from robochoc.sniffer.acl_messages import PLATFORM
@@ -227,8 +227,8 @@ def test_the_end_is_told_as_the_report_tells_it() -> None:
     assert gave_up == "No verdict: R1 gave up, as its protocol has it."
     best = ended(verdict=Verdict.OPTIMAL, withdrawn=("R1", "R2"), lost=("R1",))
     assert best == "No solution for all. 1 fly, no better team could; aside: R2; lost: R1."
-    epochs = [Epoch(verdict, ("R1",)) for verdict in (Verdict.SOLUTION, Verdict.NO_SOLUTION)]
-    epochs += [Epoch(Verdict.UNKNOWN, ("R1",), lost=("R2",))]
+    epochs = [EpochOutcome(verdict, ("R1",)) for verdict in (Verdict.SOLUTION, Verdict.NO_SOLUTION)]
+    epochs += [EpochOutcome(Verdict.UNKNOWN, ("R1",), lost=("R2",))]
     assert ended(epochs=(epochs[0],)) == "A solution."
     assert ended(epochs=tuple(epochs)) == "3 epochs: a solution, no solution, R2 lost. The last: A solution."
     many = ended(epochs=(epochs[0],) * 1000)

@@ -102,7 +102,7 @@ def test_a_withdrawn_robot_stands_where_its_topic_says_if_that_is_constant() -> 
     team = Team("t", (robot("A", "V1", topics=topics[0]), robot("B", "V2", topics=topics[1])))
     drone = by_name(scene_of(outcome({"V1": 1}, Verdict.SOLUTION, "B"), team))["B"]
     assert (drone.home[:2], drone.place) == ((2, 1), None)
-    assert drone.aside
+    assert drone.landing
 
 
 @pytest.mark.parametrize("x", [Apply("div", (Constant(1), Constant(0))), Name("elsewhere")])
@@ -183,7 +183,7 @@ def test_nobody_flies_without_a_solution() -> None:
     team = Team("t", (robot("Robot1.1", "V1.1"), robot("Robot1.2", "V1.2")))
     scene = scene_of(outcome({}, Verdict.NO_SOLUTION), team)
     assert "no solution" in scene.title
-    assert [(drone.place, drone.aside, drone.home[2]) for drone in scene.drones] == [(None, None, scene.ground)] * 2
+    assert [(drone.place, drone.landing, drone.home[2]) for drone in scene.drones] == [(None, None, scene.ground)] * 2
     assert not any(command["type"] == "set_animation" for command in commands_of(page(scene)))
 
 
@@ -207,10 +207,10 @@ def test_no_two_drones_coincide() -> None:
 
 def test_withdrawn_drones_line_up_on_the_ground_outside_the_box() -> None:
     scene = four()
-    asides = [drone.aside for drone in scene.drones if drone.aside]
-    assert len(set(asides)) == 6
-    assert {aside[1] for aside in asides} == {scene.axes[1].low - 2}
-    assert {aside[2] for aside in asides} == {scene.ground}
+    landings = [drone.landing for drone in scene.drones if drone.landing]
+    assert len(set(landings)) == 6
+    assert {landing[1] for landing in landings} == {scene.axes[1].low - 2}
+    assert {landing[2] for landing in landings} == {scene.ground}
     assert scene.title == "a team: 10 of 16 fly (proven maximum)"
 
 
@@ -239,7 +239,7 @@ def test_key_frames_begin_at_home_and_end_at_the_place() -> None:
         assert keys[0][0] == 0
         assert keys[0][1] == pytest.approx(drone.home, abs=0.05)
         assert keys[-1][1] == pytest.approx(drone.end, abs=0.1)
-        assert drone.end == (drone.place or drone.aside)
+        assert drone.end == (drone.place or drone.landing)
         frames = [frame for frame, _ in keys]
         assert frames == sorted(set(frames))
 
