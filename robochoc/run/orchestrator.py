@@ -193,7 +193,7 @@ class _Run:
         """
         brief = RunParameters(self._options.seed) if outcome.placed_by else self._brief
         if protocol.traits.costs:
-            brief = brief._replace(aside=withdrawal_cost(self._team))
+            brief = brief._replace(withdrawal_cost=withdrawal_cost(self._team))
         while True:
             team = journey.arranged()
             if outcome.placed_by == MINIMISES and self._options.order is None:
@@ -209,15 +209,15 @@ class _Run:
                 raise RobotsLostError(result.lost)
         spent = replace(outcome.metrics + result.metrics, compile_s=self._compiler.seconds)
         outcome = replace(_without(outcome, journey), metrics=spent)
-        outcome = evaluate_withdrawal(outcome, journey.team, result, compiled, brief.aside)
+        outcome = evaluate_withdrawal(outcome, journey.team, result, compiled, brief.withdrawal_cost)
         if outcome.verdict is Verdict.UNKNOWN:
             return replace(outcome, reason=self._limit(None, sum(spent.messages.values())))
-        if outcome.verdict is not Verdict.OPTIMAL or brief.aside is None:
+        if outcome.verdict is not Verdict.OPTIMAL or brief.withdrawal_cost is None:
             return outcome
         from robochoc.run.second_opinion import total_cost  # noqa: PLC0415 - start-up: seldom asked for
 
-        total = total_cost(journey.team, outcome.assignment, brief.aside)
-        return replace(outcome, confirmed=self._confirmed(journey.team, total=total, aside=int(brief.aside)))
+        total = total_cost(journey.team, outcome.assignment, brief.withdrawal_cost)
+        return replace(outcome, confirmed=self._confirmed(journey.team, total=total, aside=int(brief.withdrawal_cost)))
 
     # Epochs
 

@@ -35,7 +35,7 @@ from robochoc.model.outcome import EpochOutcome as Answered
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import AddAgent, Change, Robot, ScenarioEvent, Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import Invalidated, invalidated_by
 
@@ -115,7 +115,7 @@ class ScenarioRun:
         *,
         messages: int | None = None,
         spares: int = 0,
-        brief: RunParameters = NO_BRIEF,
+        brief: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
         self.team = self._full = team_after_events(team, events=0)
         self.withdrawn: list[str] = []

@@ -8,7 +8,7 @@ from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.run.incumbent import absent
 from robochoc.run.options import Options, Withdrawal
-from robochoc.solver.central import CentralSolver, Judgement
+from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.failures import SolverLostError
 from robochoc.verification.checker import RefutedError, assignment_cost, has_local_solution
 
@@ -52,7 +52,7 @@ def confirmed(
     return opinion.verdict is not Verdict.UNKNOWN
 
 
-def contradiction(opinion: Judgement, total: float) -> str | None:
+def contradiction(opinion: CentralAnswer, total: float) -> str | None:
     """What the judge has found against a claim; None where it agrees, or has not come to an end.
 
     `total` is what is claimed to be the least cost, what stepping aside costs included; infinite: there is no
@@ -76,7 +76,7 @@ def total_cost(team: Team, assignment: Mapping[str, int], aside: float | None) -
     )
 
 
-def _told(judgement: Judgement, team: Team, aside: int | None) -> EpochOutcome:
+def _told(judgement: CentralAnswer, team: Team, aside: int | None) -> EpochOutcome:
     verdict, assignment, bound = judgement.verdict, judgement.assignment, None
     if judgement.cost is not None:
         total = total_cost(team, assignment, aside)
