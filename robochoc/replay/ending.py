@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 
 import msgspec
@@ -19,9 +20,11 @@ from robochoc.journal.journal import Header, Journal, metrics_of
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.replay.rebuild import Ensemble
 from robochoc.replay.steps import Run
-from robochoc.run.evaluation import evaluate, evaluate_withdrawal
+from robochoc.run.evaluation import Search, check_with_files, evaluate
 from robochoc.run.options import CENTRAL
 from robochoc.run.registry import protocol_by_class
+from robochoc.run.withdrawal import Phase
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.domain import TooManySolutionsError
 from robochoc.verification.checker import RefutedError
 
@@ -125,14 +128,18 @@ def _answer(run: Run, ensemble: Ensemble, outcome: Outcome) -> EpochOutcome | Ou
         0.0,
     )
     result.findings.update({name: one.findings for name, one in protocols.items()})
-    traits, team = ensemble.protocol.traits, ensemble.compiled.team
+    team = ensemble.compiled.team
+    withdrawal = given.aside is not None or _places(run, outcome)
+    phase = Phase("", ensemble.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
+    check = partial(check_with_files, phase, result, team, ensemble.compiled)
     try:
-        if given.aside is not None or _places(run, outcome):
-            bare = Outcome(outcome.team, outcome.protocol, outcome.runtime, outcome.seed, Verdict.UNKNOWN)
-            return evaluate_withdrawal(bare, team, result, ensemble.compiled, given.aside)
-        return evaluate(EpochOutcome(result.verdict, team.order), team, result, traits, ensemble.compiled)
+        answer = evaluate(phase, Search(result, check), team.kind)
     except (RefutedError, TooManySolutionsError):
         return EpochOutcome(Verdict.UNKNOWN, team.order)
+    if not withdrawal:
+        return answer.as_epoch(team.order)
+    bare = Outcome(outcome.team, outcome.protocol, outcome.runtime, outcome.seed, Verdict.UNKNOWN)
+    return answer.as_outcome(bare, ())
 
 
 def _places(run: Run, outcome: Outcome) -> bool:

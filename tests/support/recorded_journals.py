@@ -8,7 +8,7 @@ from random import Random
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.journal import Header, Journal, Recorder, read_journal
 from robochoc.model.problem import Team
-from robochoc.run.orchestrator import Options, Runtime, ScheduleName, solve
+from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import protocol_named
 from robochoc.sniffer.feed import Feed
 from robochoc.sniffer.trace import Trace

@@ -16,8 +16,8 @@ from PIL import Image
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent
 from robochoc.journal.journal import read_journal
+from robochoc.run import solve
 from robochoc.run.options import Options, Runtime
-from robochoc.run.orchestrator import solve
 from robochoc.sniffer.feed import Feed
 from robochoc.sniffer.trace import Trace
 from tests.support.browser_pages import watched_page

@@ -31,9 +31,10 @@ from robochoc.model.message import Message, Value
 from robochoc.protocols.abt import ABT, Nogood
 from robochoc.protocols.dynabt import DynABT
 from robochoc.replay import CannotReplayError, Means, Replayed, replay
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal
+from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_names
-from robochoc.run.scenario import Announcer, ScenarioRun
+from robochoc.run.scenario import ScenarioRun
+from robochoc.run.start_events import StartEvents
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
@@ -169,11 +170,11 @@ def test_robots_are_lost_and_come_back(spares: int, tmp_path: Path) -> None:
     write_team(odd_team(), tmp_path / "team")
     team = read_team(tmp_path / "team")
     Meteor.flag = tmp_path / "hit"
-    journey = ScenarioRun(team, None, CompiledTeam, lambda: None, spares=spares, brief=RunParameters(0, {}))
+    journey = ScenarioRun(team, None, CompiledTeam, lambda: None, spares=spares, parameters=RunParameters(0, {}))
     recorder = Recorder(Header(team="team", protocol="dynabt", runtime="processes", seed=0))
-    announce = Announcer(recorder)
+    events = StartEvents(recorder)
     with ProcessesRun(journey.compiled(), Meteor, observer=recorder, survive=True) as session:
-        played = list(journey.go(session, lambda opening: announce(Meteor, opening, session)))
+        played = list(journey.epochs(session, lambda opening: events.report(Meteor, opening, session)))
     journal = read_journal(recorder.content())
     assert len(played) == 2
     assert any(isinstance(event, Lost) for event in journal.events)

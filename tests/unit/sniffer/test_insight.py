@@ -22,7 +22,7 @@ from robochoc.replay.glance import LONGEST, glance
 from robochoc.replay.inspection import MOST_VALUES
 from robochoc.replay.phrases import Phrases
 from robochoc.replay.reasons import MOST_BACKTRACKS, MOST_REASONS
-from robochoc.run.orchestrator import Options, Runtime
+from robochoc.run import Options, Runtime
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.problems import random_team, team_of
 from tests.support.replays import in_text, random_run, recorded, with_events

@@ -20,7 +20,7 @@ from robochoc.model.wording import Wording, listed
 from robochoc.protocols.dfs import Token
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal
+from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.sniffer.feed import Feed
 from robochoc.sniffer.sentences import sentence

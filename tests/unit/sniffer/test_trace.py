@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Began, Decided, Received, Refused, Sent, Settled
 from robochoc.journal.journal import Header, Journal
-from robochoc.run.orchestrator import Options, Runtime, ScheduleName
+from robochoc.run import Options, Runtime, ScheduleName
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.feed import columns_of, steps_of
 from robochoc.sniffer.trace import MOST_COUNTED, MOST_NAMES, Trace, TraceTooLargeError

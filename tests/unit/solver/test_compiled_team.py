@@ -22,7 +22,7 @@ from robochoc.protocols.abt import ABT
 from robochoc.protocols.traits import Traits
 from robochoc.replay.rebuild import Cast, Means
 from robochoc.replay.steps import Run
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, agent_problems
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, ensure_compiled
@@ -62,7 +62,7 @@ def test_every_form_of_a_team_lines_up_with_its_domains() -> None:
         for order in every_order(team, chance):
             journey = ScenarioRun(team, order if isinstance(order, tuple) else None, CompiledTeam, lambda: None)
             assert lined_up(journey.compiled())
-            assert journey.compiled().team == journey.arranged()
+            assert journey.compiled().team == journey.ordered_team()
         assert lined_up(CompiledTeam(with_dom_deg_order(team)))
         left = without_robots(team, chance.sample(team.order, len(team.order) - 1))
         assert lined_up(CompiledTeam(left))
