@@ -20,8 +20,8 @@ from robochoc.model.orders import with_dom_deg_order, with_priorities
 from robochoc.model.problem import AddConstraint, Child, Constraint, Parent, Robot, ScenarioEvent, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.traits import Traits
-from robochoc.replay.rebuild import Cast, Means
-from robochoc.replay.steps import Run
+from robochoc.replay.rebuild import Rebuilder, ReplayOptions
+from robochoc.replay.steps import RecordedRun
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, agent_problems
@@ -197,10 +197,10 @@ def test_who_plays_machines_again_knows_what_they_showed_and_what_it_cost_to_ste
     pairs = [("A", "B"), ("B", "C")]
     constraints = [Constraint("C", _UNLIKE, pair, pair, cost=5) for pair in pairs]
     team = with_costs(team_of(dict.fromkeys("ABC", (1, 2)), constraints))
-    cast = Cast(Header(team="t", protocol="abt", runtime="network", seed=0), Means(team=team))
+    cast = Rebuilder(Header(team="t", protocol="abt", runtime="network", seed=0), ReplayOptions(team=team))
     decided = Decided(t=0, robot="RA", assignment={}, clock=0)
-    cast.enter(Run(0, Began(t=0, protocol="DPOP"), None, [decided, Lost(t=1, robot="RB", why="gone")]))
-    part = cast.enter(Run(1, Began(t=0, protocol="DPOP"), None, [decided])).parts["RC"]
+    cast.enter(RecordedRun(0, Began(t=0, protocol="DPOP"), None, [decided, Lost(t=1, robot="RB", why="gone")]))
+    part = cast.enter(RecordedRun(1, Began(t=0, protocol="DPOP"), None, [decided])).parts["RC"]
     assert part.interfaces == {"RA": ("A",), "RC": ("C",)}
     assert part.parameters.withdrawal_cost == 1 + 5
 
