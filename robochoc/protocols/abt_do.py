@@ -138,7 +138,11 @@ class ABTDORetro(Backtracking):
 
     messages = Ok | Nogood | Order | AddLink
     traits = Traits(
-        concludes=ENDS_WITH_PROOF, paper="Zivan & Meisels 2006; Zivan et al. 2009", shared_scopes=True, privacy="none"
+        concludes=ENDS_WITH_PROOF,
+        paper="Zivan & Meisels 2006; Zivan et al. 2009",
+        shared_scopes=True,
+        privacy="none",
+        use_when="no costs, and no good static order is known",
     )
     order: CurrentOrder
 
@@ -188,7 +192,7 @@ class ABTDORetro(Backtracking):
             self.owed.add(sender)  # it has forgotten the value
             return
         self._check_add_link(nogood)
-        for index in self.problem.alike(nogood.value):
+        for index in self.problem.interchangeable(nogood.value):
             self.store.add(index, nogood.lhs)
         self.value = None
         self._choose_new_order(sender, nogood)

@@ -110,6 +110,7 @@ class ADOPT(BoundingProtocol):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="to compare with BnB-ADOPT+, which needs fewer messages",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -74,6 +74,7 @@ class AFB(Protocol):
         costs=True,
         shared_scopes=True,
         privacy="constraints that a robot has no part in",
+        use_when="costs, dense graph, little memory",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -102,7 +102,12 @@ class AFC(Protocol):
     """
 
     messages = CPA | FcCPA | NotOk | BacktrackCPA
-    traits = Traits(concludes=ENDS_WITH_EITHER, paper="Meisels & Zivan 2007", privacy="constraints of lower robots")
+    traits = Traits(
+        concludes=ENDS_WITH_EITHER,
+        paper="Meisels & Zivan 2007",
+        privacy="constraints of lower robots",
+        use_when="to compare with AFC-ng, which needs fewer messages",
+    )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

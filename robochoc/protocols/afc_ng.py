@@ -108,6 +108,7 @@ class AFCng(Protocol):
         concludes=ENDS_WITH_PROOF,
         paper="Ezzahir et al. 2009; Wahbi, Ezzahir, Bessiere, Bouyakhf 2013",
         privacy="constraints of lower robots",
+        use_when="no costs, hard problem: few messages and checks",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -166,13 +167,13 @@ class AFCng(Protocol):
         """Accept a nogood that agrees with the view; otherwise it is obsolete."""
         if not self._compatible(nogood.lhs):
             return
-        for index in self.problem.alike(nogood.value):
+        for index in self.problem.interchangeable(nogood.value):
             self.store.add(index, nogood.lhs)
         if self.value is not None and self.store[self.value] is not None:
             self.value = None
 
     def _process_solved(self, solution: Mapping[str, Value]) -> None:
-        (self.value,) = self.problem.alike(solution[self.problem.agent])
+        (self.value,) = self.problem.interchangeable(solution[self.problem.agent])
         self.solved = True
 
     # The search

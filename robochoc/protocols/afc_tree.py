@@ -70,6 +70,7 @@ class AFCTree(AFCng):
         paper="Wahbi, Ezzahir, Bessiere, Bouyakhf 2013",
         tree=True,
         privacy="constraints of lower robots",
+        use_when="as AFC-ng, on sparse graphs: branches search at once",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

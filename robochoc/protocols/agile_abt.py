@@ -125,7 +125,13 @@ class AgileABT(Backtracking):
     """
 
     messages = Ok | Nogood | Order | AddLink
-    traits = Traits(concludes=ENDS_WITH_PROOF, paper="Bessiere et al. 2011", shared_scopes=True, privacy="none")
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Bessiere et al. 2011",
+        shared_scopes=True,
+        privacy="none",
+        use_when="no costs, and no good static order is known; large messages",
+    )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
@@ -180,7 +186,7 @@ class AgileABT(Backtracking):
         if current is None or contradicts(nogood.value, current) or not self._coherent(nogood):
             return
         self._check_add_link(nogood)
-        for index in self.problem.alike(nogood.value):
+        for index in self.problem.interchangeable(nogood.value):
             self.store.add(index, nogood.lhs)
         self.value = None
 

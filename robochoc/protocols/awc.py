@@ -134,7 +134,11 @@ class AWC(Protocol):
 
     messages = Ok | Nogood | AddLink
     traits = Traits(
-        concludes=ENDS_WITH_PROOF, paper="Yokoo 1995; Yokoo et al. 1998", shared_scopes=True, privacy="none"
+        concludes=ENDS_WITH_PROOF,
+        paper="Yokoo 1995; Yokoo et al. 1998",
+        shared_scopes=True,
+        privacy="none",
+        use_when="to compare: ABT with max-degree order is faster here",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -235,7 +239,7 @@ class AWC(Protocol):
 
     def _violations(self, index: int) -> int:
         """How many constraints and nogoods the value at `index` breaks, whatever the priorities."""
-        return self.problem.violated(index, self.view) + len(self._standing[index])
+        return self.problem.violation_count(index, self.view) + len(self._standing[index])
 
     def _allowed(self) -> list[int]:
         return [index for index in range(len(self.problem.values)) if self._reason(index) is None]
@@ -264,7 +268,7 @@ class AWC(Protocol):
         self._standing = [[] for _ in self.problem.values]
         for others, own in self.nogoods.standing(self.view):
             if own not in self._alike:
-                self._alike[own] = list(self.problem.alike(own))
+                self._alike[own] = list(self.problem.interchangeable(own))
             for index in self._alike[own]:
                 self._standing[index].append(others)
 

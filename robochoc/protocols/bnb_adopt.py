@@ -108,6 +108,7 @@ class BnBADOPT(BoundingProtocol):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="costs, sparse graph, little memory",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

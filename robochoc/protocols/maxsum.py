@@ -117,6 +117,7 @@ class MaxSum(CycleProtocol):
         costs=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="costs, large team, graph with few cycles; no proof",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -60,6 +60,7 @@ class SBT(Protocol):
         paper="Yokoo et al. 1992, 1998; Zivan & Meisels 2003",
         synchronous=True,
         privacy="constraints of lower robots",
+        use_when="a simple baseline without costs",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

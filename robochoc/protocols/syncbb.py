@@ -109,6 +109,7 @@ class SyncBB(Protocol):
         synchronous=True,
         costs=True,
         privacy="constraints of lower robots",
+        use_when="a simple baseline with costs",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
