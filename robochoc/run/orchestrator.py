@@ -8,8 +8,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from robochoc.communication.processes.robot_link import RobotsLostError
-from robochoc.communication.run_result import Progress
+from robochoc.communication.run_result import Progress, RobotsLostError
 from robochoc.communication.session import Session
 from robochoc.formats import check_team, held_to_rules
 from robochoc.journal.events import Observer

@@ -23,8 +23,7 @@ from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.router import RouterError
 from robochoc.communication.network.settings import NetworkSettings
-from robochoc.communication.processes.robot_link import RobotsLostError
-from robochoc.communication.run_result import Progress, RunResult
+from robochoc.communication.run_result import Progress, RobotsLostError, RunResult
 from robochoc.journal.events import Began, Observer
 from robochoc.model.outcome import ALL_ROBOTS, Outcome, Verdict
 from robochoc.model.problem import Domain, Kind, Team, Variable
@@ -112,7 +111,7 @@ def lead(
     master = Master(
         authority, identity, endpoint, members, conditions, observer=observer, watched=watched, progress=progress
     )
-    authority.observer = master.chronicle.relay
+    authority.observer = master.events.relay
     if publication:
         master.publish(publication)
     with _enrolling(authority, identity, plan.place), master:
@@ -210,14 +209,14 @@ class _Lead:
             lost=tuple(self._lost),
             withdrawn=tuple(self._lost),
         )
-        self._refute(*(doubt.why for doubt in self._master.tally.doubts_about_verdict))
+        self._refute(*(doubt.why for doubt in self._master.state.doubts_about_verdict))
         ended = result.verdict is Verdict.SOLUTION
         if result.verdict is Verdict.UNKNOWN:
             outcome = replace(outcome, reason=self._limit(result.witness))
         if result.verdict is Verdict.NO_SOLUTION or not (ended or traits.costs):
             return claimed(outcome)
         proven = ended and (traits.complete or not traits.costs)
-        out = tuple(name for name in self._master.members.order if not self._master.tally.assigned.get(name))
+        out = tuple(name for name in self._master.members.order if not self._master.state.assigned.get(name))
         if ended and aside:
             outcome = replace(outcome, withdrawn=(*outcome.withdrawn, *out))
         verdict = self._verdict(traits, aside=bool(out)) if proven else Verdict.UNKNOWN
@@ -226,13 +225,13 @@ class _Lead:
             return claimed(replace(outcome, verdict=verdict, reason=reason))
         self._values = self._told(result.assignments)
         held, cost = self._master.checked(self._values)
-        self._refute(*(doubt.why for doubt in self._master.tally.doubts_about_verdict))
+        self._refute(*(doubt.why for doubt in self._master.state.doubts_about_verdict))
         if held and (aside or not out):
             verdict = verdict if proven or not ended else Verdict.SOLUTION
             outcome = replace(outcome, verdict=verdict, assignment=joined(self._values), cost=cost, verified=True)
-            return claimed(replace(outcome, checked=self._master.tally.thoroughness))
+            return claimed(replace(outcome, checked=self._master.state.thoroughness))
         if proven:
-            against = "; ".join(self._master.tally.objections) or f"{_listed(out)} has no value"
+            against = "; ".join(self._master.state.objections) or f"{_listed(out)} has no value"
             who = f"{result.witness} says that" if result.witness else "all fell quiet, so that"
             raise RefutedError(f"{who} {outcome.protocol} has a solution for {outcome.team}, but {against}")
         reason = outcome.reason or f"{outcome.protocol} has come to its end, and what it came by breaks a constraint"
@@ -240,7 +239,7 @@ class _Lead:
 
     def _told(self, reported: Mapping[str, dict[str, int]]) -> dict[str, dict[str, int]]:
         """Return what was `reported`. Raises `RobotsLostError` for who has values, and does not tell them."""
-        for name, assigned in self._master.tally.assigned.items():
+        for name, assigned in self._master.state.assigned.items():
             if assigned and not reported[name]:
                 raise RobotsLostError({name: "it has reported that it has values, and none of them"})
         return dict(reported)
@@ -280,7 +279,7 @@ class _Lead:
             over = f"so many messages have been sent (--messages {plan.messages})"
         else:
             over = "the time was over" + ("" if plan.timeout is None else f" (--timeout {plan.timeout:g})")
-        return "; ".join(filter(None, [over, self._master.tally.restless]))
+        return "; ".join(filter(None, [over, self._master.state.unfinished]))
 
     def _team(self) -> Team:
         members = self._master.members
