@@ -23,7 +23,7 @@ from robochoc.model.problem import Team
 from robochoc.run.defaults import default_protocol
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.orchestrator import solve
-from robochoc.run.registry import UnknownProtocolError, offers
+from robochoc.run.registry import UnknownProtocolError, installed_spelling, offers
 from robochoc.run.scenario import Environment
 
 if TYPE_CHECKING:
@@ -51,25 +51,26 @@ class Problem:
         withdraw: str | None = None,
         settings: Mapping[str, object] = {},
         observer: Observer | None = None,
-        field: Environment | None = None,
+        environment: Environment | None = None,
         **options: Any,  # noqa: ANN401 - the other fields of `Options`, by their names
     ) -> Outcome:
         """Let the robots solve it together; see `robochoc.run.options.Options` for what else can be said.
 
-        Without a `protocol`, the one that suits the team. A `field` is told of each answer, and says what changes
-        next (`robochoc.run.scenario.Field`). Raises what `robochoc.run.orchestrator.solve` raises, and `ValueError` or
+        Without a `protocol`, the one that suits the team. An `environment` gets each answer, and returns
+        what changes next (`robochoc.run.scenario.Environment`).
+        Raises what `robochoc.run.orchestrator.solve` raises, and `ValueError` or
         `TypeError` where an option is none. A program that starts processes is to do so below
         `if __name__ == "__main__":`.
         """
         asked = Options(
-            protocol=protocol or default_protocol(self.team.kind),
+            protocol=installed_spelling(protocol) if protocol else default_protocol(self.team.kind),
             runtime=Runtime(runtime),
             order=Order(order) if order else None,
             withdraw=Withdrawal(withdraw) if withdraw else None,
             settings={name: str(value) for name, value in settings.items()},
             **options,
         )
-        return solve(self.team, asked, observer=observer, field=field)
+        return solve(self.team, asked, observer=observer, environment=environment)
 
 
 def load(path: Path | str) -> Problem:

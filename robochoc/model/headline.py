@@ -5,18 +5,22 @@ from __future__ import annotations
 from robochoc.model.outcome import Outcome, Verdict
 
 
-def describe_outcome(outcome: Outcome, total: int, *, noun: str = "robot", weighted: bool = False) -> str:
+def describe_outcome(
+    outcome: Outcome, total: int, *, flying: int | None = None, noun: str = "robot", weighted: bool = False
+) -> str:
     """Return what happened, in a few words: "10 of 16 fly (proven maximum)", "solution for all 16 robots".
 
     Args:
         outcome: How the run ended.
         total: The number of robots that took part. If the outcome has epochs, those of the last epoch are counted.
-        noun: What `total` counts, in the singular.
+        flying: How many of `total` have a place, where drones are counted and a robot decides about several.
+        noun: What is counted, in the singular.
         weighted: Whether robots differ in weight. The maximum is then one of weight, not of number.
     """
-    if outcome.epochs and outcome.epochs[-1].robots:
-        total = len(outcome.epochs[-1].robots) + len(outcome.lost)
-    flying = total - len(outcome.withdrawn)
+    if flying is None:
+        if outcome.epochs and outcome.epochs[-1].robots:
+            total = len(outcome.epochs[-1].robots) + len(outcome.lost)
+        flying = total - len(outcome.withdrawn)
     match outcome.verdict:
         case Verdict.UNKNOWN:
             so_far = f"; {flying} of {total} fly in the best answer so far" if outcome.aside else ""

@@ -31,6 +31,8 @@ from typing import NamedTuple, assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
+from robochoc.model.wording import Wording, is_withdrawn, listed
+from robochoc.protocols import acts
 from robochoc.protocols.nogood import LeftSide, joined
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
@@ -44,15 +46,40 @@ class Ok(Message, frozen=True):
     value: Value
     priority: int
 
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} from now on, with priority {self.priority}"
+
 
 class Nogood(Message, frozen=True):
     """These assignments, one of which is the receiver's, cannot all stand; with the priorities last heard of."""
 
     nogood: dict[str, tuple[Value, int]]
 
+    act = acts.RULE_OUT
+    backtracks = True
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        values = {robot: value for robot, (value, _) in self.nogood.items() if not is_withdrawn(value)}
+        facts = [fact for robot, value in values.items() for fact in words.facts(robot, value)]
+        if len(facts) == 1:
+            return f"{facts[0]} cannot stand, whatever the others do"
+        return f"{listed(facts)} cannot {'both' if len(facts) == len('ab') else 'all'} stand"
+
 
 class AddLink(Message, frozen=True):
     """A nogood has made the sender and the receiver neighbours: each tells the other its value from now on."""
+
+    act = acts.ADD_LINK
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return (
+            f"from now on let us tell each other {words.variables(words.sender)} and {words.variables(words.receiver)}"
+        )
 
 
 class Kept(NamedTuple):
@@ -107,7 +134,11 @@ class AWC(Protocol):
 
     messages = Ok | Nogood | AddLink
     traits = Traits(
-        concludes=ENDS_WITH_PROOF, paper="Yokoo 1995; Yokoo et al. 1998", shared_scopes=True, privacy="none"
+        concludes=ENDS_WITH_PROOF,
+        paper="Yokoo 1995; Yokoo et al. 1998",
+        shared_scopes=True,
+        privacy="none",
+        use_when="to compare: ABT with max-degree order is faster here",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -208,7 +239,7 @@ class AWC(Protocol):
 
     def _violations(self, index: int) -> int:
         """How many constraints and nogoods the value at `index` breaks, whatever the priorities."""
-        return self.problem.violated(index, self.view) + len(self._standing[index])
+        return self.problem.violation_count(index, self.view) + len(self._standing[index])
 
     def _allowed(self) -> list[int]:
         return [index for index in range(len(self.problem.values)) if self._reason(index) is None]
@@ -237,7 +268,7 @@ class AWC(Protocol):
         self._standing = [[] for _ in self.problem.values]
         for others, own in self.nogoods.standing(self.view):
             if own not in self._alike:
-                self._alike[own] = list(self.problem.alike(own))
+                self._alike[own] = list(self.problem.interchangeable(own))
             for index in self._alike[own]:
                 self._standing[index].append(others)
 

@@ -18,10 +18,12 @@ from typing import TypeVar
 
 from robochoc.model import message as wire
 from robochoc.model.outcome import Verdict
+from robochoc.model.wording import Wording
+from robochoc.protocols import acts
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol, Settings
-from robochoc.solver.compiled import Burden, LocalProblem
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 T = TypeVar("T")
 
@@ -34,11 +36,23 @@ class Value(wire.Message, frozen=True):
 
     value: wire.Value
 
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} in this cycle"
+
 
 class Domain(wire.Message, frozen=True):
     """All values that the sender may take, the first thing it says; later messages name their places in it."""
 
     values: list[wire.Value]
+
+    act = acts.TELL_DOMAIN
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return words.domain(self.values)
 
 
 class CycleSettings(Settings, frozen=True):
@@ -78,7 +92,7 @@ class CycleProtocol(Protocol):
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.problem.neighbours:
-            burdens = self.problem.burdens({})
+            burdens = self.problem.lexicographic_costs({})
             self.take(burdens.index(min(burdens)))
             self.cycle = self.settings.cycles
         else:
@@ -146,10 +160,10 @@ class CycleProtocol(Protocol):
         return Findings(trail=Trail(list(self._trail), self.cycle))
 
 
-NO_GAIN: Burden = (0, 0)
+NO_GAIN: LexicographicCost = (0, 0)
 
 
-def gain(before: Burden, after: Burden) -> Burden:
+def gain(before: LexicographicCost, after: LexicographicCost) -> LexicographicCost:
     """By how much `after` is less. Pairs of differences compare like what they are differences of."""
     return before[0] - after[0], before[1] - after[1]
 

@@ -64,6 +64,7 @@ class DSA(CycleProtocol):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="costs, large team: good answers fast, no proof",
     )
 
     def begin(self) -> None:
@@ -73,7 +74,7 @@ class DSA(CycleProtocol):
 
     def _choose(self, heard: Mapping[str, Message]) -> None:
         """All neighbours' values are known: move, or stay."""
-        burdens = self.problem.burdens(said(heard))
+        burdens = self.problem.lexicographic_costs(said(heard))
         now, least = burdens[self.present], min(burdens)
         index = self.present
         if gain(now, least) > NO_GAIN or self._moves_sideways(now != (0, self.problem.charges[index])):

@@ -49,6 +49,7 @@ class DynABT(ABT, DynamicProtocol):
         paper="Omomowo, Arana, Ahriz 2008",
         dynamic=True,
         privacy="constraints of lower robots",
+        use_when="the problem changes during the run",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -114,13 +115,13 @@ class DynABT(ABT, DynamicProtocol):
 
     def _learn(self, nogood: abt.Nogood) -> None:
         because = frozenset(nogood.because) if isinstance(nogood, Nogood) else NOTHING
-        for index in self.problem.alike(nogood.value):
+        for index in self.problem.interchangeable(nogood.value):
             self.store.add(index, nogood.lhs, because)
 
     def _consistent(self, index: int, view: Mapping[str, Value]) -> bool:
         if self.store[index] is not None:
             return False
-        conflict = self.problem.explained(index, view)
+        conflict = self.problem.conflict_with_key(index, view)
         if conflict is None:
             return True
         lhs, key = conflict

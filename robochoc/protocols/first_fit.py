@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import cast
 
 from robochoc.model.message import Message, Value
+from robochoc.model.wording import Wording
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
@@ -23,6 +24,12 @@ class Placed(Message, frozen=True):
     """Where the sender flies; None: it has stepped aside."""
 
     value: Value | None
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        if self.value is None:
+            return "I step aside"
+        return f"I fly, with {words.own_value(self.value, 'a value')}"
 
 
 class FirstFit(Protocol):

@@ -30,10 +30,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from robochoc.model import message as wire
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, Value, gain, said
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import Burden, LocalProblem
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
+
+
+def saving_in_words(broken: int, cost: float) -> str:
+    """Return what a move saves: `1 broken constraint and 3 of cost`, or `nothing`."""
+    saved = [counted(broken, "broken constraint")] if broken else []
+    return listed([*saved, f"{cost_text(cost)} of cost"] if cost else saved) or "nothing"
 
 
 class Gain(wire.Message, frozen=True):
@@ -41,6 +49,12 @@ class Gain(wire.Message, frozen=True):
 
     broken: int
     cost: int | float
+
+    act = Act(Performative.INFORM, "the receiver comes to know what the sender's move would save")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return f"my move would save {saving_in_words(self.broken, self.cost)}"
 
 
 class Gainers(CycleProtocol):
@@ -52,11 +66,11 @@ class Gainers(CycleProtocol):
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
         self.target = 0
-        self.gain: Burden = NO_GAIN
+        self.gain: LexicographicCost = NO_GAIN
 
     def best_unilateral(self, view: Mapping[str, wire.Value]) -> None:
         """The best move of this robot alone, which may be to stay (BestUnilateralGain)."""
-        burdens = self.problem.burdens(view)
+        burdens = self.problem.lexicographic_costs(view)
         least = min(burdens)
         self.gain = gain(burdens[self.present], least)
         self.target = self.present
@@ -85,6 +99,7 @@ class MGM(Gainers):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="as DSA, and the cost never rises; ends in a local optimum",
     )
 
     def begin(self) -> None:

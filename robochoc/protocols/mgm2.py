@@ -37,11 +37,14 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from robochoc.model import message as wire
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.wording import Wording, counted
+from robochoc.protocols import acts
 from robochoc.protocols.cycles import NO_GAIN, CycleSettings, Domain, Value, gain, said
-from robochoc.protocols.mgm import Gain, Gainers
+from robochoc.protocols.mgm import Gain, Gainers, saving_in_words
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import Burden, LocalProblem
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 Gains = list[list[tuple[int, int | float]]]
 
@@ -54,6 +57,18 @@ class Offer(wire.Message, frozen=True):
 
     gains: Gains | None
 
+    act = Act(Performative.PROPOSE, "what both would gain by moving together")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        if self.gains is None:
+            return "I have no offer for you"
+        best = max(saving for row in self.gains for saving in row)
+        many = f"{counted(len(self.gains), 'value')} of yours and {len(self.gains[0]):,} of mine"
+        if best <= (0, 0):
+            return f"let us move together: of {many}, no two would save me anything"
+        return f"let us move together: of {many}, the best two would save me {saving_in_words(*best)}"
+
 
 class Accept(wire.Message, frozen=True):
     """The receiver is to take its value at `place`, which would save so much in all (`accept`)."""
@@ -62,9 +77,22 @@ class Accept(wire.Message, frozen=True):
     broken: int
     cost: int | float
 
+    act = acts.ACCEPT
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        saved = saving_in_words(self.broken, self.cost)
+        return f"I take your offer: you take your value number {self.place + 1}, and we save {saved} in all"
+
 
 class Reject(wire.Message, frozen=True):
     """Your offer is not taken (`reject`)."""
+
+    act = Act(Performative.REJECT_PROPOSAL, "the offer that was proposed is not taken")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return "I do not take your offer"
 
 
 class Go(wire.Message, frozen=True):
@@ -72,11 +100,19 @@ class Go(wire.Message, frozen=True):
 
     go: bool
 
+    act = Act(Performative.INFORM, "the receiver comes to know whether the sender gains most")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        if self.go:
+            return "go: of my neighbours, nobody is to move before us"
+        return "no go: one of my neighbours is to move instead"
+
 
 class Move(NamedTuple):
     """A joint move: what it saves, and with whom; the own value's place, and the partner's."""
 
-    gain: Burden
+    gain: LexicographicCost
     partner: str
     own: int
     place: int
@@ -106,6 +142,7 @@ class MGM2(Gainers):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="as MGM: better answers, more messages",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -139,7 +176,7 @@ class MGM2(Gainers):
 
     def _gains(self, partner: str) -> Gains:
         """What would be saved if the partner took each of its values, and this robot each of its own."""
-        rows = [self.problem.burdens({**self.view, partner: value}) for value in self.domains[partner]]
+        rows = [self.problem.lexicographic_costs({**self.view, partner: value}) for value in self.domains[partner]]
         now = rows[self.domains[partner].index(self.view[partner])][self.present]
         return [[gain(now, burden) for burden in row] for row in rows]
 
@@ -167,7 +204,9 @@ class MGM2(Gainers):
 
     def _joint(self, offerer: str, gains: Gains) -> Iterator[Move]:
         """All moves that are offered, with what they save both: to the offerer's share comes what it has no part in."""
-        burdens = self.problem.burdens({name: value for name, value in self.view.items() if name != offerer})
+        burdens = self.problem.lexicographic_costs(
+            {name: value for name, value in self.view.items() if name != offerer}
+        )
         now = burdens[self.present]
         for own, (burden, row) in enumerate(zip(burdens, gains, strict=True)):
             broken, cost = gain(now, burden)

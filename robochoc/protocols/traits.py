@@ -33,8 +33,9 @@ class Traits:
         dynamic: It continues when the problem changes (then it is a `DynamicProtocol`).
         concludes: The verdicts with which one robot alone may end the search. Other verdicts are refused.
         tables: It computes with tables of floats, and refuses costs that could add up to 2^53 or more
-            (`solver/exact.py`).
+            (`solver/exact_costs.py`).
         privacy: What neighbours do not learn.
+        use_when: When to choose it, in a few words, for `robochoc protocols`.
     """
 
     paper: str = ""
@@ -50,6 +51,7 @@ class Traits:
     concludes: tuple[Verdict, ...] = UNDECLARED
     tables: bool = False
     privacy: str = ""
+    use_when: str = ""
 
     def fault_of_conclusion(self, verdict: str) -> str:
         """Return why no robot of this protocol ends the search with `verdict`; empty if one may.

@@ -13,8 +13,8 @@ from html import escape
 from importlib.resources import files
 from typing import Literal
 
+from robochoc.view.content_security import content_security_policy
 from robochoc.view.label import printable
-from robochoc.view.policy import policy
 from robochoc.view.script import viewer_script
 
 Mode = Literal["served", "embedded"]
@@ -27,7 +27,7 @@ _TITLE = "<title>Sniffer</title>"
 def page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title: str = "Sniffer") -> bytes:
     """The page, UTF-8. The same answers make the same page.
 
-    `embedded` are the feed's answers by name (`columns`, `details:0`), zlib-compressed: their names are ours, what
+    `embedded` are the page's data by name (`columns`, `details:0`), zlib-compressed: their names are ours, what
     they hold is strangers'. `title` is plain text, of anybody's. Meshcat's viewer, a megabyte, is left out of an
     embedded page without a `scene`.
     """
@@ -37,7 +37,7 @@ def page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title: str = "
     if mode == "served" or "scene" in answers:
         scripts.append(viewer_script())  # the last: the page need not wait until it has been read
     head = (
-        f'<meta http-equiv="Content-Security-Policy" content="{policy(scripts, connections)}">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{content_security_policy(scripts, connections)}">\n'
         f'<link rel="icon" href="data:,">\n<style>\n{_asset("style.css")}</style>\n'
     )
     body = [_block(name, content) for name, content in answers.items()] + [_script(script) for script in scripts]
@@ -52,7 +52,7 @@ def _script(script: str) -> str:
 
 
 def _block(name: str, content: bytes) -> str:
-    """An answer of the feed as a script that no browser runs."""
+    """An answer of `PageData` as a script that no browser runs."""
     text = base64.b64encode(content).decode()
     return f'<script id="feed:{escape(name)}" type="application/octet-stream">{text}</script>'
 

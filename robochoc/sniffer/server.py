@@ -1,4 +1,4 @@
-"""The sniffer's server: the page, and the feed that it draws, for this machine alone.
+"""The sniffer's server: the page, and the data that it draws, for this machine alone.
 
 The page lives under a path that cannot be guessed, as others may use this machine too. What a browser is told unasked
 is small and replaced by what is newer before it is sent: a slow or stopped one makes nothing wait, and nothing grow.
@@ -18,10 +18,10 @@ import msgspec
 from tornado.web import Application
 from tornado.websocket import WebSocketClosedError
 
-from robochoc.sniffer.feed import BadRequestError
 from robochoc.sniffer.page import page
+from robochoc.sniffer.page_data import BadRequestError
 from robochoc.sniffer.session import NotBegunError, Session
-from robochoc.view.address import listening, secret_path, url_of
+from robochoc.view.address import loopback_socket, secret_path, url_of
 from robochoc.view.loopback import SecretHandler, SecretPage, SecretSocket, application, in_browser, served
 
 POLL_S = 0.1
@@ -49,7 +49,7 @@ def serve(
 
 
 async def _serve(session: Session, port: int, ready: Callable[[str], None] | None, *, open_browser: bool) -> None:
-    with listening(port) as here:
+    with loopback_socket(port) as here:
         token = secret_path()
         url = url_of(here, f"{token}/")
         serving = asyncio.create_task(Server(session, here, token).serve())
@@ -60,20 +60,18 @@ async def _serve(session: Session, port: int, ready: Callable[[str], None] | Non
 
 
 class Server:
-    """Serves the journal of `session` on the socket `listening`, below `/token/`.
+    """Serves the journal of `session` on the socket `listener`, below `/token/`.
 
     `seen` is told when the first page has connected. The journal is not read before anybody asks.
     """
 
-    def __init__(
-        self, session: Session, listening: socket, token: str, seen: Callable[[], None] = lambda: None
-    ) -> None:
+    def __init__(self, session: Session, listener: socket, token: str, seen: Callable[[], None] = lambda: None) -> None:
         self.session = session
         self.token = token
-        self._listening = listening
+        self._listener = listener
         self._seen = seen
         self._reader = ThreadPoolExecutor(1, "reader")
-        self._insight = ThreadPoolExecutor(1, "insight")
+        self._states_thread = ThreadPoolExecutor(1, "states")
         self._wanted = asyncio.Event()
         self._changed = asyncio.Event()
         self.version = 0
@@ -84,13 +82,13 @@ class Server:
         """Serve until cancelled."""
         following = asyncio.create_task(self._follow())
         try:
-            async with served(self._application(), self._listening):
+            async with served(self._application(), self._listener):
                 await asyncio.Event().wait()
         finally:
             following.cancel()
             self.session.stop()
             self._reader.shutdown(wait=False, cancel_futures=True)
-            self._insight.shutdown(wait=False, cancel_futures=True)
+            self._states_thread.shutdown(wait=False, cancel_futures=True)
 
     # What handlers ask
 
@@ -109,7 +107,7 @@ class Server:
 
     async def look_into(self, answer: Callable[[], R]) -> R:
         """What `answer` says, in the thread that takes its time."""
-        return await asyncio.get_running_loop().run_in_executor(self._insight, answer)
+        return await asyncio.get_running_loop().run_in_executor(self._states_thread, answer)
 
     async def change(self, since: int) -> None:
         """Wait until there is something newer than version `since`."""
@@ -169,7 +167,7 @@ class _Known(SecretHandler):
 
 
 class _Answer(_Known):
-    """One answer of the feed."""
+    """One answer to the page."""
 
     async def get(self, _token: str, what: str) -> None:
         try:

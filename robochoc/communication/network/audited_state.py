@@ -25,7 +25,7 @@ from robochoc.communication.network.plausibility import (
 )
 from robochoc.communication.quiescence import Counts
 from robochoc.communication.search_state import SearchState
-from robochoc.model.outcome import Thoroughness
+from robochoc.model.outcome import CheckCounts
 
 _ASKED_ENOUGH = 2
 _MOST_NAMED = 3
@@ -172,7 +172,7 @@ class AuditedSearchState(SearchState):
         return tuple(islice(objections(self._checks), _MOST_NAMED))
 
     @property
-    def thoroughness(self) -> Thoroughness:
+    def thoroughness(self) -> CheckCounts:
         """How many constraints were checked by one robot, and how many by more."""
         return thoroughness(self._checks)
 

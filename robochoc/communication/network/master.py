@@ -135,6 +135,11 @@ class Master(MasterLoop):
         finally:
             self._policy.close()
 
+    @property
+    def is_private(self) -> bool:
+        """Whether robots keep their values to themselves."""
+        return self._settings.private
+
     def publish(self, publication: Publication) -> None:
         """Offer `publication`, this run's journal, to those who may sniff. To be called before the master listens."""
         publication.run = self.run

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from robochoc.solver.compiled_team import CompileRobot
-from robochoc.solver.domain import compiled_domain
+from robochoc.solver.domain import compile_domain
 
 
 def _ignore(*_arguments: object) -> None:
@@ -29,7 +29,7 @@ class RobotSettings:
     sniffed: bool = False
     set_rank: Callable[[int, int], None] = _ignore
     stage: Callable[[str], None] = _ignore
-    compiled: CompileRobot = compiled_domain
+    compiled: CompileRobot = compile_domain
 
 
 DEFAULT_SETTINGS = RobotSettings()

@@ -34,13 +34,13 @@ from robochoc.communication.resources import own_memory
 from robochoc.communication.robot_loop import RobotLoop
 from robochoc.model.message import Envelope
 from robochoc.model.outcome import Metrics
-from robochoc.model.problem import Constraint, Kind, Model
+from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind
 from robochoc.protocols.findings import NOTHING, Findings
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.explanation import Known, held
+from robochoc.solver.explanation import KeyedConstraint, held_above
 
 PAIR = 2
 
@@ -117,7 +117,7 @@ class Searcher(RobotLoop):
         owners = {name: agent for agent, names in self._task.interfaces.items() for name in names}
         self._refuse_unfit(owners)
         if self._protocol.traits.shared_scopes:
-            known = [one for one in held(self._robot) if one.constraint.model is not Model.PKC]
+            known = [one for one in held_above(self._robot) if one.constraint.model is not ConstraintModel.PKC]
             for parent in self._robot.parents:
                 theirs = [one for one in known if parent.name in {owners.get(v) for v in one.constraint.variables}]
                 copies = Copies(self.epoch, msgspec.msgpack.encode(list(map(record_of, theirs))))
@@ -128,11 +128,11 @@ class Searcher(RobotLoop):
         """Raise `UnsupportedError` where the own file asks for more than the protocol can do."""
         robot, traits = self._robot, self._protocol.traits
         refused = f", which {self._task.protocol} does not support"
-        if robot.kind is Kind.DISWCSP and not traits.costs:
+        if robot.kind is ProblemKind.DISWCSP and not traits.costs:
             raise UnsupportedError(f"{robot.name} is part of a DisWCSP{refused}")
         parts = [part for child in robot.children for part in child.constraints]
         for constraint in (*robot.shared, *parts):
-            if constraint.model is Model.PKC and not traits.partially_known:
+            if constraint.model is ConstraintModel.PKC and not traits.partially_known:
                 raise UnsupportedError(
                     f"{robot.name} shares a partially known constraint (PKC, {constraint.name}){refused}"
                 )
@@ -169,7 +169,7 @@ class Searcher(RobotLoop):
         brief = RunParameters(task.seed, task.settings, task.aside)
         return AgentProblem(self._own, task.order, task.interfaces, copies, domains, task.links, task.secretive, brief)
 
-    def _known(self, sender: str, record: SharedRecord) -> Known:
+    def _known(self, sender: str, record: SharedRecord) -> KeyedConstraint:
         """Return a constraint that `sender` holds: it has to be a child, and this robot's variables in the scope."""
         known = known_of(record)
         variables = set(known.constraint.variables)
@@ -252,7 +252,7 @@ class Searcher(RobotLoop):
         return check_constraints(self.epoch, self._robot, {**values, **self.assignment}, self.assignment, self._learnt)
 
 
-def _sorted(copies: Sequence[Known], order: Sequence[str]) -> tuple[Known, ...]:
+def _sorted(copies: Sequence[KeyedConstraint], order: Sequence[str]) -> tuple[KeyedConstraint, ...]:
     """Return `copies` in the order of the robots that hold them, as in all runtimes."""
     rank = {name: place for place, name in enumerate(order)}
     return tuple(sorted(copies, key=lambda known: rank.get(known.key.partition("<")[0], -1)))

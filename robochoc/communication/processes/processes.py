@@ -41,7 +41,7 @@ from robochoc.communication.session import Epoch, Session, over
 from robochoc.journal.events import AnyEvent, Lost, Observer, Registered
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, AgentProblem, RunParameters
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 
@@ -78,7 +78,7 @@ class ProcessesRun(Session, MasterLoop):
         start_method: StartMethod = "fork",
         survive: bool = False,
         patience_s: float | None = None,
-        brief: RunParameters = NO_BRIEF,
+        brief: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
         Session.__init__(self, team)
         MasterLoop.__init__(self, progress)

@@ -13,15 +13,15 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.journal.journal import metrics_of
 from robochoc.model.outcome import Metrics
+from robochoc.run import solve
 from robochoc.run.options import Options, Runtime, Withdrawal
-from robochoc.run.orchestrator import solve
 from tests.support.problems import ON_ONE_MACHINE
 
 
 @pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_the_largest_message_is_the_largest_that_was_sent(runtime: Runtime) -> None:
     events: list[AnyEvent] = []
-    options = Options(protocol="sfb", runtime=runtime, withdraw=Withdrawal.FEWEST, cache=False)
+    options = Options(protocol="sfb", runtime=runtime, withdraw=Withdrawal.MINIMUM, cache=False)
     outcome = solve(queens3d(3), options, observer=events.append)
     largest = max(event.bytes for event in events if isinstance(event, Sent))
     assert outcome.metrics.largest == largest > 100

@@ -1,0 +1,147 @@
+"""The robots of a team side by side, read from files or built in Python: what the checks of a whole team ask."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import cached_property
+
+from robochoc.formats.locations import Place, Places
+from robochoc.model.priorities import CycleError, priority_order
+from robochoc.model.problem import Child, Constraint, Parent, Robot
+
+
+class Role(StrEnum):
+    """What a robot says that another is to it."""
+
+    PARENT = "parent"
+    CHILD = "child"
+
+    @property
+    def opposite(self) -> Role:
+        """What the other says of the robot, if they agree."""
+        return Role.CHILD if self is Role.PARENT else Role.PARENT
+
+
+@dataclass(frozen=True)
+class Member:
+    """A robot, and where its parts stand; with what only its file says, if it has one."""
+
+    robot: Robot
+    places: Places
+    copies: Mapping[str, tuple[Constraint, ...]] = field(default_factory=dict)
+    """By child: the TKC constraints that the original platform's files repeat with the parent."""
+    unsaid: frozenset[str] = frozenset()
+    """The children for which `variable` is left out: what they must be told follows from the scopes."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What lists a neighbour: a line of a robot's file, or an object."""
+
+    robot: Robot
+    other: str
+    role: Role
+    place: Place
+
+
+@dataclass(frozen=True)
+class Members:
+    """The robots of a team, as far as each is right by itself.
+
+    `broken` names the robots that have mistakes of their own. They are there, but nothing is known of them: a check
+    that would need them says nothing, so that one mistake is told once. `order` is the robots' order, where something
+    else than the links says it: a team that was built in Python has one.
+    """
+
+    files: Mapping[str, Member]
+    broken: frozenset[str]
+    order: tuple[str, ...] = ()
+
+    @property
+    def robots(self) -> Iterator[Robot]:
+        """The robots that could be read."""
+        return (file.robot for file in self.files.values())
+
+    @cached_property
+    def entries(self) -> dict[tuple[str, str], Entry]:
+        """Who lists whom, by the names of the two."""
+        return {
+            (name, neighbour.name): Entry(member.robot, neighbour.name, role, member.places.neighbour(neighbour))
+            for name, member in self.files.items()
+            for role, neighbour in _listed(member.robot)
+        }
+
+    def is_parent(self, parent: str, child: str) -> bool:
+        """Whether both could be read, and both say so."""
+        below, above = self.entries.get((parent, child)), self.entries.get((child, parent))
+        return below is not None and above is not None and below.role is Role.CHILD and above.role is Role.PARENT
+
+    @cached_property
+    def agreed(self) -> dict[str, list[str]]:
+        """The parents of each robot that agree to be its parents."""
+        return {
+            robot.name: [parent.name for parent in robot.parents if self.is_parent(parent.name, robot.name)]
+            for robot in self.robots
+        }
+
+    def has_all_parents(self, name: str) -> bool:
+        """Whether every parent of `name` could be read and agrees."""
+        return len(self.agreed[name]) == len(self.files[name].robot.parents)
+
+    @cached_property
+    def owners(self) -> dict[str, list[str]]:
+        """The robots, mostly one, that own each variable."""
+        owners: dict[str, list[str]] = {}
+        for robot in self.robots:
+            for variable in robot.variables:
+                owners.setdefault(variable.name, []).append(robot.name)
+        return owners
+
+    @cached_property
+    def ranks(self) -> tuple[Mapping[str, int], ...]:
+        """Each robot's place in the priority order; empty while some mistake leaves the order open.
+
+        The links may leave several orders: there is the one that readers of files take, and `order`, if there is one.
+        """
+        if self.broken or not all(self.has_all_parents(name) for name in self.files):
+            return ()
+        try:
+            orders = {priority_order(self.agreed), self.order or priority_order(self.agreed)}
+        except CycleError:
+            return ()
+        return tuple({name: place for place, name in enumerate(order)} for order in orders)
+
+    @cached_property
+    def own(self) -> dict[str, dict[str, None]]:
+        """The variables of each robot."""
+        return {robot.name: dict.fromkeys(variable.name for variable in robot.variables) for robot in self.robots}
+
+    @cached_property
+    def _used(self) -> dict[str, dict[str, Constraint]]:
+        """For each robot the variables in the constraints it holds, and the first that uses each."""
+        used: dict[str, dict[str, Constraint]] = {}
+        for robot in self.robots:
+            first = used[robot.name] = {}
+            for constraint in robot.shared:
+                for variable in constraint.variables:
+                    first.setdefault(variable, constraint)
+        return used
+
+    def needed(self, parent: str, child: str) -> dict[str, Constraint]:
+        """The variables of `parent` in constraints that `child` holds, with the constraint that needs each."""
+        used = self._used[child]
+        return {variable: used[variable] for variable in self.own[parent] if variable in used}
+
+    def place(self, robot: str, variable: str = "") -> Place:
+        """Where a robot stands, or a variable of its, for a message about two robots."""
+        places = self.files[robot].places
+        return places.variable(variable) if variable else places.robot()
+
+
+def _listed(robot: Robot) -> Iterator[tuple[Role, Parent | Child]]:
+    for parent in robot.parents:
+        yield Role.PARENT, parent
+    for child in robot.children:
+        yield Role.CHILD, child

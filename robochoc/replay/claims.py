@@ -1,0 +1,156 @@
+"""What a journal claims beside its steps, held against them: how it begins (the header) and how it ended.
+
+A robot's steps may all be the same while the header, or the outcome, is another run's. Metrics are counted anew from
+the steps that were played; verdict and values are what the protocol objects have in the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import chain
+
+import msgspec
+
+from robochoc.communication.run_result import RunResult
+from robochoc.journal.entries import STAMPED_LATE
+from robochoc.journal.events import AnyEvent, Lost, Received, Sent
+from robochoc.journal.journal import Header, Journal, metrics_of
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.replay.rebuild import RebuiltRobots
+from robochoc.replay.steps import RecordedRun
+from robochoc.run.evaluation import Search, check_with_files, evaluate
+from robochoc.run.options import CENTRAL
+from robochoc.run.registry import protocol_by_class
+from robochoc.run.withdrawal import Phase
+from robochoc.solver.agent_problem import RunParameters
+from robochoc.solver.domain import TooManySolutionsError
+from robochoc.verification.checker import RefutedError
+
+_COUNTED = ("messages", "bytes", "ncccs", "checks", "largest")
+_COUNTED_BEFORE = _COUNTED[:-1]
+"""In the first version of journals."""
+
+
+class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
+    """Something that the journal claims, `recorded`, and what follows from its steps, `replayed`."""
+
+    what: str
+    recorded: object
+    replayed: object
+
+
+@dataclass(frozen=True)
+class ReplayedRun:
+    """A run that was played to its end: who played it, and the answer that follows; None where nothing can be said."""
+
+    run: RecordedRun
+    answer: EpochOutcome | Outcome | None
+
+
+def played(run: RecordedRun, ensemble: RebuiltRobots, outcome: Outcome | None) -> ReplayedRun:
+    """Return `run`, which its robots have just played, with what it comes to."""
+    return ReplayedRun(run, _answer(run, ensemble, outcome) if outcome else None)
+
+
+def contradictions(journal: Journal, runs: Sequence[ReplayedRun], *, whole: bool) -> Iterator[Contradiction]:
+    """Yield what the journal claims and its steps, in `runs`, do not bear out.
+
+    `whole`: all robots were followed to the end of all runs. If not, what a run has come to is not known.
+    """
+    header, outcome = journal.header, journal.outcome
+    yield from _beginning(header, [one.run for one in runs], outcome.placed_by if outcome else None)
+    if outcome is None:
+        return
+    same = ["team", "protocol", "seed"]
+    if header.protocol != CENTRAL:  # which has no runtime
+        same.append("runtime")
+    yield from _differing("the outcome's ", outcome, header, same)
+    events = list(chain.from_iterable(one.run.events for one in runs))
+    lost = bool(outcome.lost) or any(isinstance(event, Lost) for event in events)
+    if not whole or lost or not runs or any(one.run.given is None for one in runs):
+        return  # who died took its last words with it; across machines robots tell what they like
+    if outcome.verdict is not Verdict.UNKNOWN or outcome.runtime == "simulator":
+        names = _COUNTED_BEFORE if header.version == STAMPED_LATE else _COUNTED
+        yield from _differing("the outcome's ", outcome.metrics, metrics_of(journal.events), names)
+    for number, epoch in enumerate(outcome.epochs[: len(runs)]):
+        yield from _answers(f"epoch {number}'s ", epoch, runs[number].answer)
+    yield from _answers("the outcome's ", outcome, runs[-1].answer)
+
+
+def _beginning(header: Header, runs: Sequence[RecordedRun], placed_by: str | None) -> Iterator[Contradiction]:
+    """The header, against what the robots were given. Where one alone had no solution, the search is left out."""
+    first = next((run.began.protocol for run in runs if run.began), "")
+    found = protocol_by_class(first, [header.protocol])  # a class that is installed by no name may be played, too
+    if found is not None and found[0] not in (header.protocol, placed_by):
+        yield Contradiction(what="the header's protocol", recorded=header.protocol, replayed=found[0])
+    for run in runs:
+        given = run.given
+        if given and given.seed != header.seed:
+            yield Contradiction(what="the header's seed", recorded=header.seed, replayed=given.seed)
+            return
+    order = runs[0].given.order if runs and runs[0].given else None
+    if order is not None and isinstance(header.order, tuple) and header.order != order:
+        yield Contradiction(what="the header's order", recorded=header.order, replayed=order)
+
+
+def _answers(
+    whose: str, recorded: EpochOutcome | Outcome, replayed: EpochOutcome | Outcome | None
+) -> Iterator[Contradiction]:
+    if replayed is None or recorded.verdict is Verdict.UNKNOWN:  # limits are not in a journal
+        return
+    yield from _differing(whose, recorded, replayed, ("verdict", "assignment", "cost"))
+    if isinstance(recorded, Outcome) and isinstance(replayed, Outcome):
+        left, right = sorted(recorded.withdrawn), sorted(replayed.withdrawn)
+        if left != right:
+            yield Contradiction(what=whose + "withdrawn", recorded=left, replayed=right)
+
+
+def _differing(whose: str, recorded: object, replayed: object, names: Sequence[str]) -> Iterator[Contradiction]:
+    for name in names:
+        left, right = getattr(recorded, name), getattr(replayed, name)
+        if left != right:
+            yield Contradiction(what=whose + name, recorded=left, replayed=right)
+
+
+def _answer(run: RecordedRun, ensemble: RebuiltRobots, outcome: Outcome) -> EpochOutcome | Outcome | None:
+    """What the robots of `run` have come to, as a run would tell it; None where the journal does not say enough."""
+    given = run.given
+    if given is None or given.why or len(ensemble.hosts) < len(ensemble.compiled.team.robots):
+        return None
+    protocols = {name: host.protocol for name, host in ensemble.hosts.items()}
+    result = RunResult.of(
+        _verdict(run.events, {str(one.verdict) for one in protocols.values() if one.verdict is not None}),
+        None,
+        {name: one.assignment for name, one in protocols.items()},
+        [],
+        0.0,
+    )
+    result.findings.update({name: one.findings for name, one in protocols.items()})
+    team = ensemble.compiled.team
+    withdrawal = given.aside is not None or _places(run, outcome)
+    phase = Phase("", ensemble.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
+    check = partial(check_with_files, phase, result, team, ensemble.compiled)
+    try:
+        answer = evaluate(phase, Search(result, check), team.kind)
+    except (RefutedError, TooManySolutionsError):
+        return EpochOutcome(Verdict.UNKNOWN, team.order)
+    if not withdrawal:
+        return answer.as_epoch(team.order)
+    bare = Outcome(outcome.team, outcome.protocol, outcome.runtime, outcome.seed, Verdict.UNKNOWN)
+    return answer.as_outcome(bare, ())
+
+
+def _places(run: RecordedRun, outcome: Outcome) -> bool:
+    """Whether `run` is the one in which those step aside who find no place."""
+    found = protocol_by_class(run.began.protocol, filter(None, [outcome.placed_by])) if run.began else None
+    return found is not None and found[0] == outcome.placed_by
+
+
+def _verdict(events: Sequence[AnyEvent], concluded: set[str]) -> Verdict:
+    """What a robot has concluded, or a solution where all that was said was taken in."""
+    if len(concluded) == 1:
+        return Verdict(concluded.pop())
+    under_way = sum(isinstance(event, Sent) - isinstance(event, Received) for event in events)
+    return Verdict.UNKNOWN if under_way or concluded else Verdict.SOLUTION

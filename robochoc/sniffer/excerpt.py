@@ -1,0 +1,54 @@
+"""A part of a journal as a journal: without the messages that are not meant."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from robochoc.journal.events import AnyEvent, Began, Received, Sent
+from robochoc.journal.journal import Journal
+from robochoc.sniffer.trace import Trace
+
+
+def excerpt_of(journal: Journal, trace: Trace, messages: Sequence[int]) -> Journal:
+    """`journal`, whose trace is `trace`, with no other messages than `messages`, sent and taken in.
+
+    All that is no message is there.
+    """
+    return replace(journal, events=tuple(_meant(journal.events, trace, set(messages))))
+
+
+def _meant(events: Sequence[AnyEvent], trace: Trace, messages: set[int]) -> Iterator[AnyEvent]:
+    """A sender's messages in a run have ascending numbers; whom they reach takes them in, in that order."""
+    of = trace.messages
+    spoken: dict[tuple[int, str], list[int]] = defaultdict(list)
+    for message, (run, sender) in enumerate(zip(of.run, of.sender, strict=True)):
+        spoken[run, trace.robots[sender]].append(message)
+    said: dict[tuple[int, str], int] = defaultdict(int)
+    under_way: dict[tuple[str, str], list[bool]] = defaultdict(list)
+    taken: dict[tuple[str, str], int] = defaultdict(int)
+    run = -1
+    for event in events:
+        match event:
+            case Began():
+                run += 1
+                under_way.clear()
+                taken.clear()
+                yield event
+            case Sent():
+                key = max(run, 0), event.sender
+                place = said[key]
+                said[key] += 1
+                meant = place < len(spoken[key]) and spoken[key][place] in messages
+                under_way[event.sender, event.receiver].append(meant)
+                if meant:
+                    yield event
+            case Received():
+                channel = event.sender, event.receiver
+                place = taken[channel]
+                taken[channel] += 1
+                if place < len(under_way[channel]) and under_way[channel][place]:
+                    yield event
+            case _:
+                yield event

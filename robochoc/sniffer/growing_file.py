@@ -1,0 +1,87 @@
+"""A journal's file as it is read while others write it: with a place of its own, and an end that moves."""
+
+from __future__ import annotations
+
+import io
+import os
+import stat
+from pathlib import Path
+from typing import Any
+
+_HEAD_BYTES = 256
+
+
+class NoFileError(OSError):
+    """It is a pipe, a device, or a folder: what has been read of it could not be read again."""
+
+
+def open_to_read(path: Path) -> int:
+    """Return a descriptor of the file at `path`, for reading. A FIFO is not waited for. Raises `OSError`."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        _check_file(descriptor)
+    except BaseException:
+        os.close(descriptor)
+        raise
+    return descriptor
+
+
+def _check_file(descriptor: int) -> None:
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        raise NoFileError("it is no file that can be read twice")
+
+
+class GrowingFile(io.RawIOBase):
+    """Reads the file `descriptor` from its start up to `end`, which whoever reads moves on.
+
+    The place is its own: who writes through the same open file, as a parent does, is not disturbed.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        _check_file(descriptor)
+        self._descriptor = descriptor
+        self.place = 0
+        self.end = 0
+
+    @property
+    def size(self) -> int:
+        """How long the file is by now."""
+        return os.fstat(self._descriptor).st_size
+
+    @property
+    def head(self) -> bytes:
+        """Its first bytes, by which a journal is known."""
+        return os.pread(self._descriptor, _HEAD_BYTES, 0)
+
+    def widen(self, most: int) -> bool:
+        """Let up to `most` more bytes be read, as far as they are there; whether there were any."""
+        before, self.end = self.end, min(self.size, self.end + most)
+        return self.end > before
+
+    def again(self) -> GrowingFile:
+        """The same file from its start."""
+        return GrowingFile(self._descriptor)
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def seekable(self) -> bool:
+        """It is."""
+        return True
+
+    def tell(self) -> int:
+        """The place from which is read next."""
+        return self.place
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Read next from `offset`, counted from the start, the place, or `end`."""
+        self.place = max(0, offset + {os.SEEK_SET: 0, os.SEEK_CUR: self.place, os.SEEK_END: self.end}[whence])
+        return self.place
+
+    def readinto(self, buffer: Any) -> int:  # noqa: ANN401 - whatever holds bytes
+        """Read into `buffer`; 0 at `end`."""
+        content = os.pread(self._descriptor, min(len(buffer), max(0, self.end - self.place)), self.place)
+        buffer[: len(content)] = content
+        self.place += len(content)
+        return len(content)

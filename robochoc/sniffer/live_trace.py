@@ -1,0 +1,233 @@
+"""A journal that is followed as it grows, piece by piece, into a trace.
+
+Robots report in bundles, so a journal that is written in mid-run holds events in the order in which they came. A
+trace takes them so: its causes are right, and the page can show them at once. When the journal is whole, and they were
+not in the order of their times, it is read again in that order, which is the one that everybody else reads it in; the
+trace of that has the next generation.
+
+What has been read is not kept: a file of any length takes as much memory as its trace.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from array import array
+from collections.abc import Callable, Iterable, Iterator
+from io import BufferedReader
+from mmap import ACCESS_READ, mmap
+
+import msgspec
+
+from robochoc.journal.blocks import MAGIC
+from robochoc.journal.events import AnyEvent, Began
+from robochoc.journal.journal import Ended, Follower, Header, JournalError, Line, is_journal
+from robochoc.model.outcome import Outcome
+from robochoc.sniffer.growing_file import GrowingFile
+from robochoc.sniffer.trace import Trace
+
+PIECE_BYTES = 1 << 16
+"""Of a journal, read in one go: a fraction of a second's work."""
+TEXT = b'{"event":"Journal"'
+"""How a journal in its text form begins; the other one begins with `MAGIC`."""
+_AT_ONCE_S = 0.5
+"""So much work may be done before anything is shown."""
+_EVENTS_AT_ONCE = 5_000
+_FORSAKEN_S = 30.0
+"""Without an end, and not written to for so long: whoever wrote it is gone."""
+
+
+class LiveTrace:
+    """Follows the journal in `file`, in pieces: whoever calls `advance` decides when.
+
+    `trace` is what there is by now: None before the first block. `loaded` is the part of the file that has been
+    taken in, 0 to 1.
+    """
+
+    def __init__(self, file: GrowingFile, age_s: Callable[[], float] = lambda: 0.0) -> None:
+        self._age_s = age_s
+        self.trace: Trace | None = None
+        self._generation = -1
+        self._worked_s = 0.0
+        self._waits = False
+        self.restart(file)
+
+    def restart(self, file: GrowingFile) -> None:
+        """Begin anew, with the journal in `file`: the next generation."""
+        self._file = file
+        self._follower = Follower(BufferedReader(file))
+        self._head = file.head
+        self._generation += 1
+        self.trace = None
+        self._last = float("-inf")
+        self._disordered = False
+        self._outcome: Outcome | None = None
+        self._ordering: Iterator[None] | None = None
+        self._done = False
+
+    @property
+    def loaded(self) -> float:
+        """How much of what is in the file has been taken in, 0 to 1."""
+        return self._file.end / max(1, self._file.size)
+
+    @property
+    def settled(self) -> bool:
+        """Whether all is read, the end too, and in order."""
+        return self._done
+
+    @property
+    def _ended(self) -> bool:
+        return self._done or self._ordering is not None
+
+    @property
+    def presentable(self) -> bool:
+        """Whether there is something to be shown. A small journal is put in order first, which does not take long."""
+        return self.trace is not None and (self._done or self._waits or self._worked_s > _AT_ONCE_S)
+
+    def advance(self) -> bool:
+        """Do a bit of work; False when there was none. Raises `JournalError`, and `TraceTooLargeError`."""
+        began = time.monotonic()
+        done = self._advance()
+        self._worked_s += time.monotonic() - began
+        self._waits = not done
+        return done
+
+    def _advance(self) -> bool:
+        if self._file.size < self._file.end or not self._file.head.startswith(self._head):
+            self.restart(self._file.again())  # another journal has been written into the same file
+        if self._ordering is not None:
+            if next(self._ordering, self) is self:
+                self._ordering, self._done = None, True
+            return True
+        if self._done:
+            goes_on = self._outcome is None and self._follower.damage is None and self._file.size > self._file.end
+            if goes_on:  # whoever had stopped writing
+                self.restart(self._file.again())
+            return goes_on
+        if self._read() or self._file.widen(PIECE_BYTES):
+            return True
+        if self._age_s() > _FORSAKEN_S:
+            rest, _ = self._follower.finish()
+            self._take(rest)
+            if not self._ended:
+                self._end()
+            return True
+        return False
+
+    def _read(self) -> bool:
+        """Take in a few entries, which may be few bytes; whether there was anything to do."""
+        if self.trace is None and not _may_begin(self._file.head):
+            raise JournalError("it does not begin as a journal does")
+        lines = self._follower.read(_EVENTS_AT_ONCE)
+        self._take(lines)
+        if self._follower.damage is None:
+            return bool(lines)
+        if not self._ended:
+            self._end()
+        return True
+
+    def _take(self, lines: Iterable[Line]) -> None:
+        events: list[AnyEvent] = []
+        for line in lines:
+            match line:
+                case Header():
+                    self.trace = Trace(line, self._generation)
+                case Ended():
+                    self._outcome = line.outcome
+                case _:
+                    if line.t < self._last and not isinstance(line, Began):
+                        self._disordered = True
+                    self._last = line.t
+                    events.append(line)
+        if self.trace is not None:  # the follower sees to it that the header comes first
+            self.trace.add(events)
+        if self._outcome is not None:
+            self._end()
+
+    def _end(self) -> None:
+        if self.trace is None:
+            raise JournalError("it has no header")
+        if self._disordered:  # and not over yet: the order is not the last one
+            self._ordering = self._in_order(self.trace.header)
+        else:
+            self.trace.end(self._outcome, self._follower.damage)
+            self._done = True
+
+    def _in_order(self, header: Header) -> Iterator[None]:
+        """Make the trace anew, of events in the order of their times; in pieces."""
+        trace = Trace(header, self._generation + 1)
+        for events in events_by_time(self._file):
+            trace.add(events)
+            yield
+        trace.end(self._outcome, self._follower.damage)
+        self._generation += 1
+        self.trace = trace
+
+
+def _may_begin(head: bytes) -> bool:
+    """Whether a journal begins so, or may once more of it is there."""
+    return is_journal(head) or any(form.startswith(head) for form in (MAGIC, TEXT))
+
+
+def next_entries(follower: Follower, file: GrowingFile, end: int) -> list[Line]:
+    """The next few entries before `end`, by the `follower` that reads `file`; none: there are no more."""
+    lines = follower.read(_EVENTS_AT_ONCE)
+    while not lines and file.end < end and file.widen(min(PIECE_BYTES, end - file.end)):
+        lines = follower.read(_EVENTS_AT_ONCE)
+    return lines
+
+
+def events_by_time(file: GrowingFile) -> Iterator[list[AnyEvent]]:
+    """The events in the file of `file`, up to its present end: each run's in the order of their times, in pieces.
+
+    Some pieces are empty: there was work to do. Events of equal times stay in their order. A run's are put aside in a
+    file without a name until the run is over, and only their times and places are kept.
+    """
+    here = file.again()
+    follower = Follower(BufferedReader(here))
+    aside = _Aside()
+    try:
+        while lines := next_entries(follower, here, file.end):
+            for line in lines:
+                if isinstance(line, Header | Ended):
+                    continue
+                if isinstance(line, Began):
+                    yield from aside.sorted()
+                    aside = _Aside()
+                aside.put(line)
+            yield []
+        yield from aside.sorted()
+    finally:
+        aside.close()
+
+
+class _Aside:
+    """Events of one run, packed, in a file without a name."""
+
+    def __init__(self) -> None:
+        self._times = array("d")
+        self._ends = array("Q", [0])
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `close`
+        self._encode = msgspec.msgpack.Encoder().encode
+        self._decode = msgspec.msgpack.Decoder(AnyEvent).decode
+
+    def close(self) -> None:
+        self._file.close()
+
+    def put(self, event: AnyEvent) -> None:
+        self._times.append(event.t)
+        self._ends.append(self._ends[-1] + self._file.write(self._encode(event)))
+
+    def sorted(self) -> Iterator[list[AnyEvent]]:
+        """In the order of their times, in pieces; then the file is gone."""
+        import numpy as np  # noqa: PLC0415 - not before there is something to sort
+
+        with self._file as file:
+            file.flush()
+            if not self._times:
+                return
+            order = np.argsort(np.frombuffer(self._times), kind="stable")
+            with mmap(file.fileno(), 0, access=ACCESS_READ) as packed:
+                for first in range(0, len(order), _EVENTS_AT_ONCE):
+                    places = order[first : first + _EVENTS_AT_ONCE].tolist()
+                    yield [self._decode(packed[self._ends[place] : self._ends[place + 1]]) for place in places]

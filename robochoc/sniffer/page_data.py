@@ -1,0 +1,266 @@
+"""What a page is told of a trace, answer by answer: as JSON, or as columns of numbers (little-endian).
+
+    about       JSON: what was run, who took part, how many messages there are, how it ended
+    columns     messages: t, clock (8 bytes, floating point), step, bytes (4), sender, receiver, kind, run (2)
+    steps       t, clock, checks (8), packet_end (4), the packets (4), robot, run (2)
+    decisions   JSON: [[step, {variable: value}], ...]
+    details     JSON: what messages hold, in words and as FIPA ACL
+
+Steps and messages have numbers (`trace.py`). No answer holds more than a fixed number of rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, assert_never
+
+import msgspec
+
+from robochoc.formats.result import result_json
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.priorities import natural_key
+from robochoc.sniffer.acl import text
+from robochoc.sniffer.acl_messages import AclMessages
+from robochoc.sniffer.columns import packed
+from robochoc.sniffer.recorded_messages import RunProtocols
+from robochoc.sniffer.sentences import sentence
+from robochoc.sniffer.team_names import TeamNames
+from robochoc.sniffer.trace import Trace
+from robochoc.sniffer.trace_tables import Note, RunRecord
+
+FORMAT = 1
+MOST_ROWS = 1 << 16
+"""Messages, steps, or decisions in one answer."""
+DETAILS = 1024
+"""Messages in one chunk of details."""
+STATES = 64
+"""Steps of a robot in one chunk of its states."""
+MOST_NOTES = 1000
+"""Of each sort: on what becomes cheaper, and all others."""
+MOST_EPOCHS = 8
+"""Of which the verdict says how they ended."""
+
+_OFTEN = {"heard", "improved"}
+
+_encode = msgspec.json.Encoder(enc_hook=str).encode
+
+
+class BadRequestError(ValueError):
+    """There is no such answer."""
+
+
+def message_columns(trace: Trace, first: int, end: int) -> bytes:
+    """The messages from `first` to before `end`."""
+    of = trace.messages
+    columns = (of.t, of.clock, of.step, of.bytes, of.sender, of.receiver, of.kind, of.run)
+    return packed(column[first:end] for column in columns)
+
+
+def step_columns(trace: Trace, first: int, end: int) -> bytes:
+    """The steps from `first` to before `end`, and what they took in."""
+    of = trace.steps
+    packets = trace.packets[_end_before(of.packet_end, first) : _end_before(of.packet_end, end)]
+    columns = (of.t[first:end], of.clock[first:end], of.checks[first:end], of.packet_end[first:end], packets)
+    return packed((*columns, of.robot[first:end], of.run[first:end]))
+
+
+def _end_before(ends: Sequence[int], step: int) -> int:
+    return ends[step - 1] if step else 0
+
+
+class PageData:
+    """The answers about one trace. `live`: more may come.
+
+    `chosen` are names, or patterns of names (`patterns.py`), of the robots to begin with; none: all.
+    """
+
+    def __init__(self, trace: Trace, *, live: bool = False, chosen: Sequence[str] = ()) -> None:
+        self.trace = trace
+        self._live = live
+        self._chosen = list(chosen)
+        self.protocols = RunProtocols(trace)
+        self.names = TeamNames(trace, self.protocols)
+        self.acl_messages = AclMessages(trace, self.protocols)
+
+    def about(self) -> bytes:
+        """What was run, who took part, and how far it is."""
+        trace, header = self.trace, self.trace.header
+        order = None if header.order is msgspec.UNSET else header.order
+        return _encode(
+            {
+                "format": FORMAT,
+                **self.news(),
+                "title": f"{header.protocol} on {header.team}",
+                "team": header.team,
+                "protocol": header.protocol,
+                "runtime": header.runtime,
+                "seed": header.seed,
+                "order": order if order is None or isinstance(order, str) else "listed",
+                "channel": None if header.channel is msgspec.UNSET else header.channel,
+                "robots": [{"name": name, "variables": self.names.variables(name)} for name in trace.robots],
+                "kinds": [self._kind(name) for name in trace.kinds],
+                "runs": [_run(run) for run in trace.runs],
+                "outcome": msgspec.Raw(result_json(trace.outcome)) if trace.outcome else None,
+                "notes": [_note_of(note) for note in _told(trace.notes)],
+                "replay": self.cannot_replay(),
+                "chosen": self._chosen,
+                "live": self._live,
+            }
+        )
+
+    def news(self) -> dict[str, Any]:
+        """What of `about` changes as a run goes on, in numbers and words; who counts others asks for `about` anew."""
+        trace = self.trace
+        return {
+            "generation": trace.generation,
+            "messages": len(trace.messages.t),
+            "steps": len(trace.steps.t),
+            "decisions": len(trace.decisions),
+            "robots_count": len(trace.robots),
+            "kinds_count": len(trace.kinds),
+            "runs_count": len(trace.runs),
+            "notes_count": len(trace.notes),
+            "over": trace.over,
+            "verdict": verdict_of(trace),
+            "damage": trace.damage,
+            "unseen": trace.unseen,
+        }
+
+    def cannot_replay(self) -> str:
+        """Why there are no states of robots to be had; empty where there are."""
+        if not self.trace.runs:
+            return "no run has begun"
+        for run in self.trace.runs:
+            if run.given is None or run.given.why:
+                return run.given.why if run.given else "the journal does not say what the robots were given"
+        return ""
+
+    def columns(self, first: int, end: int) -> bytes:
+        """Messages. Raises `BadRequestError`, as the others do."""
+        _check(first, end, len(self.trace.messages.t))
+        return message_columns(self.trace, first, end)
+
+    def steps(self, first: int, end: int) -> bytes:
+        """Steps, and what they took in."""
+        _check(first, end, len(self.trace.steps.t))
+        return step_columns(self.trace, first, end)
+
+    def decisions(self, first: int, end: int) -> bytes:
+        """Who decided what."""
+        _check(first, end, len(self.trace.decisions))
+        return _encode(self.trace.decisions[first:end])
+
+    def details(self, chunk: int) -> bytes:
+        """What the messages of a chunk hold."""
+        first = chunk * DETAILS
+        count = len(self.trace.messages.t)
+        if chunk < 0 or first >= max(count, 1):
+            raise BadRequestError(f"there is no chunk {chunk} of details")
+        return _encode([self.detail(message) for message in range(first, min(first + DETAILS, count))])
+
+    def detail(self, message: int) -> dict[str, Any]:
+        """What one message holds: its fields, in words, and as FIPA ACL."""
+        acl = self.acl_messages.acl_of(message)
+        return {
+            "content": self.acl_messages.plain(message),
+            "words": self.words(message),
+            "acl": text(acl),
+            "fields": self.acl_messages.fields(acl),
+        }
+
+    def words(self, message: int) -> str:
+        """Return what one message says, in words."""
+        trace, of = self.trace, self.trace.messages
+        run = of.run[message]
+        words = self.names.wording(run, trace.robots[of.sender[message]], trace.robots[of.receiver[message]])
+        kind = trace.kinds[of.kind[message]]
+        return sentence(kind, trace.content(message), words, self.protocols.type_of(message))
+
+    def _kind(self, name: str) -> dict[str, str]:
+        act = self.protocols.act_of_type(name)
+        return {"name": name, "performative": str(act.performative), "why": act.why}
+
+
+def _check(first: int, end: int, count: int) -> None:
+    if not 0 <= first <= end <= count:
+        raise BadRequestError(f"there are no rows from {first} to {end}, only {count}")
+    if end - first > MOST_ROWS:
+        raise BadRequestError(f"{end - first} rows are too many at once: at most {MOST_ROWS}")
+
+
+def _run(run: RunRecord) -> dict[str, Any]:
+    return {
+        "number": run.number,
+        "protocol": run.protocol,
+        "epoch": run.epoch,
+        "opened_by": run.opened_by,
+        "message": run.message,
+        "step": run.step,
+    }
+
+
+def _told(notes: Sequence[Note]) -> list[Note]:
+    """The last ones, in their order. What costs less each time must not crowd out losses and refusals."""
+    often = [place for place, note in enumerate(notes) if note.kind in _OFTEN]
+    seldom = [place for place, note in enumerate(notes) if note.kind not in _OFTEN]
+    return [notes[place] for place in sorted([*often[-MOST_NOTES:], *seldom[-MOST_NOTES:]])]
+
+
+def _note_of(note: Note) -> dict[str, Any]:
+    return {"t": note.t, "step": note.step, "kind": note.kind, "robot": note.robot, "text": note.text}
+
+
+def verdict_of(trace: Trace) -> str:
+    """How the run ended, in words; of several epochs, how each did."""
+    outcome = trace.outcome
+    if outcome is None:
+        return "The run broke off before an outcome." if trace.over else "The run goes on."
+    last = _ending(trace, outcome)
+    return f"{_epochs(outcome.epochs)} The last: {last}" if len(outcome.epochs) > 1 else last
+
+
+def _ending(trace: Trace, outcome: Outcome) -> str:
+    reason = f": {outcome.reason}" if outcome.reason else ""
+    out = f"; lost: {_cut(outcome.lost)}" if outcome.lost else ""
+    if outcome.aside:
+        witness = f", as {outcome.ruled_out}" if outcome.ruled_out else ""
+        flying = len({*trace.robots}.difference(outcome.withdrawn))
+        better = ", no better team could" if outcome.verdict is Verdict.OPTIMAL else ""
+        return f"No solution for all{witness}. {flying} fly{better}; aside: {_cut(outcome.aside)}{out}."
+    said = _said(outcome.verdict)
+    cost = f", of cost {outcome.cost:g}" if outcome.cost else ""
+    return f"{said[0].upper()}{said[1:]}{cost}{_by(outcome)}{reason}{out}."
+
+
+def _said(verdict: Verdict) -> str:
+    match verdict:
+        case Verdict.SOLUTION:
+            return "a solution"
+        case Verdict.OPTIMAL:
+            return "the best solution"
+        case Verdict.NO_SOLUTION:
+            return "no solution"
+        case Verdict.UNKNOWN:
+            return "no verdict"
+        case never:
+            assert_never(never)
+
+
+def _by(outcome: Outcome) -> str:
+    """Who could tell alone; who gave up is named in the reason."""
+    if outcome.witness is None or outcome.verdict is Verdict.UNKNOWN:
+        return ""
+    return f", as {outcome.ruled_out if outcome.verdict is Verdict.NO_SOLUTION else f'{outcome.witness} has concluded'}"
+
+
+def _epochs(epochs: Sequence[EpochOutcome]) -> str:
+    """How many there were, and how each of the first ones ended."""
+    ends = [f"{_cut(epoch.lost, 3)} lost" if epoch.lost else _said(epoch.verdict) for epoch in epochs[:MOST_EPOCHS]]
+    more = len(epochs) - len(ends)
+    return f"{len(epochs):,} epochs: {', '.join(ends)}{f' and {more:,} more' if more else ''}."
+
+
+def _cut(names: Sequence[str], most: int = 8) -> str:
+    shown = sorted(names, key=natural_key)
+    more = f" and {len(shown) - most} more" if len(shown) > most else ""
+    return ", ".join(shown[:most]) + more

@@ -1,0 +1,40 @@
+"""Steps that have not ended, or wait for what they took in; and the channels that this comes by."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from robochoc.journal.events import Sent
+
+
+class PendingChannel:
+    """From one robot to another, in one run: what was said and not yet taken in; `owed` was taken in unseen."""
+
+    __slots__ = ("owed", "under_way")
+
+    def __init__(self) -> None:
+        self.under_way: deque[int] = deque()
+        self.owed = 0
+
+
+class PendingStep:
+    """A step that has not ended, or waits for what it took in."""
+
+    __slots__ = ("checks", "clock", "decided", "notes", "packet", "received", "said", "t")
+
+    def __init__(self) -> None:
+        self.received: deque[PendingChannel] = deque()
+        self.packet: list[int] = []
+        self.decided: dict[str, int] | None = None
+        self.notes: list[tuple[float, str, str]] = []
+        self.said: list[Sent] = []
+        self.t = 0.0
+        self.clock = self.checks = 0
+
+    def taken_in(self) -> bool:
+        """Whether all that the step took in is known; what is goes to its packet."""
+        while self.received:
+            if not self.received[0].under_way:
+                return False
+            self.packet.append(self.received.popleft().under_way.popleft())
+        return True

@@ -1,0 +1,104 @@
+"""What a journal tells of its team, for the words: the order of the robots, and the names of their variables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from robochoc.formats import InvalidInputError
+from robochoc.journal.given import GivenProblemError, TeamReader
+from robochoc.model.problem import Team
+from robochoc.model.wording import Wording
+from robochoc.protocols.order import PseudoTree
+from robochoc.sniffer.recorded_messages import RunProtocols
+from robochoc.sniffer.trace import Trace
+
+
+class _RunNames(NamedTuple):
+    order: tuple[str, ...] = ()
+    interfaces: Mapping[str, tuple[str, ...]] = {}
+    tree: PseudoTree | None = None
+    """The pseudo-tree that the order induces, where the protocol works on it."""
+
+
+class _Seen(Mapping[str, tuple[str, ...]]):
+    """The variables that robots were seen to decide, as they are by now."""
+
+    def __init__(self, variables: Mapping[str, Mapping[str, None]]) -> None:
+        self._variables = variables
+
+    def __getitem__(self, robot: str) -> tuple[str, ...]:
+        return tuple(self._variables[robot])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._variables)
+
+    def __len__(self) -> int:
+        return len(self._variables)
+
+
+class TeamNames:
+    """What is known of the robots in each run of `trace`.
+
+    It comes from the files that the robots were given. Where a journal has none, the variables that a robot was seen
+    to decide are taken for those that its messages are about: true of robots without private variables.
+    """
+
+    def __init__(self, trace: Trace, protocols: RunProtocols) -> None:
+        self._trace = trace
+        self._protocols = protocols
+        self._teams: list[Team | None] = []
+        self._reader = TeamReader()
+        self._known: dict[int, _RunNames] = {}
+
+    def variables(self, robot: str) -> list[str]:
+        """All variables of a robot that are known of."""
+        for number in reversed(range(len(self._trace.runs))):
+            team = self._team(number)
+            if team is not None and robot in team:
+                return [variable.name for variable in team[robot].variables]
+        return list(self._trace.variables.get(robot, ()))
+
+    def wording(self, run: int, sender: str, receiver: str) -> Wording:
+        """Return the words for a message of a run."""
+        names = self._of_run(run)
+        interfaces = names.interfaces or _Seen(self._trace.variables)
+        branch = names.order
+        if self._works_on_tree(run):
+            known = names.tree if names.tree and sender in names.tree.parents else None
+            branch = (*reversed(known.ancestors(sender)), sender) if known else ()
+        return Wording(sender, receiver, names.order, interfaces, branch)
+
+    def _works_on_tree(self, run: int) -> bool:
+        found = self._protocols.of_run(run)
+        return found is not None and found[1].traits.tree
+
+    def _of_run(self, number: int) -> _RunNames:
+        if number not in self._known:
+            team = self._team(number)
+            if team is None:
+                return _RunNames()
+            tree = None
+            if self._works_on_tree(number):
+                tree = PseudoTree.induced(
+                    team.order, {robot.name: [parent.name for parent in robot.parents] for robot in team.robots}
+                )
+            interfaces = {robot.name: robot.interface for robot in team.robots}
+            self._known[number] = _RunNames(tuple(team.order), interfaces, tree)
+        return self._known[number]
+
+    def _team(self, number: int) -> Team | None:
+        """The team of a run; each says only which robots are other ones than in the run before."""
+        runs = self._trace.runs
+        while len(self._teams) <= number:
+            given = runs[len(self._teams)].given
+            if given is None and len(self._teams) == len(runs) - 1 and not self._trace.over:
+                return None  # it may still come
+            team = None
+            if given is not None:
+                try:
+                    team = self._reader.team(given)
+                except (GivenProblemError, InvalidInputError, ValueError):
+                    team = None
+            self._teams.append(team)
+        return self._teams[number]

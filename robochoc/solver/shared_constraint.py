@@ -1,0 +1,181 @@
+"""A constraint shared with other robots, as its owner checks it: compiled once, remembered by what the others say."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Container, Iterable, Mapping, Sequence
+
+from robochoc.model.message import Value
+from robochoc.model.problem import Constraint
+from robochoc.solver.encoding import allows_function, cost_function, max_cost
+
+Conflict = Mapping[str, Value]
+"""Assignments of other robots that rule out an own value: the left side of a nogood."""
+
+OtherValues = tuple[int, ...]
+"""What a constraint sees of the others: their variables' values, in the order in which it looks at them."""
+
+
+class OwnValues:
+    """The own compiled domain: `values` of the variables `names`, and what constraints can tell apart in it.
+
+    A constraint looks at some of the variables; values that agree there get one code. Many constraints look at the
+    same ones.
+    """
+
+    def __init__(self, names: Sequence[str], values: Sequence[Value]) -> None:
+        self._names = names
+        self._values = values
+        self._coded: dict[tuple[int, ...], tuple[list[int], list[Value]]] = {}
+
+    def seen(self, scope: Container[str]) -> tuple[tuple[int, ...], list[str]]:
+        """The places and names of the own variables in `scope`."""
+        places = tuple([place for place, name in enumerate(self._names) if name in scope])
+        return places, [self._names[place] for place in places]
+
+    def codes(self, places: tuple[int, ...]) -> tuple[list[int], list[Value]]:
+        """For each value its code, and for each code what it stands for, when only `places` are looked at."""
+        if places not in self._coded:
+            codes: dict[Value, int] = {}
+            coded = [codes.setdefault(tuple([value[place] for place in places]), len(codes)) for value in self._values]
+            self._coded[places] = coded, list(codes)
+        return self._coded[places]
+
+    def shown(self, index: int, places: Container[int]) -> Value:
+        """The value at `index`, where only `places` matter."""
+        return tuple([part if place in places else None for place, part in enumerate(self._values[index])])
+
+
+class SharedConstraint:
+    """A constraint on the own compiled variable and those of `agents` (in priority order).
+
+    `owners` maps others' variables to who owns them, `known` each robot to its interface; `key` is the constraint's
+    name in explanations.
+
+    After `compile` it answers which own values go with what the others say. Made at the first look, then kept:
+    there is one answer for each combination of the others' variables that the constraint looks at, however many
+    values their owners have.
+    """
+
+    def __init__(
+        self,
+        key: str,
+        constraint: Constraint,
+        owners: Mapping[str, str],
+        rank: Mapping[str, int],
+        known: Mapping[str, tuple[str, ...]],
+    ) -> None:
+        self.key = key
+        scope = set(constraint.variables)
+        self.agents = tuple(sorted({owners[name] for name in scope if name in owners}, key=rank.__getitem__))
+        self._constraint = constraint
+        self._scope = scope
+        self._seen = [
+            (agent, place) for agent in self.agents for place, name in enumerate(known[agent]) if name in scope
+        ]
+        self._names = [known[agent][place] for agent, place in self._seen]
+        self._widths = {agent: len(known[agent]) for agent in self.agents}
+        self._masks: dict[OtherValues, int] = {}
+        self._costs: dict[OtherValues, list[float]] = {}
+        self._conflicts: dict[OtherValues, Conflict] = {}
+
+    def compile(self, own: OwnValues) -> None:
+        """Get ready for the own compiled domain."""
+        self._own = own
+        self._places, names = own.seen(self._scope)
+        self._test = allows_function(self._constraint, [*self._names, *names])
+        self._price = cost_function(self._constraint, [*self._names, *names])
+        self.codes, self._distinct = own.codes(self._places)
+
+    def other_values(self, view: Mapping[str, Value]) -> OtherValues | None:
+        """What the constraint sees in `view`; None as long as a part of it is unknown, or has stepped aside."""
+        try:
+            seen = [view[agent][place] for agent, place in self._seen]
+        except KeyError:
+            return None
+        return None if None in seen else tuple(seen)  # type: ignore[arg-type]
+
+    def holds(self, others: OtherValues) -> list[bool]:
+        """For each code of own values, whether it goes with `others`."""
+        return [self._holds((*others, *own)) for own in self._distinct]
+
+    def _holds(self, values: Sequence[int | None]) -> bool:
+        """Whether the constraint holds on `values`; of a robot that steps aside (None) it asks nothing."""
+        return None in values or self._test(values)  # type: ignore[arg-type]
+
+    @property
+    def max_cost(self) -> float:
+        """The most that it charges short of being broken."""
+        return max_cost(self._constraint)
+
+    def costs(self, others: OtherValues) -> list[float]:
+        """What each own value pays when the others are as `others` says."""
+        prices = self._costs.get(others)
+        if prices is None:
+            paid = [0 if None in own else self._price((*others, *own)) for own in self._distinct]  # type: ignore[arg-type]
+            prices = self._costs[others] = [paid[code] for code in self.codes]
+        return prices
+
+    def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[float]]:
+        """How many checks it takes, and what each own value pays at the least; the others' variables are in `domains`.
+
+        With more than `wide` combinations nobody looks, and it is 0.
+        """
+        least: list[float] = [0] * len(self.codes)
+        columns = [list(domains[name]) for name in self._names]
+        if math.prod(map(len, columns)) * len(least) > wide:
+            return 0, least
+        checks = 0
+        for number, others in enumerate(itertools.product(*columns)):
+            prices = self.costs(others)
+            least = list(map(min, least, prices)) if number else prices
+            checks += len(prices)
+            if not any(least):
+                break
+        return checks, least
+
+    def mask(self, others: OtherValues) -> int:
+        """The own values that go with `others`: bit i for the i-th."""
+        mask = self._masks.get(others)
+        if mask is None:
+            holds = self.holds(others)
+            mask = sum(1 << index for index, code in enumerate(self.codes) if holds[code])
+            self._masks[others] = mask
+        return mask
+
+    def own_part(self, index: int) -> Value:
+        """What the constraint looks at of the own value at `index`; None elsewhere."""
+        return self._own.shown(index, self._places)
+
+    def row(self, index: int, columns: Sequence[Sequence[int]]) -> tuple[int, list[bool]]:
+        """Which values of the one other robot go with the own value at `index`; and how many pairs were evaluated.
+
+        `columns` are the values of that robot's variables; the answers follow their product, as `itertools` makes it.
+        Every pair that the constraint can tell apart is evaluated once, whatever the answers are.
+        """
+        own = self._distinct[self.codes[index]]
+        places = [place for _, place in self._seen]
+        pairs = itertools.product(*(columns[place] for place in places))
+        holds = {others: self._holds((*others, *own)) for others in pairs}
+        values = itertools.product(*columns)
+        return len(holds), [holds[tuple([value[place] for place in places])] for value in values]
+
+    def conflict(self, others: OtherValues) -> Conflict:
+        """`others` as a nogood's left side: one object for one combination, not to be changed."""
+        conflict = self._conflicts.get(others)
+        if conflict is None:
+            parts: dict[str, list[int | None]] = {agent: [None] * self._widths[agent] for agent in self.agents}
+            for (agent, place), value in zip(self._seen, others, strict=True):
+                parts[agent][place] = value
+            conflict = self._conflicts[others] = {agent: tuple(value) for agent, value in parts.items()}
+        return conflict
+
+
+def sorted_by_lowest_agent(
+    constraints: Iterable[SharedConstraint], rank: Mapping[str, int]
+) -> tuple[SharedConstraint, ...]:
+    """`constraints` in the order of their lowest other robot, the highest first."""
+    return tuple(
+        sorted(constraints, key=lambda c: (max((rank[agent] for agent in c.agents), default=-1), len(c.agents)))
+    )

@@ -1,0 +1,80 @@
+"""What a journal claims beside its steps: a header, or an outcome, that does not follow from them is found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import pytest
+
+from robochoc.formats import read_team
+from robochoc.generators.queens3d import queens3d
+from robochoc.journal.journal import Journal
+from robochoc.model.outcome import Verdict
+from robochoc.replay import replay
+from robochoc.run.options import Options, Runtime, Withdrawal
+from tests.support.program import ROOT
+from tests.support.replays import recorded
+
+ALL_FLY = Options(protocol="abt", runtime=Runtime.SIMULATOR)
+
+
+@pytest.fixture(scope="module")
+def four() -> Journal:
+    """Four queens' robots search, and as few as possible step aside: two runs."""
+    journal = recorded(queens3d(4), replace(ALL_FLY, withdraw=Withdrawal.MINIMUM))
+    assert replay(journal).identical
+    return journal
+
+
+def test_a_header_that_is_another_runs_is_found(four: Journal) -> None:
+    for field, value in (("protocol", "afc"), ("seed", 7), ("order", ("Robot1.2", "Robot1.1"))):
+        changes: dict[str, Any] = {field: value}
+        header = msgspec.structs.replace(four.header, **changes)
+        assert four.outcome is not None
+        own = replace(four.outcome, **changes) if field != "order" else four.outcome
+        found = replay(replace(four, header=header, outcome=own))
+        assert [one.what for one in found.contradictions] == [f"the header's {field}"]
+        assert not found.identical
+    for field, value in (("team", "five"), ("runtime", "processes")):
+        found = replay(replace(four, header=msgspec.structs.replace(four.header, **{field: value})))
+        assert [one.what for one in found.contradictions] == [f"the outcome's {field}"]
+
+
+def test_an_outcome_that_does_not_follow_is_found(four: Journal) -> None:
+    outcome = four.outcome
+    assert outcome is not None
+    metrics = outcome.metrics
+    other = dict(outcome.assignment)
+    other.popitem()
+    for field, claimed in (
+        ("verdict", replace(outcome, verdict=Verdict.SOLUTION)),
+        ("verdict", replace(outcome, verdict=Verdict.NO_SOLUTION)),
+        ("assignment", replace(outcome, assignment=other)),
+        ("cost", replace(outcome, cost=17.0)),
+        ("withdrawn", replace(outcome, withdrawn=outcome.withdrawn[1:])),
+        ("messages", replace(outcome, metrics=replace(metrics, messages={"Ok": 1}))),
+        ("bytes", replace(outcome, metrics=replace(metrics, bytes=metrics.bytes + 1))),
+        ("ncccs", replace(outcome, metrics=replace(metrics, ncccs=metrics.ncccs - 1))),
+        ("checks", replace(outcome, metrics=replace(metrics, checks=0))),
+        ("largest", replace(outcome, metrics=replace(metrics, largest=metrics.largest + 1))),
+    ):
+        found = replay(replace(four, outcome=claimed))
+        assert found.difference is None
+        assert [one.what for one in found.contradictions] == [f"the outcome's {field}"]
+        assert not found.identical
+
+
+def test_a_solution_is_not_a_proof_that_there_is_none() -> None:
+    solvable = recorded(read_team(ROOT / "docs" / "examples" / "scouts"), ALL_FLY)
+    assert replay(solvable).identical
+    assert solvable.outcome is not None
+    assert solvable.outcome.verdict == "solution"
+    claimed = replace(solvable.outcome, verdict=Verdict.NO_SOLUTION, assignment={}, cost=None)
+    found = replay(replace(solvable, outcome=claimed))
+    assert {one.what for one in found.contradictions} == {
+        "the outcome's verdict",
+        "the outcome's assignment",
+        "the outcome's cost",
+    }

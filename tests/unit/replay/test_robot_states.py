@@ -1,0 +1,291 @@
+"""What a robot knows after each of its steps, in words, and why it has changed its mind."""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from dataclasses import replace
+from random import Random
+from typing import Any, NoReturn
+
+import msgspec
+import numpy as np
+import pytest
+
+from robochoc.generators.queens3d import queens3d
+from robochoc.journal.events import Concluded, Sent, Settled, actor
+from robochoc.model.problem import Constraint, Team
+from robochoc.protocols.abt import ABT
+from robochoc.protocols.findings import Best
+from robochoc.replay import CannotReplayError, ReplayOptions, RobotState, states_of
+from robochoc.replay.inspection import MOST_VALUES
+from robochoc.replay.reasons import MOST_BACKTRACKS, MOST_REASONS
+from robochoc.replay.safe_repr import LONGEST, safe_repr
+from robochoc.replay.value_text import ValueText
+from robochoc.run import Options, Runtime
+from robochoc.run.registry import protocol_named, protocol_names
+from tests.support.problems import random_team, team_of
+from tests.support.replays import in_text, random_run, recorded, with_events
+
+SIMULATED = Options(protocol="abt", runtime=Runtime.SIMULATOR)
+
+
+def differ(*names: str) -> Constraint:
+    from robochoc.formats import PREDEFINED  # noqa: PLC0415 - one constraint
+
+    return Constraint("C", PREDEFINED["ne"], names, names)
+
+
+def pair(values: int = 3) -> Team:
+    return team_of({"A": range(1, values + 1), "B": range(1, values + 1)}, [differ("A", "B")])
+
+
+def states(team: Team, robot: str, protocol: str = "abt", means: ReplayOptions | None = None) -> list[RobotState]:
+    journal = recorded(team, replace(SIMULATED, protocol=protocol))
+    return list(states_of(journal, robot, means))
+
+
+def test_why_a_robot_changes_its_mind() -> None:
+    began, then = states(pair(), "RB")
+    assert (began.step, began.value, began.view, began.nogoods) == (0, {"B": 1}, [], [])
+    assert began.why == ["it takes B = 1, the first value that nothing rules out"]
+    assert (then.step, then.value, then.view) == (1, {"B": 2}, [("RA", "A = 1")])
+    assert then.nogoods == ["while A = 1: B != 1"]
+    assert [(one.value, one.ruled_out_by) for one in then.domain] == [
+        ("B = 1", "A = 1"),
+        ("B = 2", None),
+        ("B = 3", None),
+    ]
+    assert then.why == [
+        "B = 1 was ruled out by: A = 1 (RA said Ok: A = 1)",
+        "it takes B = 2, the first value that nothing rules out",
+    ]
+    assert then.more["higher"] == "RA"
+
+
+def test_a_nogood_from_below_and_a_domain_without_a_value() -> None:
+    team = team_of({"A": [1, 2], "B": [1], "C": [1]}, [differ("A", "B"), differ("A", "C")])
+    last = states(team, "RA")[-1]
+    assert last.nogoods == ["A != 1, whatever the others take"]
+    assert last.why[0].startswith("A = 1 was ruled out whatever the others take (R")
+    assert "RB said Nogood: A != 1, whatever the others take" in last.why[0]
+    lower = states(team, "RB")[1]
+    assert lower.why == []
+    assert lower.view == []  # forgotten, as another value is sure to come
+
+
+def test_a_robot_without_a_value_left_says_what_had_ruled_out_each() -> None:
+    team = queens3d(3)
+    told = [state for state in states(team, "Robot1.2") if any("no value was left" in line for line in state.why)]
+    first = told[0]
+    place = next(place for place, line in enumerate(first.why) if line.startswith("no value was left"))
+    assert place <= MOST_REASONS
+    values = {name for line in first.why[:place] for name in re.findall(r"V1\.2 = \d", line.split(" ruled out")[0])}
+    assert values == {"V1.2 = 1", "V1.2 = 2", "V1.2 = 3"}
+    assert all(re.search("ruled out(?: by: V| whatever)", line) for line in first.why[:place])
+    assert re.match(r"no value was left, and it said Nogood to Robot1\.1: .*V1\.1 != \d", first.why[place])
+
+
+@pytest.mark.parametrize("protocol", ["awc", "sbt", "afc", "afc-ng", "disfc"])
+def test_so_it_does_in_other_protocols_once_for_each_time(protocol: str) -> None:
+    journal = recorded(queens3d(3), replace(SIMULATED, protocol=protocol))
+    told = [state.why for robot in queens3d(3).order for state in states_of(journal, robot) if state.why]
+    ends = [why for why in told if any(line.startswith("no value was left, and it said ") for line in why)]
+    assert ends
+    assert all(len(why) <= (MOST_REASONS + 2) * (MOST_BACKTRACKS + 1) for why in told)
+    assert any("ruled out by: " in why[0] for why in ends)
+    assert all(len({*why}) == len(why) for why in ends if protocol == "awc")
+
+
+def test_a_robot_that_ends_the_search_says_so() -> None:
+    team = team_of({"A": [1], "B": [1], "C": [1]}, [differ("A", "B"), differ("A", "C")])
+    (ended,) = [state for state in states(team, "RA") if "concluded" in str(state.why)]
+    assert ended.why == [
+        "A = 1 was ruled out whatever the others take",
+        "it has no value now",
+        "it concluded that there is no solution: no value is left, whatever the others take",
+    ]
+
+
+@pytest.mark.parametrize("protocol", [name for name in protocol_names() if protocol_named(name).traits.complete])
+def test_whoever_ends_the_search_says_so_in_every_protocol(protocol: str) -> None:
+    team = team_of({"A": [1], "B": [1]}, [differ("A", "B")])
+    journal = recorded(team, replace(SIMULATED, protocol=protocol))
+    concluded = {event.robot for event in journal.events if isinstance(event, Concluded)}
+    assert concluded
+    for robot in concluded:
+        told = [line for state in states_of(journal, robot) for line in state.why]
+        assert sum(line.startswith("it concluded that ") for line in told) == 1
+
+
+def test_views_stand_in_the_order_of_priority_and_what_is_empty_is_left_out() -> None:
+    journal = recorded(queens3d(3), SIMULATED)
+    order = queens3d(3).order
+    for state in states_of(journal, "Robot3.3"):
+        names = [name for name, _ in state.view]
+        assert names == sorted(names, key=order.index)
+        assert not {"nothing", "none"} & {*state.more.values()}
+
+
+@pytest.mark.parametrize(
+    ("protocol", "view", "ruled_out"),
+    [
+        ("sbt", ("RA", "A = 1"), "A = 1, by C"),
+        ("afc", ("RA", "A = 1"), "A = 1, by C"),
+        ("afc-ng", ("RA", "A = 1"), "A = 1"),
+        ("awc", ("RA", "A = 1"), "A = 1, by C"),
+        ("disfc", ("RA", "assignment 1 of RA"), "assignment 1 of RA"),
+        ("syncbb", ("RA", "A = 1"), "A = 1, by C"),
+        ("adopt", ("RA", "A = 1"), "A = 1, by C"),
+        ("mgm2", ("RA", "A = 1"), "A = 1, by C"),
+    ],
+)
+def test_views_of_other_protocols_are_understood(protocol: str, view: tuple[str, str], ruled_out: str) -> None:
+    seen = [state for state in states(pair(), "RB", protocol) if view in state.view]
+    assert seen
+    assert ruled_out in {one.ruled_out_by for state in seen for one in state.domain}
+
+
+def test_costs_and_bounds_stand_with_the_values() -> None:
+    from tests.support.cost_problems import random_cost_team  # noqa: PLC0415 - here only
+
+    team = random_cost_team(Random(2))
+    last = states(team, team.order[0], "adopt")[-1]
+    assert all("(LB " in one.value for one in last.domain)
+    assert {"lb", "ub", "threshold", "bounds"} <= {*last.more}
+    assert any("(costs " in one.value for one in states(team, team.order[-1], "syncbb")[-1].domain)
+
+
+@pytest.mark.parametrize("protocol", protocol_names())
+def test_looking_changes_nothing(protocol: str) -> None:
+    """A robot that is looked at still does what was recorded, its checks and clocks included, or it would be told."""
+    team, options = random_run(protocol, Random(f"look {protocol}"), 0)
+    journal = in_text(recorded(team, replace(options, withdraw=None)))
+    for robot in sorted({name for event in journal.events if (name := actor(event))}):
+        found = list(states_of(journal, robot))
+        assert [state.step for state in found] == [*range(len(found))]
+        assert len(found) == sum(isinstance(event, Settled) and event.robot == robot for event in journal.events)
+        assert all(len(msgspec.json.encode(state)) < 50_000 for state in found)
+        values = [state.value for state in found]
+        assert all(state.why for before, state in zip(values, found[1:], strict=False) if before != state.value)
+
+
+def test_the_last_states_alone_are_the_same() -> None:
+    journal = recorded(queens3d(3), SIMULATED)
+    all_of_them = list(states_of(journal, "Robot3.3"))
+    assert list(states_of(journal.events, "Robot3.3", header=journal.header, since=5)) == all_of_them[5:]
+
+
+def test_what_the_text_form_loses_is_said_again_by_those_who_said_it() -> None:
+    journal = recorded(random_team(Random(5)), replace(SIMULATED, protocol="adopt"))
+    lossy = in_text(journal)
+    assert any("null" in msgspec.json.encode(e).decode() for e in lossy.events if isinstance(e, Sent))
+    for robot in ("RX00", "RX01"):
+        assert list(states_of(lossy, robot)) == list(states_of(journal, robot))
+
+
+def test_large_domains_are_shown_in_part() -> None:
+    (_, then) = states(pair(500), "RB")
+    assert len(then.domain) == MOST_VALUES + 1
+    assert then.domain[-1].value == f"and {500 - MOST_VALUES} more"
+
+
+def test_a_robot_whose_news_is_lost_says_where_it_ends() -> None:
+    journal = recorded(pair(), SIMULATED)
+    events = [event for event in journal.events if actor(event) != "RA"]
+    began, last = states_of(with_events(journal, events), "RB")
+    assert began.value == {"B": 1}
+    assert last.more == {"replay": "ends here: what RA had said to it (Ok) is not in the journal"}
+
+
+class Backwards(ABT):
+    """Takes the last value that will do."""
+
+    def _choose_value(self, view: Any) -> int | None:  # noqa: ANN401 - as its base
+        places = reversed(range(len(self.problem.values)))
+        return next((index for index in places if self._consistent(index, view)), None)
+
+
+def test_another_protocol_than_the_one_recorded_is_no_insight() -> None:
+    journal = recorded(pair(), SIMULATED)
+    with pytest.raises(CannotReplayError, match="RB does not do again what was recorded: in its step 0 of run 0"):
+        list(states_of(journal, "RB", ReplayOptions(protocols={"ABT": Backwards})))
+
+
+def test_nobody_of_that_name_has_no_states() -> None:
+    assert list(states_of(recorded(pair(), SIMULATED), "Nobody")) == []
+
+
+# Whatever a protocol keeps
+
+
+class Grim:
+    """Does not want to be looked at."""
+
+    def __getattribute__(self, name: str) -> NoReturn:
+        raise RuntimeError(name)
+
+    def __repr__(self) -> str:
+        raise RuntimeError
+
+
+class Odd(ABT):
+    """Keeps what nobody expects, under names that say something else."""
+
+    def __init__(self, *own: Any) -> None:  # noqa: ANN401 - as its base
+        super().__init__(*own)
+        self.context = Grim()
+        self.endless: list[Any] = []
+        self.endless.append(self.endless)
+        self._secret = {"key": deque(range(1000))}
+        self.table = np.zeros((3, 4))
+        self.best = Best(3.0, {"RA": (1,)})
+
+
+def test_what_a_user_keeps_is_shown_as_far_as_it_can_be() -> None:
+    then = states(pair(), "RB", means=ReplayOptions(protocols={"ABT": Odd}))[-1]
+    assert then.value == {"B": 2}
+    assert then.more["table"] == "a table of 3 x 4"
+    assert then.more["secret"].startswith("key: (0, 1, 2, ")
+    assert then.more["secret"].endswith(", 988 more)")
+    assert then.more["context"] == "a Grim that cannot be shown (RuntimeError)"
+    assert then.more["best"] == "Best(cost 3, values RA: (1))"
+    assert then.more["endless"] == "((...))"
+
+
+class Broken(ABT):
+    """Its view is none."""
+
+    def settle(self) -> None:
+        super().settle()
+        self.store = None  # type: ignore[assignment]
+        self.problem.values = None  # type: ignore[assignment]
+
+
+def test_a_robot_that_breaks_what_is_looked_at_has_a_state_nevertheless() -> None:
+    then = states(pair(), "RB", means=ReplayOptions(protocols={"ABT": Broken}))[-1]
+    assert (then.value, then.domain) == ({"B": 2}, [])
+
+
+@pytest.mark.parametrize(
+    ("thing", "shown"),
+    [
+        (None, "none"),
+        (True, "yes"),
+        (12_000, "12,000"),
+        (0.5, "0.5"),
+        (float("inf"), "inf"),
+        (b"abc", "3 bytes"),
+        ({}, "nothing"),
+        ({"a": (1, 2)}, "a: (1, 2)"),
+        ({3, 1, 2}, "1, 2, 3"),
+        (ValueText, "ValueText"),
+    ],
+)
+def test_things_at_a_glance(thing: object, shown: str) -> None:
+    assert safe_repr(thing) == shown
+
+
+def test_a_glance_is_short() -> None:
+    for thing in ("x" * 10**6, list(range(10**6)), {number: [number] * 100 for number in range(1000)}, 10**5000):
+        assert len(safe_repr(thing)) <= LONGEST

@@ -1,0 +1,121 @@
+"""A journal that is read piece by piece comes to what it comes to when it is read as a whole."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from robochoc.journal.events import AnyEvent, Began, Event
+from robochoc.journal.journal import JournalError, read_journal
+from robochoc.sniffer import live_trace
+from robochoc.sniffer.cache import Cache
+from robochoc.sniffer.growing_file import GrowingFile, NoFileError
+from robochoc.sniffer.live_trace import LiveTrace, events_by_time
+from robochoc.sniffer.trace import Trace
+from tests.support.sniffer_server import header, journal_of, run_events
+
+EVENTS, OUTCOME = run_events()
+QUICK = settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def opened(path: Path, content: bytes) -> GrowingFile:
+    path.write_bytes(content)
+    return GrowingFile(os.open(path, os.O_RDONLY))
+
+
+def numbers(trace: Trace) -> object:
+    return [list(column) for column in (*trace.messages, *trace.steps)] + [list(trace.packets), trace.decisions]
+
+
+def late(events: list[AnyEvent], robot: str) -> list[AnyEvent]:
+    """What `robot` reports comes at the end of each run: robots report in bundles."""
+    runs: list[list[AnyEvent]] = []
+    for event in events:
+        if isinstance(event, Began) or not runs:
+            runs.append([])
+        runs[-1].append(event)
+    return [event for run in runs for event in sorted(run, key=lambda event: robot in _who(event))]
+
+
+def _who(event: Event) -> set[str]:
+    name = {"Sent": "sender", "Received": "receiver"}.get(type(event).__name__, "robot")
+    return {getattr(event, name, "")}
+
+
+@pytest.mark.parametrize("robot", ["Robot1.1"])
+@given(piece=st.integers(500, 20_000), at_once=st.integers(50, 3000))
+@QUICK
+def test_in_pieces_as_in_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, robot: str, piece: int, at_once: int
+) -> None:
+    monkeypatch.setattr(live_trace, "PIECE_BYTES", piece)
+    monkeypatch.setattr(live_trace, "_EVENTS_AT_ONCE", at_once)
+    content = journal_of(late(EVENTS, robot), OUTCOME, header("processes"))
+    whole = Trace.of(read_journal(content))
+    window = opened(tmp_path / "run.journal", content)
+    follows = LiveTrace(window)
+    before = 0
+    while follows.advance():
+        assert follows.trace is None or follows.trace.generation == before or follows.settled
+    assert follows.trace is not None
+    assert numbers(follows.trace) == numbers(whole)
+    assert (follows.trace.over, follows.trace.outcome, follows.loaded) == (True, whole.outcome, 1)
+
+
+def test_events_by_time_are_the_journals(tmp_path: Path) -> None:
+    content = journal_of(late(EVENTS, "Robot2.2"), OUTCOME, header("processes"))
+    window = opened(tmp_path / "run.journal", content)
+    window.widen(len(content))
+    events = [event for some in events_by_time(window) for event in some]
+    assert tuple(events) == read_journal(content).events
+
+
+def test_whoever_writes_is_not_disturbed(tmp_path: Path) -> None:
+    """The descriptor's own place stays where it was: a parent writes through the same one."""
+    content = journal_of(EVENTS, OUTCOME)
+    path = tmp_path / "run.journal"
+    with path.open("w+b") as file:
+        file.write(content)
+        file.flush()
+        follows = LiveTrace(GrowingFile(file.fileno()))
+        while follows.advance():
+            pass
+        assert file.tell() == os.lseek(file.fileno(), 0, os.SEEK_CUR) == len(content)
+
+
+def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
+    reading, writing = os.pipe()
+    folder = os.open(tmp_path, os.O_RDONLY)
+    try:
+        for descriptor in (reading, folder):
+            with pytest.raises(NoFileError):
+                GrowingFile(descriptor)
+    finally:
+        for descriptor in (reading, writing, folder):
+            os.close(descriptor)
+
+
+@given(content=st.binary(min_size=1, max_size=300))
+@QUICK
+def test_no_bytes_do_harm(tmp_path: Path, content: bytes) -> None:
+    follows = LiveTrace(opened(tmp_path / "any", content), lambda: 1e9)
+    try:
+        while follows.advance():
+            pass
+    except JournalError:
+        return
+    assert follows.trace is None or follows.trace.over
+
+
+@settings(deadline=None)
+@given(sizes=st.lists(st.tuples(st.integers(0, 9), st.integers(0, 60)), max_size=60))
+def test_a_cache_never_holds_more_than_it_may(sizes: list[tuple[int, int]]) -> None:
+    cache = Cache(100)
+    for key, size in sizes:
+        cache.put(key, bytes(size))
+        assert cache.get(key) == bytes(size)
+        assert sum(len(cache.get(other) or b"") for other in range(10)) <= 100
