@@ -268,7 +268,7 @@ class ABTDORetro(Backtracking):
     # The view
 
     def _coherent(self, nogood: Nogood) -> bool:
-        """Whether all of the left side is higher at present, and nothing else is known of it."""
+        """Return whether all of the left side is higher at present, and nothing else is known of it."""
         return all(
             self._is_higher(agent)
             and (agent not in self.higher or (agent in self.view and not contradicts(value, self.view[agent])))

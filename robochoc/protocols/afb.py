@@ -172,7 +172,7 @@ class AFB(Protocol):
             self._take_best()
 
     def _update(self, assignments: list[Assignment]) -> bool:
-        """Whether a CPA is not obsolete. The strongest is kept; what was done with a weaker one is void."""
+        """Return whether a CPA is not obsolete. The strongest is kept; what was done with a weaker one is void."""
         common = agreement(stamp_of(assignments), stamp_of(self.assignments))
         if common == len(assignments):
             return True

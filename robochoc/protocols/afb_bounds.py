@@ -111,7 +111,7 @@ class Told(NamedTuple):
         return [*known, *[known[-1]] * (len(stamp) + 1 - len(known))]
 
     def follows(self, before: Told) -> bool:
-        """Whether it says no more than what follows from what was told `before`."""
+        """Return whether it says no more than what follows from what was told `before`."""
         return self.along(self.stamp) == before.along(self.stamp)
 
 
@@ -127,7 +127,7 @@ class Estimates:
         self._told: dict[str, Told] = {}
 
     def outdated(self, robot: str, stamp: Stamp) -> bool:
-        """Whether `robot` may have another estimate than for the last CPA that it was asked for.
+        """Return whether `robot` may have another estimate than for the last CPA that it was asked for.
 
         On how many robots' values its estimates depend, the first one that it tells says for all CPAs.
         """

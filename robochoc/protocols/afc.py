@@ -264,7 +264,7 @@ class FilteredDomain:
 
 
 def begins(beginning: Assignments, assignments: Assignments) -> bool:
-    """Whether `assignments` are `beginning` and perhaps more."""
+    """Return whether `assignments` are `beginning` and perhaps more."""
     return assignments[: len(beginning)] == beginning
 
 

@@ -297,7 +297,7 @@ class AgileABT(Backtracking):
         return {name: value for name, value in self.view.items() if rank[name] < rank[self.name]}
 
     def _coherent(self, nogood: Nogood) -> bool:
-        """Whether all of the left side is above this robot, and known to be so by those that tell it their values."""
+        """Return whether all of the left side is above this robot, and known to be so by those that tell it their values."""
         return compatible(self.present, self.name, nogood.lhs) and all(
             agent in self.view and not contradicts(value, self.view[agent])
             for agent, value in nogood.lhs.items()

@@ -55,7 +55,7 @@ class Proposal(NamedTuple):
 
 
 def compatible(order: PriorityOrder, name: str, lhs: Iterable[str]) -> bool:
-    """Whether all robots of the left side `lhs` stand above the robot `name`."""
+    """Return whether all robots of the left side `lhs` stand above the robot `name`."""
     return order.depth(lhs) < order.rank[name]
 
 

@@ -91,7 +91,7 @@ class Kept(NamedTuple):
 
 
 def stands(value: Value, told: Value | None) -> bool:
-    """Whether `told` is known to be as `value` says, wherever that is not None."""
+    """Return whether `told` is known to be as `value` says, wherever that is not None."""
     return told is not None and all(part is None or part == known for part, known in zip(value, told, strict=True))
 
 
@@ -289,7 +289,7 @@ class AWC(Protocol):
                 self._standing[index].append(others)
 
     def _is_higher(self, agent: str) -> bool:
-        """Whether `agent` has higher priority than this robot; of equals, who comes first in the static order."""
+        """Return whether `agent` has higher priority than this robot; of equals, who comes first in the static order."""
         other = (-self.priorities[agent], self.order.rank[agent])
         return other < (-self.priority, self.order.rank[self.problem.agent])
 

@@ -32,7 +32,7 @@ class Backtracking(Protocol):
         return next((index for index in range(len(self.problem.values)) if self._consistent(index, view)), None)
 
     def _consistent(self, index: int, view: Mapping[str, Value]) -> bool:
-        """Whether `view` allows the value at `index`; if a constraint does not, its nogood is stored."""
+        """Return whether `view` allows the value at `index`; if a constraint does not, its nogood is stored."""
         if self.store[index] is not None:
             return False
         conflict = self.problem.conflict(index, view)

@@ -145,7 +145,7 @@ class BoundingProtocol(TreeProtocol):
         return [*fresh, *other], bool(other)
 
     def agrees(self, values: Mapping[str, message.Value]) -> bool:
-        """Whether nobody has another value in the context (the papers' Compatible)."""
+        """Return whether nobody has another value in the context (the papers' Compatible)."""
         return all(self.context[name][0] == value for name, value in values.items() if name in self.context)
 
     def _is_newer(self, name: str, entry: Entry) -> bool:

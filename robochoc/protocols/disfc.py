@@ -213,7 +213,7 @@ class DisFC(Protocol):
                 del self.below[child]
 
     def _consistent(self, index: int) -> bool:
-        """Whether the filters allow the value at `index`; if one does not, its nogood is stored."""
+        """Return whether the filters allow the value at `index`; if one does not, its nogood is stored."""
         if self.store[index] is not None:
             return False
         for agent in sorted(self.filters, key=self.order.rank.__getitem__):

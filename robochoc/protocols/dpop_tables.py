@@ -98,7 +98,7 @@ def project(shape: Sequence[int], charges: Sequence[float], tables: Sequence[Tab
 
 
 def is_hopeless(costs: Codes) -> bool:
-    """Whether all of them are `inf`."""
+    """Return whether all of them are `inf`."""
     return bool(costs.min() == _top(costs.itemsize))
 
 

@@ -86,5 +86,5 @@ class DSA(CycleProtocol):
             self.tell_value(self._choose)
 
     def _moves_sideways(self, conflict: bool) -> bool:  # noqa: FBT001 - the variants' only question
-        """Whether a robot that gains nothing may move all the same."""
+        """Return whether a robot that gains nothing may move all the same."""
         return self.settings.variant == "C" or (self.settings.variant == "B" and conflict)

@@ -28,7 +28,7 @@ def one_by_one(distinct: Sequence[T], runs: Sequence[Run]) -> list[T]:
 
 
 def fitting(kinds: int, runs: Sequence[Run], robots: int) -> bool:
-    """Whether `runs` of so many kinds tell of so many robots."""
+    """Return whether `runs` of so many kinds tell of so many robots."""
     return sum(count for _, count in runs) == robots and all(0 <= at < kinds and count > 0 for at, count in runs)
 
 

@@ -78,7 +78,7 @@ class Gainers(CycleProtocol):
             self.target = self.any_of([place for place, burden in enumerate(burdens) if burden == least])
 
     def wins(self, gains: Mapping[str, wire.Message]) -> bool:
-        """Whether this robot gains, and more than all in `gains`; of equals, who comes first in the order."""
+        """Return whether this robot gains, and more than all in `gains`; of equals, who comes first in the order."""
         rank = self.order.rank
         return self.gain > NO_GAIN and all(
             (self.gain, rank[name]) > ((told.broken, told.cost), rank[self.problem.agent])

@@ -23,7 +23,7 @@ NOTHING: Explanation = frozenset()
 
 
 def contradicts(value: Value, other: Value) -> bool:
-    """Whether two pictures of one robot's value cannot both be true: they differ where both say something."""
+    """Return whether two pictures of one robot's value cannot both be true: they differ where both say something."""
     return any(part != told for part, told in zip(value, other, strict=True) if part is not None and told is not None)
 
 

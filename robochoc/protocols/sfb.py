@@ -185,7 +185,7 @@ class SFB(Protocol):
                 assert_never(never)
 
     def _expects(self, sender: str, message: Message) -> bool:
-        """Whether `message` may come from `sender` at this point: from the robot before, or from the next one."""
+        """Return whether `message` may come from `sender` at this point: from the robot before, or from the next one."""
         match message:
             case Above(domains, runs):
                 fits = fitting(len(domains), runs, self.rank)

@@ -1,8 +1,9 @@
 """Playing a recorded run again: the same protocol objects, the same packets, and what comes of them."""
 
 from robochoc.replay.claims import Contradiction
+from robochoc.replay.comparison import Difference
 from robochoc.replay.rebuild import CannotReplayError, ReplayOptions
-from robochoc.replay.replay import Difference, ReplayResult, StoppedRobot, replay
+from robochoc.replay.replay import ReplayResult, StoppedRobot, replay
 from robochoc.replay.robot_states import Choice, RobotState, states_of
 
 __all__ = [

@@ -1,12 +1,11 @@
-"""What was said in a recorded run, as it is to be handed on: the messages of each channel, in their order.
+"""The messages of a recorded run, by channel, as they are to be delivered again.
 
-The n-th message that was received on a channel is the n-th that was sent on it. A journal does not keep messages as
-they travelled, but their fields. In its binary form these are as they were, and a message is made again from them; in
-its text form numbers that are not finite, bytes, and keys that are no text, have become something else, and it is made
-again by its type. What a type would make of fields that are as they were is not used: where it says `float` a protocol
-may have said 0, which travels as the integer that it is.
-Whether that has worked shows in its size, which the journal knows. Where it has not, the one is used that the sender
-has said again.
+The n-th message that was received on a channel is the n-th that was sent on it. A journal does not hold messages as
+they travelled, but their fields. Its binary form keeps the fields as they were, and a message is made of them. In its
+text form infinite numbers, bytes, and keys that are no strings have become something else, and a message is made by its
+type. Where the fields are as they were the type is not used: where it says `float` a protocol may have sent 0, which
+travels as an integer. The size of the message, which the journal holds, shows whether this worked. Where it did not,
+the message is used that the sender has sent again.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from robochoc.protocols.protocol import Protocol
 Edge = tuple[str, str]
 
 _UNFIT = (msgspec.MsgspecError, RecursionError, UnicodeError, TypeError, OverflowError)
-"""What is raised for fields that are no message's: a journal's may be anything."""
+"""Raised for fields that are no message's; those of a journal may be anything."""
 
 _encode = msgspec.msgpack.Encoder().encode
 
@@ -41,11 +40,11 @@ class MessageDecoder:
         self._decoder: msgspec.msgpack.Decoder[Message] = msgspec.msgpack.Decoder(union)
 
     def message(self, content: bytes) -> Message:
-        """The message that has this `content`."""
+        """Return the message with this `content`."""
         return self._decoder.decode(content)
 
     def content(self, sent: Sent) -> bytes | None:
-        """The content of the message as it travelled; None where what was recorded does not tell it."""
+        """Return the content of the message as it travelled; None if it cannot be made of what was recorded."""
         if sent.type not in self._tags:
             return None
         fields = [self._tags[sent.type], *sent.content.values()]
@@ -59,7 +58,7 @@ class MessageDecoder:
         return None
 
     def same(self, recorded: Sent, replayed: Sent) -> bool:
-        """Whether a message has the fields that were `recorded`, through whichever form of journal these have been."""
+        """Return whether a message has the fields that were `recorded`, in either form of journal."""
         if recorded.type != replayed.type or list(recorded.content) != list(replayed.content):
             return False
         fields, again = list(recorded.content.values()), list(replayed.content.values())
@@ -87,40 +86,41 @@ class MessageDecoder:
 class RecordedChannels:
     """The messages of one run, or epoch, by channel.
 
-    `events` are the run's. What robots say again is put in, and handed on rather than what was recorded.
+    `events` are the run's. A message that was sent again is delivered rather than the recorded one.
     """
 
-    def __init__(self, events: Iterable[AnyEvent], words: MessageDecoder) -> None:
-        self._words = words
+    def __init__(self, events: Iterable[AnyEvent], decoder: MessageDecoder) -> None:
+        self._decoder = decoder
         self._recorded: dict[Edge, deque[Sent]] = {}
         self._again: dict[Edge, deque[bytes]] = {}
         self._ahead: dict[Edge, int] = {}
-        """How many messages of a channel were handed on before they were said again."""
+        """How many messages of a channel were delivered before they were sent again."""
         for event in events:
             if isinstance(event, Sent):
                 self._recorded.setdefault((event.sender, event.receiver), deque()).append(event)
 
-    def say(self, envelope: Envelope) -> None:
-        """A robot has said this again."""
-        edge = (envelope.sender, envelope.receiver)
-        if self._ahead.get(edge, 0):
-            self._ahead[edge] -= 1
-        else:
-            self._again.setdefault(edge, deque()).append(envelope.content)
+    def send_again(self, envelopes: Iterable[Envelope]) -> None:
+        """Add messages that a robot has sent in the replay."""
+        for envelope in envelopes:
+            edge = (envelope.sender, envelope.receiver)
+            if self._ahead.get(edge, 0):
+                self._ahead[edge] -= 1
+            else:
+                self._again.setdefault(edge, deque()).append(envelope.content)
 
-    def can_hand_on(self, packet: Sequence[Received]) -> bool:
-        """Whether all of `packet` can be made, or never will be, so that there is nothing to wait for."""
+    def can_deliver(self, packet: Sequence[Received]) -> bool:
+        """Return whether `packet` has nothing to wait for: all of it can be made, or never will be."""
         wanted = Counter((received.sender, received.receiver) for received in packet)
         for edge, count in wanted.items():
             here = len(self._again.get(edge, ()))
             if here < count:
                 recorded = islice(self._recorded.get(edge, ()), here, count)
-                if any(self._words.content(sent) is None for sent in recorded):
+                if any(self._decoder.content(sent) is None for sent in recorded):
                     return False
         return True
 
-    def hand_on(self, received: Received) -> tuple[Sent | None, Envelope | None]:
-        """What was received: as it was recorded, None where that is lost; and made again, None where it cannot be."""
+    def deliver(self, received: Received) -> tuple[Sent | None, Envelope | None]:
+        """Return a received message as it was recorded, and as it is delivered again; None: it is lost."""
         edge = (received.sender, received.receiver)
         recorded = self._recorded.get(edge)
         if not recorded:
@@ -131,5 +131,5 @@ class RecordedChannels:
             content: bytes | None = again.popleft()
         else:
             self._ahead[edge] = self._ahead.get(edge, 0) + 1
-            content = self._words.content(sent)
+            content = self._decoder.content(sent)
         return sent, None if content is None else Envelope(*edge, content, sent.clock)

@@ -1,7 +1,7 @@
-"""What a journal claims beside its steps, held against them: how it begins (the header) and how it ended.
+"""Claims of a journal beside its steps: the header and the outcome, compared with what follows from the steps.
 
-A robot's steps may all be the same while the header, or the outcome, is another run's. Metrics are counted anew from
-the steps that were played; verdict and values are what the protocol objects have in the end.
+All steps may be the same while the header, or the outcome, is another run's. Metrics are counted anew from the steps
+that were played. Verdict and values are those that the protocol objects have in the end.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _COUNTED_BEFORE = _COUNTED[:-1]
 
 
 class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
-    """Something that the journal claims, `recorded`, and what follows from its steps, `replayed`."""
+    """A claim of the journal, `recorded`, and what follows from its steps, `replayed`."""
 
     what: str
     recorded: object
@@ -43,21 +43,24 @@ class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class ReplayedRun:
-    """A run that was played to its end: who played it, and the answer that follows; None where nothing can be said."""
+    """A run that was played to its end, and the answer that follows; None: the journal does not say enough."""
 
     run: RecordedRun
     answer: EpochOutcome | Outcome | None
 
 
-def played(run: RecordedRun, ensemble: RebuiltRobots, outcome: Outcome | None) -> ReplayedRun:
-    """Return `run`, which its robots have just played, with what it comes to."""
-    return ReplayedRun(run, _answer(run, ensemble, outcome) if outcome else None)
+def with_answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome | None) -> ReplayedRun:
+    """Return a run that its robots have just played, with its answer."""
+    return ReplayedRun(run, _answer(run, robots, outcome) if outcome else None)
 
 
 def contradictions(journal: Journal, runs: Sequence[ReplayedRun], *, whole: bool) -> Iterator[Contradiction]:
-    """Yield what the journal claims and its steps, in `runs`, do not bear out.
+    """Yield the claims of the journal that do not follow from its steps.
 
-    `whole`: all robots were followed to the end of all runs. If not, what a run has come to is not known.
+    Args:
+        journal: The journal.
+        runs: Its runs, replayed.
+        whole: All robots were followed to the end of all runs. Otherwise the runs' answers are not known.
     """
     header, outcome = journal.header, journal.outcome
     yield from _beginning(header, [one.run for one in runs], outcome.placed_by if outcome else None)
@@ -114,12 +117,12 @@ def _differing(whose: str, recorded: object, replayed: object, names: Sequence[s
             yield Contradiction(what=whose + name, recorded=left, replayed=right)
 
 
-def _answer(run: RecordedRun, ensemble: RebuiltRobots, outcome: Outcome) -> EpochOutcome | Outcome | None:
-    """What the robots of `run` have come to, as a run would tell it; None where the journal does not say enough."""
+def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> EpochOutcome | Outcome | None:
+    """Return the answer of `run` as an orchestrator would; None: the journal does not say enough."""
     given = run.given
-    if given is None or given.why or len(ensemble.hosts) < len(ensemble.compiled.team.robots):
+    if given is None or given.why or len(robots.hosts) < len(robots.compiled.team.robots):
         return None
-    protocols = {name: host.protocol for name, host in ensemble.hosts.items()}
+    protocols = {name: host.protocol for name, host in robots.hosts.items()}
     result = RunResult.of(
         _verdict(run.events, {str(one.verdict) for one in protocols.values() if one.verdict is not None}),
         None,
@@ -128,10 +131,10 @@ def _answer(run: RecordedRun, ensemble: RebuiltRobots, outcome: Outcome) -> Epoc
         0.0,
     )
     result.findings.update({name: one.findings for name, one in protocols.items()})
-    team = ensemble.compiled.team
+    team = robots.compiled.team
     withdrawal = given.aside is not None or _places(run, outcome)
-    phase = Phase("", ensemble.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
-    check = partial(check_with_files, phase, result, team, ensemble.compiled)
+    phase = Phase("", robots.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
+    check = partial(check_with_files, phase, result, team, robots.compiled)
     try:
         answer = evaluate(phase, Search(result, check), team.kind)
     except (RefutedError, TooManySolutionsError):
@@ -143,13 +146,13 @@ def _answer(run: RecordedRun, ensemble: RebuiltRobots, outcome: Outcome) -> Epoc
 
 
 def _places(run: RecordedRun, outcome: Outcome) -> bool:
-    """Whether `run` is the one in which those step aside who find no place."""
+    """Return whether `run` is the one in which robots withdraw."""
     found = protocol_by_class(run.began.protocol, filter(None, [outcome.placed_by])) if run.began else None
     return found is not None and found[0] == outcome.placed_by
 
 
 def _verdict(events: Sequence[AnyEvent], concluded: set[str]) -> Verdict:
-    """What a robot has concluded, or a solution where all that was said was taken in."""
+    """Return what a robot has concluded; or a solution, if every message was taken in."""
     if len(concluded) == 1:
         return Verdict(concluded.pop())
     under_way = sum(isinstance(event, Sent) - isinstance(event, Received) for event in events)

@@ -139,7 +139,7 @@ class Reasons:
         return f"it takes {text}{', the first value that nothing rules out' if first else ''}"
 
     def _is_first(self, index: int) -> bool:
-        """Whether all values before are ruled out; where values have costs, that says nothing."""
+        """Return whether all values before are ruled out; where values have costs, that says nothing."""
         protocol, store = self._protocol, self._store()
         if protocol.traits.costs:
             return False
@@ -151,7 +151,7 @@ class Reasons:
         return all(against[:-1]) and not against[-1]
 
     def _hopeless(self) -> bool:
-        """Whether all own values are ruled out, whatever others take."""
+        """Return whether all own values are ruled out, whatever others take."""
         store = self._store()
         if store is None:
             return False
@@ -185,7 +185,7 @@ def _together(values: Sequence[str]) -> str:
 
 
 def _is_about(message: Message, sender: str, robots: Collection[str], own: Sequence[int | None]) -> bool:
-    """Whether `message` is of what rules the value `own` out, that of `robots`."""
+    """Return whether `message` is of what rules the value `own` out, that of `robots`."""
     lhs = getattr(message, "lhs", None)
     if lhs is None:
         return sender in robots

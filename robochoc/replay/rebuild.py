@@ -1,4 +1,4 @@
-"""Who plays: the robots of each run, made of what they were given then."""
+"""The robots of each recorded run, made again of what they were given then."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _UNCOMPILED = (
     UnsupportedError,
     SettingsError,
 )
-"""What stands in the way of robots that have to be compiled, or set, first."""
+"""Raised for robots that cannot be compiled, or whose settings do not fit."""
 
 
 class CannotReplayError(Exception):
@@ -50,12 +50,15 @@ class CannotReplayError(Exception):
 
 
 class ReplayOptions(NamedTuple):
-    """What a replay may use.
+    """What a replay may use besides the journal.
 
-    `team` is the one in the files, for runs whose journals do not say what robots were given; `protocols` are, by
-    their classes' names, to be used rather than those that are installed. `settings` are what was set of the protocol,
-    where the journal does not say. `limits`, `cache` and `solver` are for
-    robots whose private constraints need a solver (`solver/compile.py`).
+    Attributes:
+        team: The team in files, for runs whose journals do not say what robots were given.
+        protocols: Protocols by their classes' names, to be used rather than the installed ones.
+        settings: The settings of the protocol, where the journal does not have them.
+        limits: Limits for robots whose private constraints need a solver (`solver/compile.py`).
+        cache: Their cached solutions.
+        solver: The solver's process.
     """
 
     team: Team | None = None
@@ -67,36 +70,42 @@ class ReplayOptions(NamedTuple):
 
 
 class RebuiltRobots(NamedTuple):
-    """The robots of one run, ready to begin: the protocol, their hosts, and what each of them knows.
+    """The robots of one run, ready to start.
 
-    Those in `mindful` go on with what they found out in the epoch before. `compiled` is what they were made of.
+    Attributes:
+        protocol: Their protocol.
+        hosts: Their hosts, by name.
+        parts: What each robot knows of the problem.
+        lossless: No message of the epoch before was lost.
+        continuing: Robots that go on with what they found out in the epoch before.
+        compiled: The team that they were made of.
     """
 
     protocol: type[Protocol]
     hosts: Mapping[str, Host]
     parts: Mapping[str, AgentProblem]
     lossless: bool
-    mindful: Collection[str]
+    continuing: Collection[str]
     compiled: CompiledTeam
 
 
 class Rebuilder:
-    """Makes the robots of one run after the other; those that go on from one epoch to the next are the same.
+    """Makes the robots of one run after the other; robots that go on from one epoch to the next are the same objects.
 
-    `only` names those that are to play (None: all).
+    `only` names the robots to be made; None: all.
     """
 
-    def __init__(self, header: Header | None, means: ReplayOptions, only: Collection[str] | None = None) -> None:
+    def __init__(self, header: Header | None, options: ReplayOptions, only: Collection[str] | None = None) -> None:
         self._header = header
-        self._means = means
+        self._options = options
         self._only = only
         self._reader = TeamReader(header.team if header else "")
         self._hosts: dict[str, Host] = {}
         self._before: Mapping[str, CompiledRobot] = {}
         self._lost: set[str] = set()
 
-    def enter(self, run: RecordedRun) -> RebuiltRobots:
-        """The robots of `run`. Raises `CannotReplayError`."""
+    def robots_of(self, run: RecordedRun) -> RebuiltRobots:
+        """Return the robots of `run`. Raises `CannotReplayError`."""
         protocol = self._protocol(run)
         try:
             epoch = self._epoch(run, protocol)
@@ -110,18 +119,18 @@ class Rebuilder:
             raise CannotReplayError(str(why)) from why
         self._lost.update(event.robot for event in run.events if isinstance(event, Lost))
         kept = issubclass(protocol, DynamicProtocol)
-        mindful = [name for name in parts if kept and name in before and name not in epoch.restarted]
+        continuing = [name for name in parts if kept and name in before and name not in epoch.restarted]
         lossless = run.given is None or run.given.quiet
-        return RebuiltRobots(protocol, self._hosts, parts, lossless, mindful, epoch.compiled)
+        return RebuiltRobots(protocol, self._hosts, parts, lossless, continuing, epoch.compiled)
 
     def _protocol(self, run: RecordedRun) -> type[Protocol]:
-        """The class that the run names; of a master's journal, the header's."""
+        """Return the class that the run names; in a master's journal the header names it."""
         asked = self._header.protocol if self._header else None
         if run.began is None:
             return self._named(asked or "")
         name = run.began.protocol
-        if name in self._means.protocols:
-            return self._means.protocols[name]
+        if name in self._options.protocols:
+            return self._options.protocols[name]
         found = protocol_by_class(name, filter(None, [asked]))
         if found is not None:
             return found[1]
@@ -136,7 +145,7 @@ class Rebuilder:
             raise CannotReplayError(str(unknown)) from unknown
 
     def _epoch(self, run: RecordedRun, protocol: type[Protocol]) -> Epoch:
-        if run.given is not None and not (run.given.why and self._means.team):
+        if run.given is not None and not (run.given.why and self._options.team):
             return self._as_given(run.given)
         return self._as_filed(run, protocol)
 
@@ -145,8 +154,8 @@ class Rebuilder:
         return Epoch(compiled, void_of(given), frozenset(given.fresh), brief_of(given))
 
     def _as_filed(self, run: RecordedRun, protocol: type[Protocol]) -> Epoch:
-        """What the files say, for a run whose journal does not; robots that were lost before are left out."""
-        if self._means.team is None:
+        """Return the epoch by the team's files, without robots that were lost before."""
+        if self._options.team is None:
             raise CannotReplayError(
                 "the journal does not say what the robots were given, as that of a run across machines;"
                 " name the folder with the team's files: --team DIR"
@@ -154,14 +163,14 @@ class Rebuilder:
         if run.began is not None and isinstance(run.began.epoch, int):
             raise CannotReplayError("the journal does not say what the robots were given when their problem changed")
         try:
-            filed = self._ordered(team_after_events(self._means.team, events=0))
+            filed = self._ordered(team_after_events(self._options.team, events=0))
             team = self._left(filed)
         except (OrderError, ChangeError, ValueError) as why:
             raise CannotReplayError(f"the team cannot be brought into the order of the run: {why}") from why
         seed = self._header.seed if self._header else 0
         asked = self._header.protocol if self._header else None
         if asked is None or self._named(asked) is protocol:
-            return Epoch(self._compiled(team), brief=RunParameters(seed, self._means.settings))
+            return Epoch(self._compiled(team), brief=RunParameters(seed, self._options.settings))
         there = [robot for robot in filed.robots if run.given is not None or robot.name in team]
         aside = withdrawal_cost(replace(filed, robots=tuple(there))) if protocol.traits.costs else None
         return Epoch(self._compiled(team), brief=RunParameters(seed, withdrawal_cost=aside))
@@ -183,20 +192,20 @@ class Rebuilder:
 
     def _compiled(self, team: Team) -> CompiledTeam:
         """Return `team` with those compiled who play; what did not change is not compiled again."""
-        means = self._means
+        options = self._options
 
         def compile_robot(robot: Robot) -> CompiledDomain:
             known = self._before.get(robot.name)
             return known.domain if known and known.robot == robot else compiler.compile(robot).domain
 
-        with Compiler(means.limits, means.cache, solver=means.solver) as compiler:
+        with Compiler(options.limits, options.cache, solver=options.solver) as compiler:
             compiled = CompiledTeam(team, compile_robot, self._only)
         self._before = {**self._before, **compiled.robots}
         return compiled
 
 
 def _host(protocol: type[Protocol], part: AgentProblem, before: Host | None, epoch: Epoch) -> Host:
-    """The robot of `part`: the one that was there before, if it goes on, or a new one. Raises `CannotReplayError`."""
+    """Return the host that was there before, if it goes on, or a new one. Raises `CannotReplayError`."""
     name = part.robot.name
     try:
         if before is None or name in epoch.restarted:

@@ -15,7 +15,7 @@ from robochoc.journal.journal import Header, Journal
 from robochoc.replay.inspection import Inspector, safely
 from robochoc.replay.reasons import Reasons
 from robochoc.replay.rebuild import CannotReplayError, Rebuilder, ReplayOptions
-from robochoc.replay.replay import Difference, ReplayStopsError, RunReplay
+from robochoc.replay.run_replay import ReplayStopsError, RunReplay
 from robochoc.replay.steps import RecordedStep, runs_of, steps_of
 
 
@@ -47,7 +47,7 @@ class RobotState(msgspec.Struct, frozen=True, kw_only=True):
 def states_of(
     journal: Journal | Iterable[AnyEvent],
     robot: str,
-    means: ReplayOptions | None = None,
+    options: ReplayOptions | None = None,
     *,
     header: Header | None = None,
     since: int = 0,
@@ -67,7 +67,7 @@ def states_of(
     for alone in (True, False):
         if not alone and everything is not None:
             events = tuple(everything())
-        player = _Player(header, robot, means or ReplayOptions(), alone=alone)
+        player = _Player(header, robot, options or ReplayOptions(), alone=alone)
         try:
             for state in player.states(events, since):
                 yield state
@@ -84,8 +84,8 @@ class _UnsaidError(Exception):
 class _Player:
     """Plays the robot's steps, and looks at it after each; `alone`, or with all others."""
 
-    def __init__(self, header: Header | None, robot: str, means: ReplayOptions, *, alone: bool) -> None:
-        self._cast = Rebuilder(header, means, {robot} if alone else None)
+    def __init__(self, header: Header | None, robot: str, options: ReplayOptions, *, alone: bool) -> None:
+        self._rebuilder = Rebuilder(header, options, {robot} if alone else None)
         self._header = header
         self._robot = robot
         self._alone = alone
@@ -94,12 +94,12 @@ class _Player:
     def states(self, events: Sequence[AnyEvent], since: int) -> Iterator[RobotState]:
         gone: set[str] = set()
         for run in runs_of(events):
-            ensemble = self._cast.enter(run)
-            if self._robot not in ensemble.hosts:
+            robots = self._rebuilder.robots_of(run)
+            if self._robot not in robots.hosts:
                 continue
-            scene = RunReplay(run, ensemble, self._header)
-            look = Inspector(ensemble.parts[self._robot])
-            gone.intersection_update(ensemble.mindful)
+            replay = RunReplay(run, robots, self._header)
+            inspector = Inspector(robots.parts[self._robot])
+            gone.intersection_update(robots.continuing)
             for step in steps_of(run.events):
                 if self._alone and step.robot != self._robot:
                     continue
@@ -107,7 +107,7 @@ class _Player:
                     self._step += step.robot == self._robot
                     continue
                 try:
-                    state = self._played(scene, look, step, since)
+                    state = self._played(replay, inspector, step, since)
                 except ReplayStopsError as stops:
                     if stops.unsaid and self._alone:
                         raise _UnsaidError from stops
@@ -116,30 +116,30 @@ class _Player:
                 if state is not None:
                     yield state
 
-    def _played(self, scene: RunReplay, look: Inspector, step: RecordedStep, since: int) -> RobotState | None:
+    def _played(self, replay: RunReplay, inspector: Inspector, step: RecordedStep, since: int) -> RobotState | None:
         """What the robot knows after `step`; None where the step is another's, is not whole, or is not asked for."""
         if step.robot != self._robot:
-            scene.play(step, 0)
+            replay.play(step, 0)
             return None
-        number, protocol = self._step, scene.ensemble.hosts[self._robot].protocol
+        number, protocol = self._step, replay.robots.hosts[self._robot].protocol
         self._step += 1
         wanted = step.whole and number >= since
-        reasons = Reasons(look, protocol) if wanted else None
-        difference = scene.play(step, number, reasons.listen) if reasons else scene.play(step, number)
+        reasons = Reasons(inspector, protocol) if wanted else None
+        difference = replay.play(step, number, reasons.listen) if reasons else replay.play(step, number)
         if difference is not None:
-            raise CannotReplayError(f"{self._robot} does not do again what was recorded: {in_short(difference)}")
-        heard = scene.heard
+            raise CannotReplayError(f"{self._robot} does not do again what was recorded: {difference.in_short}")
+        heard = replay.taken_in
         for sent, message in heard:
-            look.hear(sent.sender, message)
+            inspector.hear(sent.sender, message)
         if reasons is None:
             return None
         return RobotState(
             step=number,
             value=dict(protocol.assignment),
-            view=safely(lambda: look.view(protocol), []),
-            domain=[Choice(*pair) for pair in safely(lambda: look.domain(protocol), [])],
-            nogoods=safely(lambda: look.nogoods(protocol), []),
-            more=look.more(protocol),
+            view=safely(lambda: inspector.view(protocol), []),
+            domain=[Choice(*pair) for pair in safely(lambda: inspector.domain(protocol), [])],
+            nogoods=safely(lambda: inspector.nogoods(protocol), []),
+            more=inspector.more(protocol),
             why=safely(lambda: reasons.told(heard, step), []),
         )
 
@@ -149,13 +149,3 @@ class _Player:
             return None
         self._step += 1
         return RobotState(step=self._step - 1, more={"replay": f"ends here: {why}"}) if self._step > since else None
-
-
-def in_short(difference: Difference) -> str:
-    """`difference` in one line."""
-    if difference.raised:
-        return f"in its step {difference.step} the protocol raised {difference.raised}"
-    recorded = type(difference.recorded).__name__ if difference.recorded else "nothing more"
-    replayed = type(difference.replayed).__name__ if difference.replayed else "nothing more"
-    where = f"in its step {difference.step} of run {difference.run}"
-    return f"{where}, recorded is {recorded}, and replayed {replayed}"

@@ -64,7 +64,7 @@ def runs_of(events: Iterable[AnyEvent]) -> Iterator[RecordedRun]:
 
 
 def _is_one(run: RecordedRun) -> bool:
-    """Whether anybody has, or could have, done anything in it."""
+    """Return whether anybody has, or could have, done anything in it."""
     return run.given is not None or any(actor(event) is not None for event in run.events)
 
 

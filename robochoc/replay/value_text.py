@@ -55,7 +55,7 @@ class ValueText:
 
 
 def is_value(thing: object) -> bool:
-    """Whether `thing` looks like a robot's value as others see it."""
+    """Return whether `thing` looks like a robot's value as others see it."""
     return isinstance(thing, tuple) and all(part is None or type(part) is int for part in thing)
 
 

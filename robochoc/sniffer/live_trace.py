@@ -165,7 +165,7 @@ class LiveTrace:
 
 
 def _may_begin(head: bytes) -> bool:
-    """Whether a journal begins so, or may once more of it is there."""
+    """Return whether a journal begins so, or may once more of it is there."""
     return is_journal(head) or any(form.startswith(head) for form in (MAGIC, TEXT))
 
 

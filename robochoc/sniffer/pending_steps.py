@@ -32,7 +32,7 @@ class PendingStep:
         self.clock = self.checks = 0
 
     def taken_in(self) -> bool:
-        """Whether all that the step took in is known; what is goes to its packet."""
+        """Return whether all that the step took in is known; what is goes to its packet."""
         while self.received:
             if not self.received[0].under_way:
                 return False

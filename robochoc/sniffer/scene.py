@@ -69,7 +69,7 @@ class TraceScene:
         self._names = [craft.name for craft in crafts]
 
     def __bool__(self) -> bool:
-        """Whether there is anything to see."""
+        """Return whether there is anything to see."""
         return bool(self._owners)
 
     def answer(self, first: int = 0) -> dict[str, Any]:

@@ -68,7 +68,7 @@ class Session:
             pass
 
     def _replaced(self) -> bool:
-        """Whether another file has taken the place of the journal; it is the journal then."""
+        """Return whether another file has taken the place of the journal; it is the journal then."""
         if self._path is None:
             return False
         try:

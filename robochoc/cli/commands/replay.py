@@ -60,14 +60,14 @@ def replay(
     from robochoc.solver.cache import SolutionCache
 
     recorded = saved_journal(journal)
-    means = ReplayOptions(
+    options = ReplayOptions(
         team=read_team(folder) if folder else None,
         settings=protocol_settings(settings),
         limits=limits(local_solutions, local_timeout, always_ace=always_ace),
         cache=None if no_cache else SolutionCache(),
     )
     with failures_told(journal):
-        replayed = _replayed(journal, recorded, means)
+        replayed = _replayed(journal, recorded, options)
     if as_json:
         from robochoc.cli.reports.replay import result_json
 
@@ -86,7 +86,7 @@ def _altered(journal: Journal) -> bool:
     return journal.damage is not None and not journal.truncated
 
 
-def _replayed(path: Path, journal: Journal, means: ReplayOptions) -> ReplayResult:
+def _replayed(path: Path, journal: Journal, options: ReplayOptions) -> ReplayResult:
     from robochoc.cli.reports.progress import progress_line
     from robochoc.formats import on_one_line
     from robochoc.replay import CannotReplayError
@@ -94,7 +94,7 @@ def _replayed(path: Path, journal: Journal, means: ReplayOptions) -> ReplayResul
 
     try:
         with progress_line(on_one_line(journal.header.team)) as progress:
-            return play(journal, means, progress=progress)
+            return play(journal, options, progress=progress)
     except CannotReplayError as why:
         status = INVALID if why.broken or _altered(journal) else USAGE
         damage = f"it was altered: {journal.damage}; " if _altered(journal) else ""

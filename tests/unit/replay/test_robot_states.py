@@ -40,9 +40,9 @@ def pair(values: int = 3) -> Team:
     return team_of({"A": range(1, values + 1), "B": range(1, values + 1)}, [differ("A", "B")])
 
 
-def states(team: Team, robot: str, protocol: str = "abt", means: ReplayOptions | None = None) -> list[RobotState]:
+def states(team: Team, robot: str, protocol: str = "abt", options: ReplayOptions | None = None) -> list[RobotState]:
     journal = recorded(team, replace(SIMULATED, protocol=protocol))
-    return list(states_of(journal, robot, means))
+    return list(states_of(journal, robot, options))
 
 
 def test_why_a_robot_changes_its_mind() -> None:
@@ -243,7 +243,7 @@ class Odd(ABT):
 
 
 def test_what_a_user_keeps_is_shown_as_far_as_it_can_be() -> None:
-    then = states(pair(), "RB", means=ReplayOptions(protocols={"ABT": Odd}))[-1]
+    then = states(pair(), "RB", options=ReplayOptions(protocols={"ABT": Odd}))[-1]
     assert then.value == {"B": 2}
     assert then.more["table"] == "<array of 3 x 4>"
     assert then.more["secret"].startswith("{'key': deque([0, 1, 2, ")
@@ -263,7 +263,7 @@ class Broken(ABT):
 
 
 def test_a_robot_that_breaks_what_is_looked_at_has_a_state_nevertheless() -> None:
-    then = states(pair(), "RB", means=ReplayOptions(protocols={"ABT": Broken}))[-1]
+    then = states(pair(), "RB", options=ReplayOptions(protocols={"ABT": Broken}))[-1]
     assert (then.value, then.domain) == ({"B": 2}, [])
 
 

@@ -199,8 +199,8 @@ def test_who_plays_machines_again_knows_what_they_showed_and_what_it_cost_to_ste
     team = with_costs(team_of(dict.fromkeys("ABC", (1, 2)), constraints))
     cast = Rebuilder(Header(team="t", protocol="abt", runtime="network", seed=0), ReplayOptions(team=team))
     decided = Decided(t=0, robot="RA", assignment={}, clock=0)
-    cast.enter(RecordedRun(0, Began(t=0, protocol="DPOP"), None, [decided, Lost(t=1, robot="RB", why="gone")]))
-    part = cast.enter(RecordedRun(1, Began(t=0, protocol="DPOP"), None, [decided])).parts["RC"]
+    cast.robots_of(RecordedRun(0, Began(t=0, protocol="DPOP"), None, [decided, Lost(t=1, robot="RB", why="gone")]))
+    part = cast.robots_of(RecordedRun(1, Began(t=0, protocol="DPOP"), None, [decided])).parts["RC"]
     assert part.interfaces == {"RA": ("A",), "RC": ("C",)}
     assert part.parameters.withdrawal_cost == 1 + 5
 

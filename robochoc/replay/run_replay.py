@@ -1,0 +1,195 @@
+"""One recorded run, driven through its packets once more."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+
+import msgspec
+
+from robochoc.communication.host import Host
+from robochoc.journal.events import AnyEvent, Received, Sent
+from robochoc.journal.journal import Header
+from robochoc.model.message import Envelope, Message
+from robochoc.replay.channels import MessageDecoder, RecordedChannels
+from robochoc.replay.comparison import Difference, StepComparison
+from robochoc.replay.rebuild import RebuiltRobots
+from robochoc.replay.steps import RecordedRun, RecordedStep, steps_of
+
+SIMULATED = "simulator"
+"""The runtime whose schedules may delay messages: a message may then move the receiver's clock on."""
+MAX_EXTRA_MESSAGES = 10_000
+"""Messages that a replayed step may send beyond those recorded."""
+
+Listener = Callable[[str, Message], None]
+"""Called with the receiver and the message when the protocol sends it, within the step."""
+
+
+class NoEndError(Exception):
+    """A protocol has sent so many messages in one step that it may never end."""
+
+
+class ReplayStopsError(Exception):
+    """The robot cannot be followed any further.
+
+    `unsaid`: a message to it cannot be made from the journal alone, but by its sender when that is replayed too.
+    """
+
+    def __init__(self, why: str, *, unsaid: bool = False) -> None:
+        super().__init__(why)
+        self.unsaid = unsaid
+
+
+class _Outbox(list[tuple[str, Message]]):
+    """An outbox of limited size: most protocols that never end send messages on the way."""
+
+    def __init__(self, most: int, listener: Listener) -> None:
+        super().__init__()
+        self._most = most
+        self._listener = listener
+
+    def append(self, said: tuple[str, Message]) -> None:
+        """Add one message. Raises `NoEndError` when there are too many."""
+        if len(self) >= self._most:
+            raise NoEndError(f"{len(self):,} messages in one step, and no end of it")
+        super().append(said)
+        self._listener(*said)
+
+
+class RunReplay:
+    """A replay of one run: `robots` go through its steps again."""
+
+    def __init__(self, run: RecordedRun, robots: RebuiltRobots, header: Header | None) -> None:
+        self.run = run
+        self.robots = robots
+        self.taken_in: list[tuple[Sent, Message]] = []
+        """The messages that the last step took in."""
+        self._decoder = MessageDecoder(robots.protocol)
+        self._channels = RecordedChannels(run.events, self._decoder)
+        self._comparison = StepComparison(self._decoder, header)
+        self._simulated = header is None or header.runtime == SIMULATED
+        self._started: set[str] = set()
+
+    def steps(self) -> Iterator[RecordedStep]:
+        """Yield the steps in their order; each must be played before the next.
+
+        Across machines clocks differ, so that a message may seem to be received before it was sent. The step waits.
+        """
+        waiting: dict[str, deque[RecordedStep]] = {}
+        for step in steps_of(self.run.events):
+            if step.robot in waiting or not self._channels.can_deliver(step.received):
+                waiting.setdefault(step.robot, deque()).append(step)
+                continue
+            yield step
+            yield from self._now_possible(waiting)
+        for steps in waiting.values():
+            yield from steps
+
+    def _now_possible(self, waiting: dict[str, deque[RecordedStep]]) -> Iterator[RecordedStep]:
+        """Yield the steps that need not wait any longer; one that is played may let another go on."""
+        moved = True
+        while moved:
+            moved = False
+            for name, steps in list(waiting.items()):
+                while steps and self._channels.can_deliver(steps[0].received):
+                    moved = True
+                    yield steps.popleft()
+                if not steps:
+                    del waiting[name]
+
+    def play(self, step: RecordedStep, number: int, listener: Listener = lambda *_: None) -> Difference | None:
+        """Play a step, and return the first difference; None: it is the same as recorded.
+
+        Args:
+            step: The step.
+            number: Its number among its robot's steps.
+            listener: Called for each message that the protocol sends.
+
+        Raises:
+            ReplayStopsError: when the robot is not there, or a message that it took in cannot be had.
+        """
+        host = self.robots.hosts.get(step.robot)
+        if host is None:
+            raise ReplayStopsError("it is not in the team")
+        events: list[AnyEvent] = []
+        host.observe(events.append, lambda: 0.0)
+        recorded = sum(isinstance(event, Sent) for event in step.done)
+        host.protocol.outbox = _Outbox(recorded + MAX_EXTRA_MESSAGES, listener)
+        self.taken_in = []
+        sent: Sequence[Envelope] = ()
+        packet: list[Sent] = []
+        raised = ""
+        try:
+            for received in step.received:
+                message, envelope = self._delivered(received)
+                packet.append(message)
+                self._take_in(host, message, envelope)
+                self._delay(host, received, events)
+            sent = self._go_on(host, step)
+        except ReplayStopsError:
+            raise
+        except Exception as error:  # noqa: BLE001 - a protocol under development may raise anything
+            raised = _with_place(error)
+        found = self._comparison.first_difference(step, events, raised=bool(raised))
+        if found is None and not raised:
+            self._channels.send_again(sent)
+            return None
+        return self._difference(step, number, packet, found or (None, None), raised)
+
+    def _delivered(self, received: Received) -> tuple[Sent, Envelope]:
+        """Return the message that was received. Raises `ReplayStopsError`."""
+        sent, envelope = self._channels.deliver(received)
+        if sent is None:
+            raise ReplayStopsError(f"what {received.sender} had said to it ({received.type}) is not in the journal")
+        if envelope is None:
+            why = f"what {received.sender} had said to it ({received.type}) cannot be made again from the journal"
+            raise ReplayStopsError(why, unsaid=True)
+        return sent, envelope
+
+    def _take_in(self, host: Host, message: Sent, envelope: Envelope) -> None:
+        host.take_in(envelope)
+        self.taken_in.append((message, self._decoder.message(envelope.content)))
+
+    def _delay(self, host: Host, received: Received, events: list[AnyEvent]) -> None:
+        """Move the clock on by a message that was under way for longer: only the recorded clock shows it."""
+        if self._simulated and received.clock > host.clock and events and isinstance(events[-1], Received):
+            host.catch_up(received.clock)
+            events[-1] = msgspec.structs.replace(events[-1], clock=received.clock)
+
+    def _go_on(self, host: Host, step: RecordedStep) -> Sequence[Envelope]:
+        """Let the robot settle, or start; no robot starts a run twice."""
+        sent: Sequence[Envelope] = ()
+        if step.received and (step.whole or step.done):
+            sent = host.settle()
+        elif not step.received and step.robot not in self._started:
+            sent = host.start(lossless=self.robots.lossless)
+        self._started.add(step.robot)
+        return sent
+
+    def _difference(
+        self,
+        step: RecordedStep,
+        number: int,
+        packet: Sequence[Sent],
+        events: tuple[AnyEvent | None, AnyEvent | None],
+        raised: str,
+    ) -> Difference:
+        return Difference(
+            run=self.run.number,
+            protocol=self.robots.protocol.__name__,
+            robot=step.robot,
+            step=number,
+            packet=tuple(packet),
+            recorded=events[0],
+            replayed=events[1],
+            raised=raised,
+        )
+
+
+def _with_place(error: Exception) -> str:
+    """Return an exception with the file and line that raised it."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    place = f" ({trace.tb_frame.f_code.co_filename}:{trace.tb_lineno})" if trace is not None else ""
+    return f"{type(error).__name__}: {error}{place}"
