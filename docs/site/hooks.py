@@ -95,15 +95,20 @@ def protocol_pages() -> dict[str, str]:
     """Return the text of the protocols' pages and of their list, by the pages' names."""
     protocols = {offer.name: offer.protocol for offer in offers() if offer.protocol}
     pages = {f"reference/protocols/{name}.md": protocol_page(name, kind) for name, kind in protocols.items()}
-    rows = [f"| [`{name}`]({name}.md) | {title(kind)} | {purpose(kind)} | {kind.traits.paper} |"
-            for name, kind in protocols.items()]  # fmt: skip
-    text = "# Protocols\n\nOne page per protocol, from its docstring. "
-    text += (
-        "[Which protocol when](../../guides/which-protocol.md) compares them.\n\n| name | | for | paper |\n| --- | --- | --- | --- |\n"
-        + "\n".join(rows)
-        + "\n"
-    )
-    return {**pages, PROTOCOLS: text}
+    rows = [
+        f"| [`{name}`]({name}.md) | {title(kind)} | {purpose(kind)} | {kind.traits.paper} |"
+        for name, kind in protocols.items()
+    ]
+    listing = [
+        "# Protocols",
+        "",
+        "One page per protocol, from its docstring. [Which protocol when](../../guides/which-protocol.md) compares them.",
+        "",
+        "| name | | for | paper |",
+        "| --- | --- | --- | --- |",
+        *rows,
+    ]
+    return {**pages, PROTOCOLS: "\n".join(listing)}
 
 
 def protocol_page(name: str, kind: type[Protocol]) -> str:
@@ -122,9 +127,10 @@ def protocol_page(name: str, kind: type[Protocol]) -> str:
     listed = [
         f"::: {item.__module__}.{item.__qualname__}\n    options: {{heading_level: 3}}\n" for item in structs(kind)
     ]
+    whole = "{members: false, show_root_heading: false, show_root_toc_entry: false}"
     parts = [
         f"# {title(kind)}\n\n| | |\n| --- | --- |\n{table}\n",
-        f"::: {kind.__module__}\n    options: {{members: false, show_root_heading: false, show_root_toc_entry: false}}\n",
+        f"::: {kind.__module__}\n    options: {whole}\n",
         *(["## Messages and settings\n", *listed] if listed else []),
     ]
     return "\n".join(parts)

@@ -79,7 +79,7 @@ def blocks_of(text: str) -> list[Block]:
 def steps_of(text: str) -> Iterator[Step]:
     """Yield what a page has tests run, in its order."""
     blocks = blocks_of(text)
-    for block, following in zip(blocks, [*blocks[1:], Block(0, "", "")], strict=True):
+    for block, following in zip(blocks, [*blocks[1:], Block(0, "", "")], strict=bool(blocks)):
         printed = following.text if following.kind == "text" else None
         if not block.runs:
             continue
