@@ -102,7 +102,7 @@ def protocol_pages() -> dict[str, str]:
     listing = [
         "# Protocols",
         "",
-        "One page per protocol, from its docstring. [Which protocol when](../../guides/which-protocol.md) compares them.",
+        "One page per protocol, from its docstring. See also [which protocol when](../../guides/which-protocol.md).",
         "",
         "| name | | for | paper |",
         "| --- | --- | --- | --- |",

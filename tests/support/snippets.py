@@ -2,14 +2,16 @@
 
 A fenced block of the language `sh` or `console` has commands, one of `python` code; a `text` block that follows is what
 they print. In `console` blocks commands begin with `$ ` and their output stands between them. In an output `...` stands
-for any text, and seconds may differ. A command ends with status 0, or with what `# exit status N` behind it says.
+for any text; seconds and sizes of files may differ. A command ends with status 0, or with what `# exit status N`
+behind it says.
 
 A comment before a block says more of it, `<!-- snippet: WORDS -->`, of these words:
 
 - `not run: REASON`: the block cannot be run by a test;
 - `slow`: in `make test-slow` only;
 - `needs MODULE`: only where that module is installed;
-- `background`: the commands are one script that runs on beside the blocks that follow, until it ends by itself.
+- `script`: the commands are one script of the shell;
+- `background`: the same, and it runs on beside the blocks that follow, until it ends by itself.
 """
 
 from __future__ import annotations
@@ -29,11 +31,13 @@ from typing import NamedTuple
 from tests.support.program import robochoc_within
 
 _FENCE = re.compile(
-    r"(?:^ *<!-- snippet: (?P<words>.*?) -->\n+)?^(?P<indent> *)```(?P<kind>\w*)[^\n]*\n(?P<text>.*?)^(?P=indent)```$",
+    r"(?:^ *<!-- snippet: (?P<words>.*?) -->\n+)?"
+    r'^(?P<indent> *)```(?P<kind>\w*)(?: title="(?P<title>[^"]+)")?[^\n]*\n'
+    r"(?P<text>.*?)^(?P=indent)```$",
     re.MULTILINE | re.DOTALL,
 )
 _STATUS = re.compile(r"\s+# exit status (\d)$")
-_SECONDS = re.compile(r"\d[\d,]*(\.\d+)? (seconds|s)\b")
+_VARIES = re.compile(r"\b\d[\d,]*(\.\d+)?(?= (?:seconds|s|ms|MB|MiB|times as fast)\b)")
 _SERVES = re.compile(r"--sniff\b|--serve\b|--watch\b|robochoc sniff (?!.*--no-page)")
 _ALONE = {"network", "master", "robot", "directory"}
 """What leaves threads behind is run in a process of its own."""
@@ -42,12 +46,13 @@ LONG_S = 100
 
 @dataclass(frozen=True)
 class Block:
-    """A fenced block of a page: the line on which it begins, its language, its text, and the comment's words."""
+    """A fenced block of a page: the line on which it begins, its language, its text, the comment's words, its title."""
 
     line: int
     kind: str
     text: str
     words: str = ""
+    title: str = ""
 
     @property
     def runs(self) -> bool:
@@ -56,7 +61,7 @@ class Block:
 
 
 class Step(NamedTuple):
-    """What is run at once, and what it is said to print, or None if the page does not say."""
+    """What is run at once, and what it is said to print, or None if the page does not say; or a file to write."""
 
     line: int
     kind: str
@@ -72,20 +77,22 @@ def blocks_of(text: str) -> list[Block]:
         depth = len(match["indent"])
         lines = "".join(line[depth:] if line.strip() else line for line in match["text"].splitlines(keepends=True))
         line = text.count("\n", 0, match.start("kind")) + 1
-        found.append(Block(line, match["kind"], lines, (match["words"] or "").strip()))
+        found.append(Block(line, match["kind"], lines, match["words"] or "", match["title"] or ""))
     return found
 
 
 def steps_of(text: str) -> Iterator[Step]:
     """Yield what a page has tests run, in its order."""
     blocks = blocks_of(text)
-    for block, following in zip(blocks, [*blocks[1:], Block(0, "", "")], strict=bool(blocks)):
+    for block, following in zip(blocks, [*blocks, Block(0, "", "")][1:], strict=True):
         printed = following.text if following.kind == "text" else None
-        if not block.runs:
+        if block.title:
+            yield Step(block.line, "file", block.text, None, block.title)
+        elif not block.runs:
             continue
-        if block.kind == "console":
+        elif block.kind == "console":
             yield from _console(block)
-        elif block.kind == "python" or "background" in block.words:
+        elif block.kind == "python" or {"script", "background"} & {*block.words.split()}:
             yield Step(block.line, block.kind, block.text, printed, block.words)
         else:
             commands = block.text.replace("\\\n", " ").strip().splitlines()
@@ -116,7 +123,7 @@ def agrees(said: str, printed: str) -> bool:
 
 def _plain(text: str) -> str:
     lines = [line.rstrip() for line in text.strip().splitlines()]
-    return _SECONDS.sub("N s", "\n".join(lines))
+    return _VARIES.sub("N", "\n".join(lines))
 
 
 # Running
@@ -142,6 +149,10 @@ class Reader:
 
     def run(self, step: Step) -> None:
         """Do one step, and compare what it prints."""
+        if step.kind == "file":
+            (self._folder / step.words).parent.mkdir(parents=True, exist_ok=True)
+            (self._folder / step.words).write_text(self._here(step.code))
+            return
         if "background" in step.words:
             self._background.append((step, self._started(self._here(step.code))))
             return
@@ -159,8 +170,9 @@ class Reader:
     def stop(self) -> None:
         """End what still runs in the background."""
         for _, process in self._background:
-            os.killpg(process.pid, signal.SIGTERM)
-            process.communicate(timeout=LONG_S)
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGTERM)
+                process.communicate(timeout=LONG_S)
 
     def _here(self, code: str) -> str:
         for said, here in self._said.items():
@@ -171,7 +183,7 @@ class Reader:
         where = f"line {step.line}: {step.code.strip()}"
         output = done.output
         for said, here in self._said.items():
-            output = output.replace(here, said)
+            output = output.replace(here, said) if said in step.code else output
         assert done.status == status, f"{where}\nended with status {done.status}\n{output}"
         if step.printed is not None:
             assert agrees(step.printed, output), f"{where}\nsaid:\n{step.printed}\nprinted:\n{output}"
@@ -197,6 +209,8 @@ class Reader:
 
     def _words(self, command: str) -> tuple[list[str], str] | None:
         """Return the words of a plain call of the program and the file that takes its output, or None for a shell."""
+        if "\n" in command.strip():
+            return None
         words = shlex.split(command, comments=True)
         target = ""
         if len(words) > 2 and words[-2] == ">":
