@@ -7,14 +7,14 @@ import statistics
 from measure import RUNS, say, spread
 from report import Row, Section
 
-from robochoc.flight.flight import Conditions, Flown, fly
+from robochoc.flight.flight import FlightConditions, FlightLog, fly
 from robochoc.flight.mission import Mission, mission_of
 from robochoc.flight.quadrotor.simulation import DT
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Outcome, Verdict
 
 SIZES = (4, 7, 11)
-WIND = Conditions(wind=(3.0, 4.0, 0.0), gusts=1.0)
+WIND = FlightConditions(wind=(3.0, 4.0, 0.0), gusts=1.0)
 
 
 def measured() -> Section:
@@ -35,14 +35,14 @@ def _speed() -> list[Row]:
     ]
     for n in SIZES:
         mission = _mission(n)
-        for air, conditions in (("calm", Conditions()), ("wind", WIND)):
+        for air, conditions in (("calm", FlightConditions()), ("wind", WIND)):
             say(f"flight, {len(mission.drones)} drones, {air}")
             runs = [fly(mission, conditions) for _ in range(RUNS)]
             rows.append(_row(air, runs))
     return rows
 
 
-def _row(air: str, runs: list[Flown]) -> Row:
+def _row(air: str, runs: list[FlightLog]) -> Row:
     flown = runs[0]
     drones = len(flown.names)
     rates = [run.simulated_s / run.wall_s for run in runs]

@@ -23,7 +23,7 @@ from robochoc.model.problem import Team
 from robochoc.run.defaults import default_protocol
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.orchestrator import solve
-from robochoc.run.registry import UnknownProtocolError, offers
+from robochoc.run.registry import UnknownProtocolError, installed_spelling, offers
 from robochoc.run.scenario import Environment
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class Problem:
         `if __name__ == "__main__":`.
         """
         asked = Options(
-            protocol=protocol or default_protocol(self.team.kind),
+            protocol=installed_spelling(protocol) if protocol else default_protocol(self.team.kind),
             runtime=Runtime(runtime),
             order=Order(order) if order else None,
             withdraw=Withdrawal(withdraw) if withdraw else None,

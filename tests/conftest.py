@@ -14,11 +14,11 @@ from robochoc.authority.authority import Authority
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from tests.support.authorities import Clock, Seen
-from tests.support.desks import Desk, open_files
-from tests.support.machines import Site
+from tests.support.authority_service import AuthorityService, open_files
+from tests.support.deployments import Deployment
 
 if TYPE_CHECKING:
-    from tests.support.sniffed import Served
+    from tests.support.sniffer_server import SnifferServer
 
 # How long an example takes says something of the machine, and nothing of what is tested.
 settings.register_profile("robochoc", deadline=None)
@@ -39,8 +39,8 @@ def in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def site(tmp_path: Path) -> Iterator[Site]:
-    with Site(tmp_path) as site:
+def site(tmp_path: Path) -> Iterator[Deployment]:
+    with Deployment(tmp_path) as site:
         yield site
 
 
@@ -68,9 +68,9 @@ def authority(tmp_path: Path, clock: Clock, seen: Seen) -> Authority:
 
 
 @pytest.fixture
-def desk(tmp_path: Path) -> Iterator[Desk]:
+def desk(tmp_path: Path) -> Iterator[AuthorityService]:
     before = threading.active_count(), open_files()
-    desk = Desk(tmp_path / "authority")
+    desk = AuthorityService(tmp_path / "authority")
     with desk.server:
         yield desk
     assert (threading.active_count(), open_files()) == before, "nothing is left behind"
@@ -97,14 +97,14 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture(scope="module")
-def server(without_the_scenes_viewer: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+def server(without_the_scenes_viewer: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[SnifferServer]:
     """A page of the journal `sniffer_pages.WHOLE`."""
     from robochoc.sniffer.session import Session  # noqa: PLC0415 - see above
-    from tests.support.sniffed import served  # noqa: PLC0415 - see above
     from tests.support.sniffer_pages import WHOLE  # noqa: PLC0415 - see above
+    from tests.support.sniffer_server import sniffer_server  # noqa: PLC0415 - see above
 
     del without_the_scenes_viewer  # it only has to be there before the page is made
     file = tmp_path_factory.mktemp("sniffed") / "run.journal"
     file.write_bytes(WHOLE)
-    with served(Session(file)) as running:
+    with sniffer_server(Session(file)) as running:
         yield running

@@ -1,4 +1,4 @@
-"""The group of commands, and the exit status of whatever they run into."""
+"""The group of commands, and the exit status of errors."""
 
 from __future__ import annotations
 
@@ -23,35 +23,36 @@ Exit status:
 
 
 COMMANDS = {
-    "animate": ("animate", "Make the 3D scene of a saved result or journal."),
-    "authority": ("authority", "Say who may take part on several machines: enrol, list, revoke."),
+    "animate": ("animate", "Write or show the 3D scene of a saved result."),
+    "authority": ("authority", "Enrol and revoke robots for runs on several machines."),
     "cache": ("cache", "Show or clear the cache of solved local problems."),
-    "compile": ("compile_team", "Compile robots' local problems, and show what they come to."),
-    "directory": ("directory", "Ask a running master who is there, and offers what."),
-    "export": ("export", "Write a team's whole problem for other solvers."),
-    "fly": ("fly", "Fly a saved result: simulated drones, a page, ROS."),
-    "generate": ("generate", "Write a team of a known family."),
-    "journal": ("journal", "What is in a journal, and exports of it."),
-    "master": ("master", "Lead a team whose robots are on machines of their own."),
-    "protocols": ("protocols", "List the protocols that are installed, or explain one."),
-    "replay": ("replay", "Play a journal again, and say where the protocol does something else."),
-    "robot": ("robot", "Be one robot, on its own machine, in a master's run."),
-    "sniff": ("sniff", "Look into what robots said: a page on this machine."),
+    "compile": ("compile_team", "Compile the robots' local problems, and show their sizes."),
+    "completion": ("completion", "Print the script for completion in bash, zsh or fish."),
+    "directory": ("directory", "List the agents of a running master, and their services."),
+    "export": ("export", "Write a team's problem for other solvers (XCSP3)."),
+    "fly": ("fly", "Simulate the flight of a saved result: 3D scene, ROS."),
+    "generate": ("generate", "Write a team of a problem family."),
+    "journal": ("journal", "Summarise or export a journal."),
+    "master": ("master", "Lead a team whose robots run on other machines."),
+    "protocols": ("protocols", "List the installed protocols, or explain one."),
+    "replay": ("replay", "Replay a journal, and compare it with the protocol of today."),
+    "robot": ("robot", "Run one robot on this machine, in the run of a master."),
+    "sniff": ("sniff", "Show and explain the messages of a run on a page."),
     "solve": ("solve", "Solve teams, each robot in its own process."),
-    "validate": ("validate", "Check teams, and tell every mistake with file and line."),
+    "validate": ("validate", "Check teams, and print all errors with file and line."),
 }
-"""Of each command its function in the module of its name, and its line in `robochoc --help`, which imports none."""
+"""Each command: its function in the module of its name, and its line in `robochoc --help`, which imports no command."""
 
 
 class Commands(click.Group):
-    """The commands, each imported when it is asked for: nobody waits for the others."""
+    """The group of commands. A command is imported when it is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's
-        """All names, sorted."""
+        """Return all names, sorted."""
         return [*COMMANDS]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - click's
-        """The command of that name, if there is one."""
+        """Return the command of that name, or None."""
         if cmd_name not in COMMANDS:
             return None
         command: click.Command = resolve_name(f"robochoc.cli.commands.{cmd_name}:{COMMANDS[cmd_name][0]}")
@@ -65,7 +66,7 @@ class Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """As click's, and says what may have been meant."""
+        """Resolve as click does, and suggest the nearest name if there is no such command."""
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:
@@ -77,14 +78,15 @@ class Commands(click.Group):
             raise click.UsageError(f"{error.message} Did you mean {near[0]!r}?", ctx) from None
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]}, epilog=EXIT_STATUS)
+@click.group(
+    cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}, epilog=EXIT_STATUS
+)
 @click.version_option(__version__, prog_name="robochoc")
 def cli() -> None:
-    """Teams of robots that solve constraint problems together.
+    """Distributed constraint solving by teams of robots.
 
-    Each robot knows only its own XML file, runs as its own OS process, and talks to its neighbours by messages of
-    a distributed protocol until the team has a solution, the cheapest one where there are costs, or a
-    proof that there is none.
+    Each robot reads only its own XML file, runs as its own OS process, and exchanges messages of a distributed protocol
+    with its neighbours. The team finds a solution (with costs: an optimum) or proves that there is none.
 
     \b
     robochoc generate queens3d --n 4

@@ -89,11 +89,11 @@ class Failed(_Control, frozen=True):
 class Begin(_Control, frozen=True):
     """All robots are there: search. `began` is the run's beginning, on the monotonic clock.
 
-    `quiet`: no message of the epoch before was lost.
+    `lossless`: no message of the epoch before was lost.
     """
 
     began: float
-    quiet: bool
+    lossless: bool
 
 
 class Pause(_Control, frozen=True):

@@ -88,14 +88,14 @@ class Host:
         """Constraint checks so far."""
         return self.protocol.problem.checks
 
-    def start(self, *, quiet: bool = True) -> list[Envelope]:
+    def start(self, *, lossless: bool = True) -> list[Envelope]:
         """Begin the search, or go on with it after a change; returns what the robot says first.
 
-        `quiet` says whether no message of the epoch before was lost.
+        `lossless` says whether no message of the epoch before was lost.
         """
         protocol = self.protocol
         if self._begun and isinstance(protocol, DynamicProtocol):
-            return self._step(lambda: protocol.resume(quiet=quiet))
+            return self._step(lambda: protocol.resume(lossless=lossless))
         self._begun = True
         return self._step(protocol.start)
 

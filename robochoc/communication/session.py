@@ -16,15 +16,18 @@ from robochoc.solver.explanation import Invalidated
 
 
 class Epoch(NamedTuple):
-    """What the team has to solve from now on.
+    """One problem that the team solves, between two changes.
 
-    `void` is what of the epoch before no longer stands; the robots in `fresh` begin anew, though there may have been
-    others of their names before; `brief` is what robots are told beside the problem.
+    Attributes:
+        compiled: The team, with compiled domains.
+        void: What of the epoch before no longer holds.
+        restarted: Robots that begin anew, though there may have been others of their names before.
+        brief: What robots are given besides the problem.
     """
 
     compiled: CompiledTeam
     void: Invalidated = Invalidated(frozenset(), frozenset())
-    fresh: frozenset[str] = frozenset()
+    restarted: frozenset[str] = frozenset()
     brief: RunParameters = NO_BRIEF
 
     @property
@@ -35,7 +38,7 @@ class Epoch(NamedTuple):
     def parts(self, protocol: type[Protocol]) -> dict[str, AgentProblem]:
         """What each robot knows when it speaks `protocol`."""
         traits = protocol.traits
-        return agent_problems(self.compiled, self.brief, everywhere=traits.everywhere, tree=traits.tree)
+        return agent_problems(self.compiled, self.brief, shared_scopes=traits.shared_scopes, tree=traits.tree)
 
 
 class Session(ABC):
@@ -57,7 +60,7 @@ class Session(ABC):
 
     @property
     @abstractmethod
-    def quiet(self) -> bool:
+    def lossless(self) -> bool:
         """Whether no message of the search before was lost: it came to rest, or there was none. Robots are told."""
 
     @abstractmethod

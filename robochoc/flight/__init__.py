@@ -1,1 +1,1 @@
-"""Where drones fly, whatever tells them: missions, routes, and the simulated quadrotor."""
+"""Flights of drones: missions, routes that keep a distance, and the simulated quadrotor. Nothing of ROS."""

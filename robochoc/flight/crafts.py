@@ -1,4 +1,4 @@
-"""Who takes part: one craft per robot, or one per place where a robot decides about several.
+"""Crafts: one drone per robot, or one per place where a robot decides about several places.
 
 A craft's cell and level come from the first of these that fits: the coordinates of its topic under the assignment;
 the two numbers its name ends in (`Robot3.1`, `V3.1`), with its first value for the level; its first value alone.
@@ -21,66 +21,67 @@ Cell = tuple[int, int]
 # Longer numbers are dates or serial numbers, not rows.
 _ROW_AND_COLUMN = re.compile(r"(?<![0-9])([0-9]{1,4})[._,:;-]([0-9]{1,4})$")
 
-_FARTHEST = 10**300
-"""Numbers beyond it, which no floating point can hold, are drawn there."""
-_MOST_DECISIONS = 1_000
-"""Of a robot whose places are all looked at before it decides."""
+_COORDINATE_MAX = 10**300
+"""Larger numbers do not fit into floating point; they are cut to this one."""
+_DECISIONS_MAX = 1_000
+"""All possible places of a robot with more decisions than that are not listed."""
 
 
 @dataclass(frozen=True)
 class Craft:
-    """A drone before the layout: what is known of where it belongs. It flies when it has a level."""
+    """A drone before it has a place in the layout. It flies when it has a level."""
 
     name: str
     cell: Cell | None = None
     level: int | None = None
     robot: str = ""
-    """Who decides about it; empty where only a variable is known."""
+    """The robot that decides about it; empty where only a variable is known."""
     topic: Topic | None = None
-    """Where its decisions are published, if its file says so."""
+    """The topic of its waypoints, if its file names one."""
     decided_by: tuple[str, ...] = field(default=(), compare=False)
     """The variables on which its place depends."""
 
 
-def numbers(name: str) -> Cell | None:
-    """The row and the column that a name such as `Robot3.1` ends in."""
+def row_and_column(name: str) -> Cell | None:
+    """Return the row and the column that a name such as `Robot3.1` ends in."""
     found = _ROW_AND_COLUMN.search(name)
     return (int(found[1]), int(found[2])) if found else None
 
 
-def lone_craft(variable: str, values: Assignment) -> Craft:
-    """The craft of `variable`, of whose robot nothing else is known."""
+def craft_of_variable(variable: str, values: Assignment) -> Craft:
+    """Return the craft of `variable`, where nothing else is known of its robot."""
     return _craft(variable, [variable], None, values)
 
 
 def crafts_of(robot: Robot, values: Assignment) -> list[Craft]:
-    """One craft per topic that has coordinates, or per variable that names a cell, or one for the robot."""
+    """Return one craft per topic that has coordinates, or per variable that names a cell, or one for the robot."""
     own = [variable.name for variable in robot.variables]
     topics = [topic for topic in robot.topics if topic.x is not None and topic.y is not None]
     if len(topics) > 1:
         named = zip(_short_names(topics), topics, strict=True)
-        crew = [_craft(name, own, topic, values) for name, topic in named]
-    elif not topics and len(own) > 1 and all(numbers(name) for name in own):
+        crafts = [_craft(name, own, topic, values) for name, topic in named]
+    elif not topics and len(own) > 1 and all(row_and_column(name) for name in own):
         topics = [topic for topic in robot.topics[: len(own)] if len(robot.topics) == len(own)]
         named_topics = zip_longest(own, topics)
-        crew = [_craft(name, [name], topic, values) for name, topic in named_topics]
+        crafts = [_craft(name, [name], topic, values) for name, topic in named_topics]
     else:
         topics = topics or [*robot.topics[:1]]
-        crew = [_craft(robot.name, own, topics[0] if topics else None, values)]
-    return [replace(craft, robot=robot.name) for craft in crew]
+        crafts = [_craft(robot.name, own, topics[0] if topics else None, values)]
+    return [replace(craft, robot=robot.name) for craft in crafts]
 
 
 def possible_crafts(robot: Robot) -> Iterator[Craft]:
-    """The crafts of `robot` for all that it might decide; none where that would be too much to look at."""
-    if 0 < prod(len(own.domain) for own in robot.variables) <= _MOST_DECISIONS:
+    """Yield the crafts of `robot` for all that it might decide; none if there are too many decisions."""
+    if 0 < prod(len(own.domain) for own in robot.variables) <= _DECISIONS_MAX:
         names = [own.name for own in robot.variables]
         for decided in product(*(own.domain for own in robot.variables)):
             yield from crafts_of(robot, dict(zip(names, decided, strict=True)))
 
 
 def _craft(name: str, variables: Sequence[str], topic: Topic | None, values: Assignment) -> Craft:
-    """The craft `name`, whose cell is its topic's, or else the one that its own or its first variable's name says."""
-    cells = [_sent(topic, values) if topic else None, numbers(name), *(numbers(first) for first in variables[:1])]
+    """Return the craft `name`. Its cell is its topic's, or the one in its name, or in its first variable's name."""
+    named = (row_and_column(one) for one in (name, *variables[:1]))
+    cells = [_cell_of(topic, values) if topic else None, *named]
     known = [values[own] for own in variables if own in values]
     level = None
     if known:
@@ -91,7 +92,7 @@ def _craft(name: str, variables: Sequence[str], topic: Topic | None, values: Ass
 
 
 def _decided_by(topic: Topic | None, variables: Sequence[str]) -> tuple[str, ...]:
-    """The variables in the coordinates that `topic` gives, and the one that is the level where it gives none."""
+    """Return the variables in the coordinates of `topic`, and the one that is the level where it gives none."""
     across = [topic.x, topic.y] if topic else []
     height = topic.z if topic else None
     given = [*(across if None not in across else []), height]
@@ -99,13 +100,13 @@ def _decided_by(topic: Topic | None, variables: Sequence[str]) -> tuple[str, ...
     return tuple(dict.fromkeys([*found, *(variables[:1] if height is None else [])]))
 
 
-def _sent(topic: Topic, values: Assignment) -> Cell | None:
+def _cell_of(topic: Topic, values: Assignment) -> Cell | None:
     x, y = _value(topic.x, values), _value(topic.y, values)
     return None if x is None or y is None else (x, y)
 
 
 def _value(expression: Expression | None, values: Assignment) -> int | None:
-    """What `expression` comes to, or nothing: it may be undefined, or about variables without a value."""
+    """Return the value of `expression`; None if it is undefined, or a variable has no value."""
     if expression is None:
         return None
     try:
@@ -115,10 +116,10 @@ def _value(expression: Expression | None, values: Assignment) -> int | None:
 
 
 def _bounded(value: int) -> int:
-    return max(-_FARTHEST, min(value, _FARTHEST))
+    return max(-_COORDINATE_MAX, min(value, _COORDINATE_MAX))
 
 
 def _short_names(topics: Sequence[Topic]) -> list[str]:
-    """`drone3.1` for `/drone3.1/waypoint3.1`, unless that is no name of its own."""
+    """Return `drone3.1` for `/drone3.1/waypoint3.1`; the whole topics if these names would not be unique."""
     first = [topic.name.strip("/").partition("/")[0] for topic in topics]
     return first if len(set(first)) == len(topics) else [topic.name for topic in topics]

@@ -8,7 +8,7 @@ What may happen on the way:
 - An obstacle, a point, is where nobody expected it: nearer than `KEEP_M` to somebody's goal (or than the planned
   distance, if that is more). Of these the planner knows nothing before one is seen; all others it avoids. Whoever is
   about to come so near to one sees it from `SIGHT_M` away at the latest: what is to be kept, the way on which the
-  common clock stops (`quadrotor/course.py`), and `_LOOK_M` for tracking and for looking only at samples.
+  common clock stops (`quadrotor/trajectory.py`), and `_LOOK_M` for tracking and for looking only at samples.
 - Somebody cannot follow: no leg waits for it longer than `SETTLING_S` after its plan is over.
 """
 
@@ -21,28 +21,36 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from robochoc.flight.log import SAMPLE_RATE_HZ, ClosestApproach, FlightEvent, FlightLog, LegTimes
 from robochoc.flight.mission import Goal, Mission
 from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.bounds import check_homes, check_length, check_near, check_ways, origin_of
-from robochoc.flight.quadrotor.conditions import LEAST_M, Conditions, Failure
-from robochoc.flight.quadrotor.course import STOP_S, Course
-from robochoc.flight.quadrotor.flown import SAMPLES_A_SECOND, Flown, Happening, Stage
-from robochoc.flight.quadrotor.nearest import Nearest
-from robochoc.flight.quadrotor.obstacles import Threat, threats
-from robochoc.flight.quadrotor.simulation import DT, Simulation
-from robochoc.flight.quadrotor.spots import gaps, nearest_two
-from robochoc.flight.quadrotor.targets import Hazards, Targets, check_apart, waits
+from robochoc.flight.quadrotor.conditions import LEAST_M, FlightConditions, MotorFailure
+from robochoc.flight.quadrotor.free_points import nearest_distances, nearest_two
+from robochoc.flight.quadrotor.goals import Hazards, LegGoals, check_separation, start_delays
+from robochoc.flight.quadrotor.obstacles import ObstacleEncounter, encounters
+from robochoc.flight.quadrotor.simulation import DT, QuadrotorSimulation
+from robochoc.flight.quadrotor.trajectory import STOP_S, Trajectory
 from robochoc.flight.reports import Blocked, OutOfOrder, Report
-from robochoc.flight.routes.motion import Limits
-from robochoc.flight.routes.timetable import NoRouteError, TooCloseError, plan
+from robochoc.flight.routes.motion import MotionLimits
+from robochoc.flight.routes.timetable import NoRouteError, TooCloseError, plan_routes
 
-__all__ = ["Conditions", "Failure", "Flight", "Flown", "Happening", "Nearest", "Stage", "fly"]
+__all__ = [
+    "ClosestApproach",
+    "Flight",
+    "FlightConditions",
+    "FlightEvent",
+    "FlightLog",
+    "LegTimes",
+    "MotorFailure",
+    "fly",
+]
 
 DISTANCE_M = 0.5
 """Between drones' middles, where nothing else is said and nobody's place is nearer to another's."""
 _SHARE = 0.8
 """Of the nearest two homes or goals, where these are nearer."""
-LIMITS = Limits()
+LIMITS = MotionLimits()
 KEEP_M = 0.5
 SIGHT_M = 1.5
 _LOOK_M = 0.2
@@ -71,7 +79,7 @@ class Flight:
         self,
         names: Sequence[str],
         homes: Array,
-        conditions: Conditions,
+        conditions: FlightConditions,
         progress: Callable[[str], None] | None = None,
     ) -> None:
         homes = np.array(homes, dtype=np.float64).reshape(-1, 3)
@@ -84,37 +92,39 @@ class Flight:
         self._homes = homes - self._origin
         self._ground = float(self._homes[:, 2].min())
         self._distance = conditions.distance or _distance([self._homes])
-        check_apart("homes", self.names, {number: (x, y, z) for number, (x, y, z) in enumerate(homes)}, self._distance)
+        check_separation(
+            "homes", self.names, {number: (x, y, z) for number, (x, y, z) in enumerate(homes)}, self._distance
+        )
         check_near(["an obstacle"] * len(conditions.obstacles), conditions.obstacles)
         self._obstacles = np.array(conditions.obstacles, dtype=np.float64).reshape(-1, 3) - self._origin
         self._known = np.zeros(len(self._obstacles), dtype=np.bool_)
         self._seen_s = [0.0] * len(self._obstacles)
         self._asked: dict[int, Goal] = {}
-        self._stages: list[Stage] = []
+        self._legs: list[LegTimes] = []
         self._wall_s = 0.0
-        self._simulation = Simulation(self.names, self._homes, self._ground, conditions)
+        self._simulation = QuadrotorSimulation(self.names, self._homes, self._ground, conditions)
         self._hovers = False
 
-    def fly(self, title: str, goals: Mapping[int, Goal], *, heed: bool = False) -> tuple[Report, ...]:
+    def fly(self, title: str, goals: Mapping[int, Goal], *, stop_on_report: bool = False) -> tuple[Report, ...]:
         """One leg, from where everybody is, to these goals by drones' numbers; who has none stays.
 
-        With `heed` everybody stops and hovers as soon as somebody has something to report; this is returned, and the
-        goals are not reached. Raises `ValueError` where two goals are nearer to each other than the distance to keep,
-        somebody has too far to fly, or what lies there leaves no way.
+        With `stop_on_report` everybody stops and hovers as soon as somebody has something to report; this is returned,
+        and the goals are not reached. Raises `ValueError` where two goals are nearer to each other than the distance to
+        keep, somebody has too far to fly, or what lies there leaves no way.
         """
         began = time.perf_counter()
         with np.errstate(all="ignore"):  # the simulation looks for numbers that are none
-            targets = self._targets(goals)
-            if not self._stages:
+            leg_goals = self._leg_goals(goals)
+            if not self._legs:
                 self._stay()
             begins_s = self._simulation.now_s
-            reports = self._leg(targets, heed=heed)
-        self._stages.append(Stage(title, begins_s, self._simulation.now_s))
+            reports = self._leg(leg_goals, stop_on_report=stop_on_report)
+        self._legs.append(LegTimes(title, begins_s, self._simulation.now_s))
         self._hovers = False
         self._wall_s += time.perf_counter() - began
         return reports
 
-    def flown(self) -> Flown:
+    def flown(self) -> FlightLog:
         """All that was flown until now, and a second of hovering."""
         began = time.perf_counter()
         if not self._hovers:
@@ -124,16 +134,16 @@ class Flight:
         simulation = self._simulation
         times, positions, attitudes = simulation.record()
         self._wall_s += time.perf_counter() - began
-        return Flown(
+        return FlightLog(
             names=self.names,
             times=times,
             positions=positions + self._origin if self._origin.any() else positions,
             attitudes=attitudes,
-            stages=tuple(self._stages),
-            happenings=tuple(simulation.happenings),
+            legs=tuple(self._legs),
+            events=tuple(simulation.events),
             errors_m=self._errors(),
-            nearest=simulation.watch.nearest,
-            nearest_fallen=simulation.watch.nearest_fallen,
+            nearest=simulation.separation.nearest,
+            nearest_fallen=simulation.separation.nearest_fallen,
             distance=self._distance,
             obstacles=self.conditions.obstacles,
             seen_s=tuple(self._seen_s),
@@ -151,7 +161,7 @@ class Flight:
         for _ in range(round(_STILL_S / DT)):
             self._simulation.advance()
 
-    def _targets(self, goals: Mapping[int, Goal]) -> Targets:
+    def _leg_goals(self, goals: Mapping[int, Goal]) -> LegGoals:
         if strange := [number for number in goals if not 0 <= number < len(self.names)]:
             raise ValueError(f"there are {len(self.names)} drones, from number 0 on, and no number {strange[0]}")
         simulation = self._simulation
@@ -161,64 +171,66 @@ class Flight:
             self._distance = min(self._distance, _distance([places]))
         moved = [(x, y, z) for x, y, z in (places - self._origin).tolist()]
         goals = {number: replace(goal, at=at) for (number, goal), at in zip(goals.items(), moved, strict=True)}
-        targets = Targets(self.names, goals, simulation.reference[:3].T, simulation.lost, self._distance)
+        leg_goals = LegGoals(self.names, goals, simulation.reference[:3].T, simulation.lost, self._distance)
         self._asked.update(goals)
-        return targets
+        return leg_goals
 
-    def _leg(self, targets: Targets, *, heed: bool) -> tuple[Report, ...]:
-        """Plan and fly; without `heed`, again and again as long as obstacles are found."""
+    def _leg(self, leg_goals: LegGoals, *, stop_on_report: bool) -> tuple[Report, ...]:
+        """Plan and fly; without `stop_on_report`, again and again as long as obstacles are found."""
         simulation = self._simulation
         told = len(simulation.broken)
-        wishes = targets.places.copy()
-        delays = waits(targets.goals, self._homes)
+        wishes = leg_goals.places.copy()
+        delays = start_delays(leg_goals.goals, self._homes)
         reports: list[Report] = []
         while True:
-            course, watched = self._course(targets, wishes, delays)
-            seen = self._follow(course, watched, told if heed else None)
+            trajectory, watched = self._trajectory(leg_goals, wishes, delays)
+            seen = self._follow(trajectory, watched, told if stop_on_report else None)
             reports += seen
-            if heed or not seen:
+            if stop_on_report or not seen:
                 break
             wishes = simulation.reference[:3].T.copy()
             delays = np.zeros_like(delays)
         failed = [OutOfOrder(self.names[drone], why, at_s) for drone, why, at_s in simulation.broken[told:]]
-        if not (heed and (reports or failed)):
+        if not (stop_on_report and (reports or failed)):
             self._tell_unfinished()
-        return tuple(sorted([*reports, *failed], key=lambda report: report.at_s)) if heed else ()
+        return tuple(sorted([*reports, *failed], key=lambda report: report.at_s)) if stop_on_report else ()
 
-    def _course(self, targets: Targets, wishes: Array, delays: Array) -> tuple[Course, list[Threat]]:
+    def _trajectory(
+        self, leg_goals: LegGoals, wishes: Array, delays: Array
+    ) -> tuple[Trajectory, list[ObstacleEncounter]]:
         """The plan from where everybody is wanted now, and whom it brings near to obstacles that nobody knows of."""
         simulation = self._simulation
         starts = simulation.reference[:3].T.copy()
-        check_ways(self.names, starts, targets.places)
-        keep = self._keep(targets.planned(starts))
-        ends = np.array([goal.at for goal in targets.goals.values()]).reshape(-1, 3)
-        known = self._known | (gaps(self._obstacles, ends) >= keep)
+        check_ways(self.names, starts, leg_goals.places)
+        keep = self._keep(leg_goals.planned(starts))
+        ends = np.array([goal.at for goal in leg_goals.goals.values()]).reshape(-1, 3)
+        known = self._known | (nearest_distances(self._obstacles, ends) >= keep)
         fallen = simulation.places[simulation.lost & ~simulation.falling]
         points = np.vstack((fallen, self._obstacles[known]))
         radii = np.concatenate((np.full(len(fallen), self._distance), np.full(int(known.sum()), keep)))
         hazards = Hazards(points, radii)
-        for drone, what in targets.give_way(hazards, wishes, self._ground):
-            simulation.tell(drone, what)
-        planned = targets.planned(starts, hazards)
-        simulation.leave(planned - self._distance)
-        who = targets.who
+        for drone, what in leg_goals.give_way(hazards, wishes, self._ground):
+            simulation.log_event(drone, what)
+        planned = leg_goals.planned(starts, hazards)
+        simulation.set_spare_distance(planned - self._distance)
+        who = leg_goals.who
         self._progress(f"ways for {len(who)} drones are looked for")
         try:
-            way = plan(
+            way = plan_routes(
                 starts[who],
-                targets.places[who],
+                leg_goals.places[who],
                 distance=planned,
-                standing=targets.standing(hazards, starts, planned),
-                waits=delays[who],
+                standing=leg_goals.standing(hazards, starts, planned),
+                delays=delays[who],
                 limits=LIMITS,
                 ground=self._ground,
             )
         except (TooCloseError, NoRouteError) as refused:
             raise ValueError(self._told(refused, who)) from refused
         check_length(len(self.names), simulation.now_s + way.duration_s)
-        course = Course(way, who, simulation.reference)
+        trajectory = Trajectory(way, who, simulation.reference)
         unknown = {int(number): self._obstacles[number] for number in np.flatnonzero(~known)}
-        return course, threats(course, unknown, keep)
+        return trajectory, encounters(trajectory, unknown, keep)
 
     def _told(self, refused: TooCloseError | NoRouteError, who: npt.NDArray[np.intp]) -> str:
         """The same with the names of those that it is about: the plan knows only their places in `who`."""
@@ -233,8 +245,8 @@ class Flight:
         """How far to stay from obstacles."""
         return max(KEEP_M, planned)
 
-    def _follow(self, course: Course, watched: Sequence[Threat], told: int | None) -> list[Blocked]:
-        """Fly the course to its end, or to where it was stopped for what is seen.
+    def _follow(self, trajectory: Trajectory, watched: Sequence[ObstacleEncounter], told: int | None) -> list[Blocked]:
+        """Fly the trajectory to its end, or to where it was stopped for what is seen.
 
         Unless `told` is None, it is stopped as well once more than so many have broken down.
         """
@@ -243,52 +255,56 @@ class Flight:
         waited = 0.0
         while True:
             late = waited > _LATE_S
-            simulation.advance(course, late=late)
+            simulation.advance(trajectory, late=late)
             if not simulation.is_sampled:
                 continue
-            self._progress(f"leg {len(self._stages) + 1}, {course.s:.1f} s of {course.plan.duration_s:.1f} s flown")
-            reports += self._look(course, watched)
+            self._progress(
+                f"leg {len(self._legs) + 1}, {trajectory.s:.1f} s of {trajectory.plan.duration_s:.1f} s flown"
+            )
+            reports += self._look(trajectory, watched)
             if reports or (told is not None and len(simulation.broken) > told):
-                course.stop()
-            if course.over:
-                course.refer()
+                trajectory.stop()
+            if trajectory.over:
+                trajectory.refer()
                 if reports and told is None:
                     return reports
                 if simulation.settled(_NEAR_M, _SLOW_M_S) or waited > SETTLING_S:
                     return reports
-                waited += 1 / SAMPLES_A_SECOND
+                waited += 1 / SAMPLE_RATE_HZ
 
-    def _look(self, course: Course, watched: Sequence[Threat]) -> list[Blocked]:
+    def _look(self, trajectory: Trajectory, watched: Sequence[ObstacleEncounter]) -> list[Blocked]:
         """Which obstacles are seen now that nobody knew of, and by whom."""
         simulation = self._simulation
         reports = []
         for number, drone, until, keep in watched:
-            if self._known[number] or simulation.lost[drone] or course.s > until:
+            if self._known[number] or simulation.lost[drone] or trajectory.s > until:
                 continue
             gap = float(np.sqrt(np.square(simulation.places[drone] - self._obstacles[number]).sum()))
             if gap <= max(SIGHT_M, keep + LIMITS.speed * STOP_S / 2 + _LOOK_M):
                 self._known[number] = True
                 self._seen_s[number] = simulation.now_s
                 place = self.conditions.obstacles[number]
-                simulation.tell(drone, f"sees an obstacle at ({', '.join(f'{x:g}' for x in place)})")
+                simulation.log_event(drone, f"sees an obstacle at ({', '.join(f'{x:g}' for x in place)})")
                 reports.append(Blocked(self.names[drone], place, simulation.now_s))
         return reports
 
     def _tell_unfinished(self) -> None:
-        apart = self._simulation.gaps()
+        apart = self._simulation.tracking_errors()
         worst = int(apart.argmax())
         if apart[worst] > _FAR_M:
-            self._simulation.tell(worst, f"is {apart[worst]:.2f} m from where it is wanted as the leg ends")
+            self._simulation.log_event(worst, f"is {apart[worst]:.2f} m from where it is wanted as the leg ends")
 
 
-def fly(mission: Mission, conditions: Conditions | None = None, progress: Callable[[str], None] | None = None) -> Flown:
+def fly(
+    mission: Mission, conditions: FlightConditions | None = None, progress: Callable[[str], None] | None = None
+) -> FlightLog:
     """Fly all legs of `mission`, one after the other, in `conditions` (None: calm, and nothing happens).
 
     `progress` is `Flight`'s.
 
     Raises `ValueError` where there is nobody to fly, the conditions do not fit the mission, or its places are too near.
     """
-    conditions = conditions or Conditions()
+    conditions = conditions or FlightConditions()
     names = [drone.name for drone in mission.drones]
     homes = np.array([drone.home for drone in mission.drones], dtype=np.float64).reshape(-1, 3)
     check_homes(names, homes)

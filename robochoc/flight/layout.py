@@ -1,4 +1,4 @@
-"""Where drones stand, fly to and step aside: a crew in a box of rows, columns and levels.
+"""Where drones stand, fly to and step aside: a crafts in a box of rows, columns and levels.
 
 Lengths are in cells: a drone is a little narrower than one. An axis says which value of the problem a cell stands for.
 """
@@ -10,27 +10,28 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count, product
 
-from robochoc.flight.crafts import Cell, Craft, numbers
+from robochoc.flight.crafts import Cell, Craft, row_and_column
 
 Point = tuple[float, float, float]
 
 _GAP = 2
-"""Cells between the box and the lines of drones beside it, the first of the line included."""
+"""Cells from the box to the first line of drones beside it."""
 _TALL = 6
-"""Levels that even a single drone's box may have before they are scaled."""
+"""A box of up to so many levels is not scaled, even for a single drone."""
 _LEVELS = range(4, 13)
-"""Least and most levels of a box whose levels are scaled."""
+"""Minimum and maximum of levels in a box whose levels are scaled."""
 _TICKS = 15
-"""Most labels on an axis."""
+"""Maximum of labels on an axis."""
 _FAR = 1000
-"""Positions beyond it are moved to begin at 1: a browser draws in single precision."""
+"""Axes that begin beyond it are moved to begin at 1: a browser draws in single precision."""
 _TOO_CLOSE = 0.5
+"""Places nearer to each other count as the same place."""
 _GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One side of the box: the values `first` to `last` lie evenly from cell `low` to cell `high`."""
+    """One side of the box: values `first` to `last` are spread evenly over cells `low` to `high`."""
 
     name: str
     low: int
@@ -40,7 +41,7 @@ class Axis:
 
     @classmethod
     def over(cls, name: str, values: Iterable[int], *, most: int, scaled: int) -> Axis:
-        """The axis that holds `values`: a cell for each of up to `most` numbers, or else `scaled` cells in all."""
+        """Return the axis that holds `values`: a cell for each of up to `most` numbers, else `scaled` cells in all."""
         found = [*values] or [1]
         first, last = min(found), max(found)
         if last - first < most:
@@ -50,17 +51,17 @@ class Axis:
 
     @property
     def cells(self) -> int:
-        """How many cells long."""
+        """The length in cells."""
         return self.high - self.low + 1
 
     def at(self, value: float) -> float:
-        """Where `value` lies."""
+        """Return the cell in which `value` lies."""
         if self._is_even:
             return float(self.low + value - self.first)
         return self.low + (value - self.first) * (self.high - self.low) / (self.last - self.first)
 
     def value(self, cell: float) -> float:
-        """What lies there: `at`, the other way round."""
+        """Return the value that lies at `cell`: the inverse of `at`."""
         if self._is_even:
             return cell - self.low + self.first
         return self.first + (cell - self.low) * (self.last - self.first) / (self.high - self.low)
@@ -72,25 +73,25 @@ class Axis:
 
     @property
     def middle(self) -> float:
-        """Half way from end to end."""
+        """The cell half way from end to end."""
         return (self.low + self.high) / 2
 
     @property
     def ground(self) -> float:
-        """One cell below the lowest."""
+        """The height of the ground: one cell below the lowest."""
         return self.low - 1.0
 
     @property
     def ticks(self) -> list[tuple[float, str]]:
-        """Positions to label, and what to write there: round values, not too many."""
+        """Positions and texts of the labels: round values, not too many."""
         span = self.last - self.first
         step = next(digit * 10**power for power in count() for digit in (1, 2, 5) if span < _TICKS * digit * 10**power)
         return [(self.at(value), str(value)) for value in range(-(-self.first // step) * step, self.last + 1, step)]
 
 
 @dataclass(frozen=True)
-class Field:
-    """The box, and for each craft of a crew the spot on the ground where it stands in the beginning."""
+class Layout:
+    """The box, and for each craft of a crafts the spot on the ground where it stands in the beginning."""
 
     axes: tuple[Axis, Axis, Axis]
     homes: tuple[Point, ...]
@@ -100,13 +101,13 @@ class Field:
         """The height on which drones stand: one cell below the lowest level."""
         return self.axes[2].ground
 
-    def places(self, crew: Sequence[Craft]) -> list[Point | None]:
-        """Where each of `crew`, as many as have homes, flies to; nowhere without a level. No two meet."""
+    def places(self, crafts: Sequence[Craft]) -> list[Point | None]:
+        """Where each of `crafts`, as many as have homes, flies to; nowhere without a level. No two meet."""
         taken = _Taken()
         around: dict[Point, Iterator[Point]] = {}
         found: list[Point | None] = []
         rows, columns, levels = self.axes
-        for craft, (x, y, _) in zip(crew, self.homes, strict=True):
+        for craft, (x, y, _) in zip(crafts, self.homes, strict=True):
             place = None
             if craft.level is not None:
                 here = (rows.at(craft.cell[0]), columns.at(craft.cell[1])) if craft.cell else (x, y)
@@ -125,11 +126,11 @@ class Field:
             yield x, y, self.ground
 
 
-def field_of(crew: Sequence[Craft], others: Iterable[Craft] = ()) -> Field:
-    """The field for `crew`. Its axes also reach to `others`: where some of the crew may be at another time."""
+def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = ()) -> Layout:
+    """The field for `crafts`. Its axes also reach to `others`: where some of the crafts may be at another time."""
     others = [*others]
-    cells = _cells(crew)
-    axes = _axes(crew, others, [*cells, *(other.cell for other in others if other.cell)])
+    cells = _cells(crafts)
+    axes = _axes(crafts, others, [*cells, *(other.cell for other in others if other.cell)])
     rows, columns, levels = axes
     beside = _lines(rows.low, rows.cells, columns.high + _GAP, 1)
     homes: list[Point] = []
@@ -138,36 +139,36 @@ def field_of(crew: Sequence[Craft], others: Iterable[Craft] = ()) -> Field:
         home = (rows.at(x), columns.at(y), levels.ground)
         homes.append((*next(beside), levels.ground) if taken.is_near(home) else home)
         taken.add(homes[-1])
-    return Field(axes, tuple(homes))
+    return Layout(axes, tuple(homes))
 
 
-def _cells(crew: Sequence[Craft]) -> list[Cell]:
+def _cells(crafts: Sequence[Craft]) -> list[Cell]:
     """The crafts' cells; those that have none get a square grid, behind the others if there are others."""
-    known = [craft.cell for craft in crew if craft.cell]
-    side = math.ceil(math.sqrt(len(crew) - len(known)))
+    known = [craft.cell for craft in crafts if craft.cell]
+    side = math.ceil(math.sqrt(len(crafts) - len(known)))
     x = min((x for x, _ in known), default=1)
     y = max((y + _GAP for _, y in known), default=1)
     grid = ((x + row, y + column) for row in range(side) for column in range(side))
-    return [craft.cell or next(grid) for craft in crew]
+    return [craft.cell or next(grid) for craft in crafts]
 
 
-def _axes(crew: Sequence[Craft], others: Sequence[Craft], cells: Sequence[Cell]) -> tuple[Axis, Axis, Axis]:
-    most = max(_LEVELS[-1], 3 * math.ceil(math.sqrt(len(crew))))
-    names = _axis_names(crew)
+def _axes(crafts: Sequence[Craft], others: Sequence[Craft], cells: Sequence[Cell]) -> tuple[Axis, Axis, Axis]:
+    most = max(_LEVELS[-1], 3 * math.ceil(math.sqrt(len(crafts))))
+    names = _axis_names(crafts)
     rows = Axis.over(names[0], (x for x, _ in cells), most=most, scaled=most)
     columns = Axis.over(names[1], (y for _, y in cells), most=most, scaled=most)
     side = max(rows.cells, columns.cells)
-    values = [craft.level for craft in (*crew, *others) if craft.level is not None]
+    values = [craft.level for craft in (*crafts, *others) if craft.level is not None]
     if names[2] == "level" and all(1 <= value <= side for value in values):
         return rows, columns, Axis(names[2], 1, side, 1, side)
     scaled = min(max(side, _LEVELS[0]), _LEVELS[-1])
     return rows, columns, Axis.over(names[2], values, most=max(_TALL, 2 * side), scaled=scaled)
 
 
-def _axis_names(crew: Sequence[Craft]) -> tuple[str, str, str]:
-    if all(craft.cell and craft.cell == numbers(craft.name) for craft in crew):
+def _axis_names(crafts: Sequence[Craft]) -> tuple[str, str, str]:
+    if all(craft.cell and craft.cell == row_and_column(craft.name) for craft in crafts):
         return "row", "column", "level"
-    return ("x", "y", "z") if any(craft.cell for craft in crew) else ("", "", "value")
+    return ("x", "y", "z") if any(craft.cell for craft in crafts) else ("", "", "value")
 
 
 def _lines(x: float, across: int, y: int, step: int) -> Iterator[tuple[float, float]]:

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from robochoc.flight.crafts import Craft, crafts_of, lone_craft, numbers, possible_crafts
-from robochoc.flight.layout import Axis, Field, Point, field_of
-from robochoc.model.outcome import Epoch, Outcome, Verdict
-from robochoc.model.priorities import natural
+from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts, row_and_column
+from robochoc.flight.layout import Axis, Layout, Point, layout_of
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.priorities import natural_key
 from robochoc.model.problem import AddAgent, Assignment, Robot, Team, Topic
 
 UNIT_M = 1.0
@@ -73,8 +73,8 @@ class Mission:
         return self.axes[2].value(self.axes[2].ground) * self.scale
 
 
-class Cast:
-    """The crew of a run whose epochs come one after the other: who they are, where they stand, what each epoch asks.
+class MissionBuilder:
+    """The crafts of a run whose epochs come one after the other: who they are, where they stand, what each epoch asks.
 
     `robots` are all that ever take part, those that come later among them; or, where nothing but names is known,
     `names` of variables and of robots. `first` says where they go first, `leaving` how many of them will leave (None:
@@ -93,28 +93,30 @@ class Cast:
     ) -> None:
         self._robots = {robot.name: robot for robot in robots}
         self._names = [*names]
-        crew = sorted(self._crafts(first), key=lambda craft: (natural(craft.name), craft.name))
-        self._places = {(craft.robot, craft.name): number for number, craft in enumerate(crew)}
-        self._crew = crew
-        self.field: Field = field_of(crew, others)
-        self.scale = _scale(self.field.axes) if scale is None else scale
-        self._edge = self.field.edge(len(crew) if leaving is None else leaving)
+        crafts = sorted(self._crafts(first), key=lambda craft: (natural_key(craft.name), craft.name))
+        self._places = {(craft.robot, craft.name): number for number, craft in enumerate(crafts)}
+        self._crafts_in_order = crafts
+        self.layout: Layout = layout_of(crafts, others)
+        self.scale = _scale(self.layout.axes) if scale is None else scale
+        self._edge = self.layout.edge(len(crafts) if leaving is None else leaving)
         self._aside: dict[int, Point] = {}
         self._seen: set[str] = set()
-        self.drones = tuple(map(self._drone, crew, self.field.homes))
+        self.drones = tuple(map(self._drone, crafts, self.layout.homes))
 
-    def leg(self, epoch: Epoch, withdrawn: Iterable[str] = ()) -> Leg:
+    def leg(self, epoch: EpochOutcome, withdrawn: Iterable[str] = ()) -> Leg:
         """What `epoch`, the next one, asks of the drones. Who is not there any more lands at the edge."""
         values: Assignment = {} if epoch.verdict is Verdict.NO_SOLUTION else epoch.assignment
         here = {*(epoch.robots if self._robots else values or self._seen)} - {*withdrawn}
         gone = (self._seen | {*withdrawn}) - here
         self._seen |= here
-        crew = [*self._crew]
+        crafts = [*self._crafts_in_order]
         for craft in self._crafts(values, here):
-            crew[self._places[craft.robot, craft.name]] = craft
-        places = self.field.places([craft if _owner(craft) in here else replace(craft, level=None) for craft in crew])
+            crafts[self._places[craft.robot, craft.name]] = craft
+        places = self.layout.places(
+            [craft if _owner(craft) in here else replace(craft, level=None) for craft in crafts]
+        )
         goals: dict[int, Goal] = {}
-        for number, (craft, place) in enumerate(zip(crew, places, strict=True)):
+        for number, (craft, place) in enumerate(zip(crafts, places, strict=True)):
             if place is not None:
                 goals[number] = Goal(self._metres(place))
             elif _owner(craft) in gone:
@@ -123,7 +125,7 @@ class Cast:
 
     def mission(self, team: str, legs: Iterable[Leg]) -> Mission:
         """The whole of it."""
-        return Mission(team, self.drones, tuple(legs), self.field.axes, self.scale)
+        return Mission(team, self.drones, tuple(legs), self.layout.axes, self.scale)
 
     def _crafts(self, values: Assignment, here: Container[str] | None = None) -> Iterator[Craft]:
         """The crafts of everybody, or of those that are `here`."""
@@ -132,7 +134,7 @@ class Cast:
                 yield from crafts_of(robot, values)
         for name in self._names:
             if here is None or name in here:
-                yield lone_craft(name, values) if name in values else Craft(name, numbers(name))
+                yield craft_of_variable(name, values) if name in values else Craft(name, row_and_column(name))
 
     def _drone(self, craft: Craft, home: Point) -> Drone:
         group = craft.cell[0] if craft.cell else round(home[0])
@@ -144,7 +146,7 @@ class Cast:
         return self._aside[number]
 
     def _metres(self, point: Point) -> Point:
-        x, y, z = (axis.value(cell) * self.scale for axis, cell in zip(self.field.axes, point, strict=True))
+        x, y, z = (axis.value(cell) * self.scale for axis, cell in zip(self.layout.axes, point, strict=True))
         return x, y, z
 
 
@@ -154,24 +156,26 @@ def mission_of(outcome: Outcome, team: Team | None = None, scale: float | None =
     `team` is as its files have it, before its scenario. `scale` is in metres a unit; without one, `UNIT_M`, or less
     where the field would be vast.
     """
-    epochs = outcome.epochs or (Epoch(outcome.verdict, team.order if team else (), assignment=outcome.assignment),)
+    epochs = outcome.epochs or (
+        EpochOutcome(outcome.verdict, team.order if team else (), assignment=outcome.assignment),
+    )
     decided = [epoch.assignment for epoch in epochs if epoch.verdict is not Verdict.NO_SOLUTION]
     first: dict[str, int] = {}
     for values in decided:
         first = {**values, **first}
     if team is not None:
-        robots, names = everybody(team), []
+        robots, names = all_robots(team), []
         others = [craft for values in decided for robot in robots for craft in crafts_of(robot, values)]
         others += _lowest(robots, others)
     else:
         robots, names = [], [*first, *outcome.withdrawn]
-        others = [lone_craft(name, values) for values in decided for name in values]
-    cast = Cast(robots, first, names=names, others=others, leaving=_leaving(epochs, outcome), scale=scale)
+        others = [craft_of_variable(name, values) for values in decided for name in values]
+    cast = MissionBuilder(robots, first, names=names, others=others, leaving=_leaving(epochs, outcome), scale=scale)
     legs = [cast.leg(epoch) for epoch in epochs[:-1]]
     return cast.mission(outcome.team, [*legs, cast.leg(epochs[-1], outcome.withdrawn)])
 
 
-def everybody(team: Team) -> list[Robot]:
+def all_robots(team: Team) -> list[Robot]:
     """All robots that ever take part: those of the beginning, and those that the scenario adds."""
     added = [change.robot for event in team.scenario for change in event.changes if isinstance(change, AddAgent)]
     return [*{robot.name: robot for robot in (*team.robots, *added)}.values()]
@@ -187,7 +191,7 @@ def _lowest(robots: Iterable[Robot], decided: Iterable[Craft]) -> list[Craft]:
     return [Craft("", level=lowest.level)] if highest - (lowest.level or 0) < _FAR_BELOW else []
 
 
-def _leaving(epochs: Sequence[Epoch], outcome: Outcome) -> int:
+def _leaving(epochs: Sequence[EpochOutcome], outcome: Outcome) -> int:
     """About how many leave before the end: a robot may fly several drones."""
     stay = {*epochs[-1].robots} - {*outcome.withdrawn}
     return len({*outcome.withdrawn, *(name for epoch in epochs for name in epoch.robots)} - stay)

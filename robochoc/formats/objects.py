@@ -30,7 +30,7 @@ from robochoc.formats.rules import (
     repeated,
 )
 from robochoc.formats.shapes import AS_BUILT, ShapeError, check_shape
-from robochoc.model.problem import Constraint, Domain, Kind, Model, Predicate, Relation, Robot
+from robochoc.model.problem import Constraint, ConstraintModel, Domain, Predicate, ProblemKind, Relation, Robot
 
 Definition = Domain | Relation | Predicate
 
@@ -41,11 +41,13 @@ class Objects:
     def __init__(self) -> None:
         self._known: dict[int, tuple[Definition, bool]] = {}
         """By `id`: the object, which is kept so that the number stays its own, and whether it is right."""
+        self._wrong: list[Definition] = []
+        """The definitions of the robot in hand that are wrong. In a file, equal ones are written once."""
         self._found: list[Diagnostic] = []
 
     def mistakes(self, robot: Robot) -> list[Diagnostic]:
         """Return what is wrong with `robot` by itself: nothing of its neighbours is looked at."""
-        self._found = []
+        self._found, self._wrong = [], []
         if self._is_made_right(robot):
             for _ in self._steps(robot, ObjectPlaces(robot.name)):
                 if len(self._found) > MAX_PER_FILE:
@@ -56,7 +58,7 @@ class Objects:
 
     def mistakes_of_constraint(self, constraint: Constraint, robot: Robot) -> list[Diagnostic]:
         """Return what is wrong with a constraint that `robot` is to share from now on."""
-        self._found = []
+        self._found, self._wrong = [], []
         own = dict.fromkeys(variable.name for variable in robot.variables)
         self._shared(constraint, own, robot.kind, ObjectPlaces(robot.name))
         return self._found
@@ -127,7 +129,7 @@ class Objects:
                 check_name(child.name)
                 check_told(child.variables, own)
             for constraint in child.constraints:
-                if constraint.model is Model.TKC:
+                if constraint.model is ConstraintModel.TKC:
                     message = f"a totally known constraint (TKC) with the child '{shortened(child.name)}'"
                     hint = "the child holds it; with the parent stands its part of a PKC only"
                     self._note(places.constraint(constraint), message, hint)
@@ -135,26 +137,26 @@ class Objects:
                     self._shared(constraint, own, robot.kind, places)
                 yield
             for copy in child.copies:
-                if copy.model is Model.PKC:
+                if copy.model is ConstraintModel.PKC:
                     message = f"a copy of a partially known constraint (PKC) of the child '{shortened(child.name)}'"
                     self._note(places.constraint(copy), message, "nobody knows another's part: leave the copy out")
                 else:
                     self._shared(copy, own, robot.kind, places)
                 yield
 
-    def _private(self, constraint: Constraint, own: Collection[str], kind: Kind, places: ObjectPlaces) -> None:
+    def _private(self, constraint: Constraint, own: Collection[str], kind: ProblemKind, places: ObjectPlaces) -> None:
         with self._at(places.constraint, constraint):
             refuse_private_part(constraint.model)
             if self._applied(constraint, kind, places):
                 check_private(constraint, own)
 
-    def _shared(self, constraint: Constraint, own: Collection[str], kind: Kind, places: ObjectPlaces) -> None:
+    def _shared(self, constraint: Constraint, own: Collection[str], kind: ProblemKind, places: ObjectPlaces) -> None:
         with self._at(places.constraint, constraint):
             refuse_no_model(constraint.model)
             if self._applied(constraint, kind, places):
                 check_shared(constraint, own)
 
-    def _applied(self, constraint: Constraint, kind: Kind, places: ObjectPlaces) -> bool:
+    def _applied(self, constraint: Constraint, kind: ProblemKind, places: ObjectPlaces) -> bool:
         """Look at a constraint, whoever holds it. False: its definition is to blame. Raises `MistakeError`."""
         definition = constraint.definition
         check_word(constraint.name)
@@ -171,11 +173,19 @@ class Objects:
         """Whether a domain or a definition is right; the first who has it is told what is wrong."""
         known = self._known.get(id(thing))
         if known is None:
-            before = len(self._found)
-            with self._at(places.part, type(thing).__name__.lower(), thing.name):
-                _check_defined(thing)
-            known = self._known[id(thing)] = (thing, len(self._found) == before)
+            known = self._known[id(thing)] = (thing, self._is_right(thing, places))
         return known[1]
+
+    def _is_right(self, thing: Definition, places: ObjectPlaces) -> bool:
+        try:
+            _check_defined(thing)
+        except MistakeError as mistake:
+            if thing not in self._wrong:
+                place = places.part(type(thing).__name__.lower(), thing.name)
+                self._note(place, mistake.message, mistake.hint)
+            self._wrong.append(thing)
+            return False
+        return True
 
     @contextmanager
     def _at(self, place: Callable[..., Place], *part: object) -> Iterator[None]:

@@ -8,7 +8,8 @@ as long as that very object lives: teams cannot be changed, and `dataclasses.rep
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import islice
 from typing import TypeVar
@@ -30,14 +31,14 @@ from robochoc.formats.places import ObjectPlaces, Place
 from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
 from robochoc.formats.scopes import misplaced, misplaced_parts, untold
 from robochoc.formats.shapes import AS_BUILT, ShapeError, check_shape
-from robochoc.model.change import ChangeError, changed
+from robochoc.model.change import ChangeError, apply_changes
 from robochoc.model.priorities import priority_order
-from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, Event, RemoveValue, Robot, Team
+from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, RemoveValue, Robot, ScenarioEvent, Team
 
 MAX_BETWEEN = 1000
 """So many mistakes between the robots of one team are told."""
 
-_NOTHING = Event(())
+_NOTHING = ScenarioEvent(())
 _Ended = TypeVar("_Ended")
 
 _valid: dict[int, weakref.ref[Team]] = {}
@@ -54,7 +55,7 @@ def check_team(team: Team) -> None:
         return
     found = _of_the_whole(team) or _mistakes(team) or list(_of_the_scenario(team))
     if found:
-        raise InvalidInputError(dict.fromkeys(found))
+        raise InvalidInputError(_numbered(found))
     note_valid(team)
 
 
@@ -78,7 +79,7 @@ def check_writable(team: Team) -> None:
         place = Place(f"team {shortened(team.name)}")
         found.append(place.mistake("its scenario is no robot's", "write it as scenario.xml, and the team without it"))
     if found:
-        raise InvalidInputError(dict.fromkeys(found))
+        raise InvalidInputError(_numbered(found))
     by_links = priority_order({robot.name: [parent.name for parent in robot.parents] for robot in team.robots})
     if by_links != team.order:
         check_team(replace(team, robots=tuple(team[name] for name in by_links)))
@@ -88,26 +89,28 @@ def check_robot(robot: Robot) -> None:
     """Raise `InvalidInputError` with every mistake of `robot` that can be found without its neighbours."""
     found = Objects().mistakes(robot)
     if found:
-        raise InvalidInputError(dict.fromkeys(found))
+        raise InvalidInputError(_numbered(found))
 
 
-def check_event(team: Team, event: Event) -> None:
+def check_event(team: Team, event: ScenarioEvent) -> None:
     """Raise `InvalidInputError` when `event`, which happens to `team`, brings what no team could have.
 
     What this team cannot take is no mistake here: it may have lost the robots that somebody has counted on.
     """
     place = Place("an event")
-    found = list(_of_the_shape(event, Event, place)) or [
+    found = list(_of_the_shape(event, ScenarioEvent, place)) or [
         mistake for change in event.changes for mistake in _of_the_change(_robots(team, event), change, place)
     ]
     if found:
-        raise InvalidInputError(dict.fromkeys(found))
+        raise InvalidInputError(_numbered(found))
 
 
-def held_to_rules(field: Callable[[Team, _Ended, float | None], Event | None]) -> Callable[..., Event | None]:
+def held_to_rules(
+    field: Callable[[Team, _Ended, float | None], ScenarioEvent | None],
+) -> Callable[..., ScenarioEvent | None]:
     """Return `field`, which says what happens to a team, with its events held against the rules before they happen."""
 
-    def checked(team: Team, ended: _Ended, left_s: float | None) -> Event | None:
+    def checked(team: Team, ended: _Ended, left_s: float | None) -> ScenarioEvent | None:
         event = field(team, ended, left_s)
         if event:
             check_event(team, event)
@@ -126,6 +129,17 @@ def is_known_valid(team: Team) -> bool:
     """Whether this very object has been found valid before."""
     known = _valid.get(id(team))
     return known is not None and known() is team
+
+
+def _numbered(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
+    """Yield `found`; of equal diagnostics, those after the first get a number.
+
+    Lines tell two constraints of a file apart. Two objects may have the same name and scope.
+    """
+    seen: Counter[Diagnostic] = Counter()
+    for mistake in found:
+        seen[mistake] += 1
+        yield mistake if seen[mistake] == 1 else replace(mistake, file=f"{mistake.file} (no. {seen[mistake]})")
 
 
 def between(members: Members) -> list[Diagnostic]:
@@ -210,7 +224,7 @@ def _of_the_scenario(team: Team) -> Iterator[Diagnostic]:
             found += mistakes
             if not mistakes:
                 try:
-                    now = changed(now, [change])
+                    now = apply_changes(now, [change])
                 except ChangeError as bad:
                     found.append(place.mistake(bad.message, bad.hint))
         if not found and not now.robots:
@@ -220,7 +234,7 @@ def _of_the_scenario(team: Team) -> Iterator[Diagnostic]:
             return
 
 
-def _of_the_time(event: Event, place: Place) -> Iterator[Diagnostic]:
+def _of_the_time(event: ScenarioEvent, place: Place) -> Iterator[Diagnostic]:
     try:
         check_integer(event.after or 0)
     except MistakeError as mistake:
@@ -229,7 +243,7 @@ def _of_the_time(event: Event, place: Place) -> Iterator[Diagnostic]:
         yield place.mistake("an event after less than no message", "expected None, or a number of messages")
 
 
-def _robots(team: Team, event: Event = _NOTHING) -> dict[str, Robot]:
+def _robots(team: Team, event: ScenarioEvent = _NOTHING) -> dict[str, Robot]:
     """Who is there, and who comes with `event`."""
     coming = [change.robot for change in event.changes if isinstance(change, AddAgent)]
     return {robot.name: robot for robot in (*team.robots, *coming)}

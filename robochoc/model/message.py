@@ -1,15 +1,18 @@
-"""What robots say to each other, and how it is wrapped for the way.
+"""Messages between robots, and their envelope.
 
-A protocol defines its own messages as subclasses of :class:`Message`, named as in its paper. They travel as
-msgpack (msgspec): compact, and validated against their declared types when they are decoded, so bytes from
-elsewhere can do no more than fail to decode.
+A protocol defines its own messages as subclasses of `Message`, named as in its paper. They travel as msgpack (msgspec):
+compact, and validated against their declared types when they are decoded. Foreign bytes can do no more than fail to
+decode.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import msgspec
+
+from robochoc.model.communicative_acts import INFORM, Act
+from robochoc.model.wording import Wording
 
 Value = tuple[int | None, ...]
 """A robot's value as others see it: the values of its interface variables, in the order of its file.
@@ -20,7 +23,20 @@ the nogood holds whatever that variable's value is, and so for every value of th
 
 
 class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
-    """Base of all messages of all protocols; the class's name is its type on the wire."""
+    """Base of all messages of all protocols; the class's name is its type on the wire.
+
+    All that is special about a message stands in its class: its fields, its `act`, its words. The sniffer, FIPA ACL
+    and the exports ask the class.
+    """
+
+    act: ClassVar[Act] = INFORM
+    """What the sender does by the message, in FIPA's terms."""
+    backtracks: ClassVar[bool] = False
+    """Whether robots send it because they have no value left."""
+
+    def in_words(self, words: Wording) -> str:  # noqa: ARG002 - for those that have words
+        """Return what the sender says: `V1.1 = 1 from now on`. Empty: the message is shown by its fields."""
+        return ""
 
 
 class Envelope(NamedTuple):
@@ -36,5 +52,5 @@ _encoder = msgspec.msgpack.Encoder()
 
 
 def encode(message: Message) -> bytes:
-    """The content of `message` as it travels, and as it is counted in bytes."""
+    """Return the content of `message` as it travels, and as it is counted in bytes."""
     return _encoder.encode(message)

@@ -38,6 +38,8 @@ from typing import assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
+from robochoc.model.wording import Wording
+from robochoc.protocols import acts
 from robochoc.protocols.backtracking import Backtracking
 from robochoc.protocols.nogood import contradicts
 from robochoc.protocols.order import PriorityOrder
@@ -50,6 +52,12 @@ class Ok(Message, frozen=True):
 
     value: Value
 
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} from now on"
+
 
 class Nogood(Message, frozen=True):
     """While all of `lhs` stands, the receiver cannot take `value` (`ngd`)."""
@@ -57,9 +65,22 @@ class Nogood(Message, frozen=True):
     lhs: dict[str, Value]
     value: Value
 
+    act = acts.RULE_OUT
+    backtracks = True
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return words.nogood(self.lhs, self.value)
+
 
 class AddLink(Message, frozen=True):
     """The sender, lower in the order, asks to be told the receiver's value from now on (`adl`)."""
+
+    act = acts.ADD_LINK
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"tell me {words.variables(words.receiver)} from now on"
 
 
 class ABT(Backtracking):
@@ -75,6 +96,7 @@ class ABT(Backtracking):
         paper="Yokoo et al. 1992; Bessiere et al. 2005; PKC: Brito et al. 2009",
         partially_known=True,
         privacy="constraints of lower robots; of PKCs every robot's part, but for the pairs that were asked about",
+        use_when="no costs: the default",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

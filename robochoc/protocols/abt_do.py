@@ -40,6 +40,8 @@ from typing import assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
+from robochoc.model.wording import Wording, listed
+from robochoc.protocols import acts
 from robochoc.protocols.backtracking import Backtracking
 from robochoc.protocols.nogood import contradicts
 from robochoc.protocols.order import PriorityOrder
@@ -56,6 +58,12 @@ class Ok(Message, frozen=True):
     value: Value
     left: int
 
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} from now on; {_not_ruled_out(self.left)}"
+
 
 class Nogood(Message, frozen=True):
     """While all of `lhs` stands, the receiver cannot take `value`, or the sender, which has `left` values then."""
@@ -64,6 +72,13 @@ class Nogood(Message, frozen=True):
     value: Value
     left: int
 
+    act = acts.RULE_OUT
+    backtracks = True
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.nogood(self.lhs, self.value)}; without that value, {_not_ruled_out(self.left)}"
+
 
 class Order(Message, frozen=True):
     """A new order of all robots, highest priority first (`order`)."""
@@ -71,9 +86,25 @@ class Order(Message, frozen=True):
     names: tuple[str, ...]
     counters: Counters
 
+    act = acts.TELL_ORDER
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return f"the order is now {listed(self.names)}"
+
 
 class AddLink(Message, frozen=True):
     """The sender asks to be told the receiver's value from now on, whenever the receiver is higher."""
+
+    act = acts.ADD_LINK
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"tell me {words.variables(words.receiver)} from now on, whenever you are above me"
+
+
+def _not_ruled_out(left: int) -> str:
+    return f"{left:,} of my values {'is' if left == 1 else 'are'} not ruled out"
 
 
 class CurrentOrder(PriorityOrder):
@@ -107,7 +138,11 @@ class ABTDORetro(Backtracking):
 
     messages = Ok | Nogood | Order | AddLink
     traits = Traits(
-        concludes=ENDS_WITH_PROOF, paper="Zivan & Meisels 2006; Zivan et al. 2009", everywhere=True, privacy="none"
+        concludes=ENDS_WITH_PROOF,
+        paper="Zivan & Meisels 2006; Zivan et al. 2009",
+        shared_scopes=True,
+        privacy="none",
+        use_when="no costs, and no good static order is known",
     )
     order: CurrentOrder
 

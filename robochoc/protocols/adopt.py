@@ -42,9 +42,12 @@ from collections.abc import Mapping
 from typing import assert_never, cast
 
 from robochoc.model import message
+from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.bounding import BoundingProtocol, Context, Entry, Number, Terminate
+from robochoc.model.wording import Wording, cost_text
+from robochoc.protocols import acts
+from robochoc.protocols.bounding import BoundingProtocol, Context, Entry, Number, Terminate, bounds_in_words
 from robochoc.protocols.dfs import TreeMessage
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -57,6 +60,12 @@ class Value(Message, frozen=True):
     value: message.Value
     counter: int
 
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} from now on (change {self.counter})"
+
 
 class Cost(Message, frozen=True):
     """In `context` the sender's subtree costs between `lb` and `ub` (COST)."""
@@ -65,12 +74,26 @@ class Cost(Message, frozen=True):
     lb: Number
     ub: Number
 
+    act = acts.TELL_BOUNDS
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return bounds_in_words(words, self.context, self.lb, self.ub)
+
 
 class Threshold(Message, frozen=True):
     """In `context` the receiver's subtree may cost so much before it tries other values (THRESHOLD)."""
 
     threshold: Number
     context: dict[str, message.Value]
+
+    act = Act(Performative.REQUEST, "the receiver is to keep its value while it costs no more")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        values = {robot: (value, 0) for robot, value in self.context.items()}
+        allowed = cost_text(self.threshold)
+        return f"{words.context(values)}your subtree may cost {allowed} before you try other values"
 
 
 class ADOPT(BoundingProtocol):
@@ -84,9 +107,10 @@ class ADOPT(BoundingProtocol):
         concludes=ENDS_WITH_PROOF,
         paper="Modi, Shen, Tambe, Yokoo 2005",
         costs=True,
-        everywhere=True,
-        beyond=False,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="to compare with BnB-ADOPT+, which needs fewer messages",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -46,56 +46,17 @@ domain is empty says so when the search begins.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import assert_never, cast
 
-from robochoc.model.message import Message, Value
+from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.afb_bounds import Assignment, Cost, Estimates, Prices, Told, agreement, stamp_of
+from robochoc.protocols.afb_messages import CPA, FBCPA, FBEstimate, NewSolution, Terminate
 from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
-
-
-class CPA(Message, frozen=True):
-    """The current partial assignment, of the robots from the first one on (`CPA_MSG`).
-
-    With the last value the receiver's own, it comes back: no solution that begins like this costs less than `bound`,
-    which is B. On its way down, `least` says of each of its beginnings, the empty one first, what that costs at least.
-    """
-
-    assignments: list[Assignment]
-    bound: Cost
-    least: list[Cost]
-
-
-class FBCPA(Message, frozen=True):
-    """A copy of the CPA down to the sender, who asks for the receiver's estimate (`FB_CPA`)."""
-
-    assignments: list[Assignment]
-
-
-class FBEstimate(Message, frozen=True):
-    """What it costs at least to add a value of the sender to each beginning of the CPA (`FB_ESTIMATE`).
-
-    The empty beginning is first; the last estimate holds for all longer ones. `stamp` is the CPA's time-stamp.
-    """
-
-    stamp: Sequence[int]
-    estimates: Sequence[Cost]
-
-
-class NewSolution(Message, frozen=True):
-    """The best solution so far: the values of all robots in priority order, and their cost B (`NEW_SOLUTION`)."""
-
-    values: list[Value]
-    cost: Cost
-
-
-class Terminate(Message, frozen=True):
-    """No solution is better than the best one: the search is over (`TERMINATE`)."""
 
 
 class AFB(Protocol):
@@ -111,8 +72,9 @@ class AFB(Protocol):
         concludes=ENDS_WITH_PROOF,
         paper="Gershman, Meisels & Zivan 2009",
         costs=True,
-        everywhere=True,
+        shared_scopes=True,
         privacy="constraints that a robot has no part in",
+        use_when="costs, dense graph, little memory",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

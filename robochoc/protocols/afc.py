@@ -28,8 +28,11 @@ from __future__ import annotations
 
 from typing import assert_never, cast
 
+from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
+from robochoc.model.wording import Wording
+from robochoc.protocols import acts
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_EITHER, Traits
@@ -45,12 +48,24 @@ class CPA(Message, frozen=True):
     assignments: Assignments
     sc: int
 
+    act = acts.PROPOSE_CPA
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"so far {words.partial(self.assignments)}; it is {words.receiver}'s turn"
+
 
 class FcCPA(Message, frozen=True):
     """A copy of the CPA of step `sc`, for forward checking (`FC_CPA`)."""
 
     assignments: Assignments
     sc: int
+
+    act = Act(Performative.INFORM, "a copy of the CPA, for forward checking; the receiver need not extend it")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"so far {words.partial(self.assignments)}; look which of your values still go with it"
 
 
 class NotOk(Message, frozen=True):
@@ -59,12 +74,25 @@ class NotOk(Message, frozen=True):
     assignments: Assignments
     sc: int
 
+    act = Act(Performative.DISCONFIRM, "the receiver takes the CPA to be right, and it has no solution")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"no solution has {words.partial(self.assignments)}" if self.assignments else "there is no solution"
+
 
 class BacktrackCPA(Message, frozen=True):
     """The CPA comes back: `assignments`, whose last value is the receiver's, cannot be extended (`backtrack_CPA`)."""
 
     assignments: Assignments
     sc: int
+
+    act = Act(Performative.REJECT_PROPOSAL, "the CPA that was proposed comes back")
+    backtracks = True
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"no solution has {words.partial(self.assignments)}: take another value"
 
 
 class AFC(Protocol):
@@ -74,7 +102,12 @@ class AFC(Protocol):
     """
 
     messages = CPA | FcCPA | NotOk | BacktrackCPA
-    traits = Traits(concludes=ENDS_WITH_EITHER, paper="Meisels & Zivan 2007", privacy="constraints of lower robots")
+    traits = Traits(
+        concludes=ENDS_WITH_EITHER,
+        paper="Meisels & Zivan 2007",
+        privacy="constraints of lower robots",
+        use_when="to compare with AFC-ng, which needs fewer messages",
+    )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

@@ -42,8 +42,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import assert_never, cast
 
+from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
+from robochoc.model.wording import Wording
+from robochoc.protocols import acts
 from robochoc.protocols.nogood import NogoodStore, contradicts
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
@@ -59,6 +62,12 @@ class CPA(Message, frozen=True):
 
     assignments: list[Assignment]
 
+    act = acts.PROPOSE_CPA
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"so far {words.partial([value for value, _ in self.assignments])}"
+
 
 class Nogood(Message, frozen=True):
     """While all of `lhs` stands, the receiver cannot take `value` (`ngd`)."""
@@ -66,11 +75,24 @@ class Nogood(Message, frozen=True):
     lhs: dict[str, Value]
     value: Value
 
+    act = acts.RULE_OUT
+    backtracks = True
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return words.nogood(self.lhs, self.value)
+
 
 class Solved(Message, frozen=True):
     """A solution has been found, and the search is over (`stp`)."""
 
     solution: dict[str, Value]
+
+    act = Act(Performative.INFORM, "the receiver comes to know the solution")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"a solution is found, and the search is over: {words.assigned(self.solution.items())}"
 
 
 class AFCng(Protocol):
@@ -86,6 +108,7 @@ class AFCng(Protocol):
         concludes=ENDS_WITH_PROOF,
         paper="Ezzahir et al. 2009; Wahbi, Ezzahir, Bessiere, Bouyakhf 2013",
         privacy="constraints of lower robots",
+        use_when="no costs, hard problem: few messages and checks",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -36,6 +36,8 @@ from collections.abc import Mapping, Sequence
 from typing import assert_never, cast
 
 from robochoc.model.message import Message, Value
+from robochoc.model.wording import Wording
+from robochoc.protocols import acts
 from robochoc.protocols.afc_ng import CPA, AFCng, Nogood, Solved
 from robochoc.protocols.order import PriorityOrder, PseudoTree
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -51,6 +53,13 @@ class Accept(Message, frozen=True):
     counters: list[int]
     subtree: dict[str, Value]
 
+    act = acts.ACCEPT
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        values = f", with {words.assigned(self.subtree.items())}" if self.subtree else ""
+        return f"all below {words.receiver}, from me down, accept its partial assignment{values}"
+
 
 class AFCTree(AFCng):
     """One agent of AFC-tree. State beside AFC-ng's: `accepts`, what each child's subtree takes with the own value."""
@@ -61,6 +70,7 @@ class AFCTree(AFCng):
         paper="Wahbi, Ezzahir, Bessiere, Bouyakhf 2013",
         tree=True,
         privacy="constraints of lower robots",
+        use_when="as AFC-ng, on sparse graphs: branches search at once",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

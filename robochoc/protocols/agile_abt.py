@@ -41,6 +41,8 @@ from typing import assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
+from robochoc.model.wording import Wording, counted, listed
+from robochoc.protocols import acts
 from robochoc.protocols.agile_order import (
     UNKNOWN,
     Explanation,
@@ -66,12 +68,26 @@ class Ok(Message, frozen=True):
     left: int
     size: int
 
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        left = f"I have {self.left} of {counted(self.size, 'value')} left"
+        return f"{words.own_value(self.value)} from now on; {words.condition(self.lhs)}{left}"
+
 
 class Nogood(Message, frozen=True):
     """While all of `lhs` stands, the receiver cannot take `value` (`ngd`)."""
 
     lhs: dict[str, Value]
     value: Value
+
+    act = acts.RULE_OUT
+    backtracks = True
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return words.nogood(self.lhs, self.value)
 
 
 class Order(Message, frozen=True):
@@ -80,9 +96,24 @@ class Order(Message, frozen=True):
     places: tuple[int, ...]
     termination: TerminationVector
 
+    act = acts.TELL_ORDER
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        if self.places and not 0 <= min(self.places) <= max(self.places) < len(words.order):
+            numbers = listed([str(place + 1) for place in self.places])
+            return f"the order is now, by the places of the first one, {numbers}"
+        return f"the order is now {listed([words.order[place] for place in self.places])}"
+
 
 class AddLink(Message, frozen=True):
     """The sender asks to be told the receiver's value from now on, whenever it is below the receiver (`adl`)."""
+
+    act = acts.ADD_LINK
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"tell me {words.variables(words.receiver)} from now on, whenever I am below you"
 
 
 class AgileABT(Backtracking):
@@ -94,7 +125,13 @@ class AgileABT(Backtracking):
     """
 
     messages = Ok | Nogood | Order | AddLink
-    traits = Traits(concludes=ENDS_WITH_PROOF, paper="Bessiere et al. 2011", everywhere=True, privacy="none")
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Bessiere et al. 2011",
+        shared_scopes=True,
+        privacy="none",
+        use_when="no costs, and no good static order is known; large messages",
+    )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

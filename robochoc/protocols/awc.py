@@ -31,6 +31,8 @@ from typing import NamedTuple, assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
+from robochoc.model.wording import Wording, is_withdrawn, listed
+from robochoc.protocols import acts
 from robochoc.protocols.nogood import LeftSide, joined
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
@@ -44,15 +46,40 @@ class Ok(Message, frozen=True):
     value: Value
     priority: int
 
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} from now on, with priority {self.priority}"
+
 
 class Nogood(Message, frozen=True):
     """These assignments, one of which is the receiver's, cannot all stand; with the priorities last heard of."""
 
     nogood: dict[str, tuple[Value, int]]
 
+    act = acts.RULE_OUT
+    backtracks = True
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        values = {robot: value for robot, (value, _) in self.nogood.items() if not is_withdrawn(value)}
+        facts = [fact for robot, value in values.items() for fact in words.facts(robot, value)]
+        if len(facts) == 1:
+            return f"{facts[0]} cannot stand, whatever the others do"
+        return f"{listed(facts)} cannot {'both' if len(facts) == len('ab') else 'all'} stand"
+
 
 class AddLink(Message, frozen=True):
     """A nogood has made the sender and the receiver neighbours: each tells the other its value from now on."""
+
+    act = acts.ADD_LINK
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return (
+            f"from now on let us tell each other {words.variables(words.sender)} and {words.variables(words.receiver)}"
+        )
 
 
 class Kept(NamedTuple):
@@ -106,7 +133,13 @@ class AWC(Protocol):
     """One agent of AWC. State: `view` (agent_view) and `priorities` of others, `nogoods`, own `priority`."""
 
     messages = Ok | Nogood | AddLink
-    traits = Traits(concludes=ENDS_WITH_PROOF, paper="Yokoo 1995; Yokoo et al. 1998", everywhere=True, privacy="none")
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Yokoo 1995; Yokoo et al. 1998",
+        shared_scopes=True,
+        privacy="none",
+        use_when="to compare: ABT with max-degree order is faster here",
+    )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

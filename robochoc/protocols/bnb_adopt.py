@@ -44,6 +44,7 @@ leaf, where LB = UB.
 
 from __future__ import annotations
 
+import math
 from typing import assert_never, cast
 
 import msgspec
@@ -51,7 +52,9 @@ import msgspec
 from robochoc.model import message
 from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.bounding import BoundingProtocol, Context, Number, Terminate
+from robochoc.model.wording import Wording, cost_text
+from robochoc.protocols import acts
+from robochoc.protocols.bounding import BoundingProtocol, Context, Number, Terminate, bounds_in_words
 from robochoc.protocols.dfs import TreeMessage
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -65,6 +68,15 @@ class Value(Message, frozen=True):
     counter: int
     threshold: Number = INFINITE
 
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        change = f"{words.own_value(self.value)} from now on (change {self.counter})"
+        if math.isinf(self.threshold):
+            return change
+        return f"{change}; your subtree may cost {cost_text(self.threshold)} then"
+
 
 class Cost(Message, frozen=True):
     """In `context` the sender's subtree costs between `lb` and `ub`; whether its threshold is asked for (ThReq)."""
@@ -73,6 +85,13 @@ class Cost(Message, frozen=True):
     lb: Number
     ub: Number
     threshold_request: bool = False
+
+    act = acts.TELL_BOUNDS
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        asked = "; tell me my threshold again" if self.threshold_request else ""
+        return f"{bounds_in_words(words, self.context, self.lb, self.ub)}{asked}"
 
 
 class BnBADOPT(BoundingProtocol):
@@ -86,9 +105,10 @@ class BnBADOPT(BoundingProtocol):
         concludes=ENDS_WITH_PROOF,
         paper="Yeoh, Felner, Koenig 2010; Gutierrez & Meseguer 2010",
         costs=True,
-        everywhere=True,
-        beyond=False,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="costs, sparse graph, little memory",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

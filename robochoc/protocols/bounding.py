@@ -7,6 +7,7 @@ UB(d), and LB and UB are the least of them. A context says who above has which v
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -16,6 +17,8 @@ from robochoc.model import message
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.model.wording import Wording, cost_text
+from robochoc.protocols import acts
 from robochoc.protocols.dfs import TreeProtocol
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.order import PriorityOrder
@@ -35,6 +38,26 @@ class Terminate(Message, frozen=True):
     """All above the receiver have taken their last values: those in `context` (TERMINATE)."""
 
     context: Context
+
+    act = acts.TERMINATE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        condition = words.context(self.context).removeprefix("as long as ").removesuffix(", ")
+        return f"all above you have taken their last values{': ' if condition else ''}{condition}"
+
+
+def bounds_in_words(words: Wording, context: Context, lower: Number, upper: Number) -> str:
+    """Return what a robot says of its subtree's cost: `as long as V1.1 = 2, my subtree costs at least 3`."""
+    if math.isinf(lower):
+        costs = "has no solution"
+    elif lower == upper:
+        costs = f"costs {cost_text(lower)}"
+    elif math.isinf(upper):
+        costs = f"costs at least {cost_text(lower)}"
+    else:
+        costs = f"costs between {cost_text(lower)} and {cost_text(upper)}"
+    return f"{words.context(context)}my subtree {costs}"
 
 
 class Bounds:

@@ -18,6 +18,8 @@ from typing import TypeVar
 
 from robochoc.model import message as wire
 from robochoc.model.outcome import Verdict
+from robochoc.model.wording import Wording
+from robochoc.protocols import acts
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol, Settings
@@ -34,11 +36,23 @@ class Value(wire.Message, frozen=True):
 
     value: wire.Value
 
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} in this cycle"
+
 
 class Domain(wire.Message, frozen=True):
     """All values that the sender may take, the first thing it says; later messages name their places in it."""
 
     values: list[wire.Value]
+
+    act = acts.TELL_DOMAIN
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return words.domain(self.values)
 
 
 class CycleSettings(Settings, frozen=True):

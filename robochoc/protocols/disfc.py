@@ -34,6 +34,8 @@ from typing import assert_never, cast
 
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
+from robochoc.model.wording import Wording, counted, listed
+from robochoc.protocols import acts
 from robochoc.protocols.nogood import NogoodStore
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
@@ -48,6 +50,15 @@ class Ok(Message, frozen=True):
     counter: int
     allowed: bytes
 
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        left = counted(sum(byte.bit_count() for byte in self.allowed), "value")
+        return (
+            f"my assignment number {self.counter} stands from now on; it leaves {words.receiver} {left} of its domain"
+        )
+
 
 class Nogood(Message, frozen=True):
     """While all assignments in `lhs` stand, the receiver's called `counter` cannot (`ngd`)."""
@@ -55,9 +66,25 @@ class Nogood(Message, frozen=True):
     lhs: dict[str, int]
     counter: int
 
+    act = acts.RULE_OUT
+    backtracks = True
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        named = [f"{robot} keeps its assignment number {counter}" for robot, counter in self.lhs.items()]
+        condition = f"as long as {listed(named)}, " if named else ""
+        rest = "" if named else ", whatever the others do"
+        return f"{condition}{words.receiver} cannot keep its assignment number {self.counter}{rest}"
+
 
 class AddLink(Message, frozen=True):
     """The sender, lower in the order, asks to be told the receiver's assignments from now on (`adl`)."""
+
+    act = acts.ADD_LINK
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return "tell me of each new assignment of yours from now on"
 
 
 class DisFC(Protocol):
@@ -74,8 +101,9 @@ class DisFC(Protocol):
         paper="Brito and Meseguer 2003; PKC: Brito et al. 2009",
         n_ary=False,
         partially_known=True,
-        everywhere=True,
+        shared_scopes=True,
         privacy="values; of PKCs every robot's part, but for the rows of values taken",
+        use_when="values are private, or constraints are (PKC)",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -46,13 +46,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, TypeVar, assert_never, cast
+from typing import TypeVar, assert_never, cast
 
 import msgspec
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.dfs import TreeMessage, TreeProtocol
+from robochoc.protocols.dpop_messages import UTIL, VALUE, Dimensions, Domain, Need, Proceed
 from robochoc.protocols.dpop_tables import (
     Arriving,
     Codes,
@@ -79,56 +80,6 @@ MOST_AXES = 1_000
 """Long before that no table fits anywhere."""
 Scope = tuple[str, ...]
 T = TypeVar("T")
-Size = Annotated[int, msgspec.Meta(ge=2)]
-Cost = Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
-"""2^53 stands for all that is larger, too: it ends the run."""
-
-
-class Need(msgspec.Struct, frozen=True, array_like=True, order=True):
-    """At most so many `bytes` are in arrays of `robot` at a time; from 2^53 on, the float that is nearest."""
-
-    bytes: int | float
-    robot: str
-
-
-class Domain(Message, frozen=True):
-    """The sender's values: for those below it, who check constraints with it."""
-
-    values: list[Value]
-
-
-class Dimensions(Message, frozen=True):
-    """The sender's separator, with the number of each robot's values; no cost in its table is above `dearest`.
-
-    `induced_width` is the size of the largest separator among the sender and all below, `most` the largest need.
-    """
-
-    separator: dict[str, Size]
-    dearest: Cost
-    induced_width: int
-    most: Need
-
-
-class Proceed(Message, frozen=True):
-    """All tables of the tree fit: make yours. These are its axes: the receiver's separator, the nearest robot first."""
-
-    separator: list[str]
-
-
-class UTIL(Message, frozen=True):
-    """A piece of the sender's table, in the order of its cells; its first axis is the nearest robot's.
-
-    `costs` are unsigned integers of `width` bytes, little-endian; the largest of all stands for `inf`.
-    """
-
-    width: Width
-    costs: bytes
-
-
-class VALUE(Message, frozen=True):
-    """The places of the values that the robots of the receiver's separator take, in the order of its axes."""
-
-    assignment: list[int]
 
 
 class DPOPSettings(Settings, frozen=True):
@@ -155,10 +106,11 @@ class DPOP(TreeProtocol):
         concludes=ENDS_WITH_PROOF,
         paper="Petcu & Faltings 2005",
         costs=True,
-        everywhere=True,
-        beyond=False,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
         tables=True,
         privacy="constraints of others, but for sums",
+        use_when="costs, small induced width: number of messages is linear",
     )
     settings: DPOPSettings = DPOPSettings()
 

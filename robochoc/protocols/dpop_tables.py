@@ -15,6 +15,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from robochoc.model.wording import cost_text, counted
+
 Array = NDArray[np.float64]
 Codes = NDArray[np.unsignedinteger[Any]]
 Table = Array | Codes
@@ -184,3 +186,18 @@ def _choice(own: int) -> np.dtype[np.unsignedinteger[Any]]:
 
 def _top(width: int) -> int:
     return (1 << 8 * width) - 1
+
+
+def piece_in_words(costs: bytes, width: Width) -> str:
+    """Return what is in a piece of a table: `a piece of my table: 16 costs, from 17 to 24`.
+
+    Raises:
+        ValueError: if the bytes are not whole cells.
+    """
+    cells = np.frombuffer(costs, f"<u{width}")
+    finite = cells[cells != np.iinfo(cells.dtype).max]
+    piece = f"a piece of my table: {counted(len(cells), 'cost')}"
+    if len(finite):
+        piece += f", from {cost_text(int(finite.min()))} to {cost_text(int(finite.max()))}"
+    infinite = len(cells) - len(finite)
+    return f"{piece}, and {infinite:,} infinite" if infinite else piece

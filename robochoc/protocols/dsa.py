@@ -61,9 +61,10 @@ class DSA(CycleProtocol):
         paper="Fitzpatrick & Meertens 2001; Zhang, Wang, Xing, Wittenburg 2005",
         complete=False,
         costs=True,
-        everywhere=True,
-        beyond=False,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="costs, large team: good answers fast, no proof",
     )
 
     def begin(self) -> None:

@@ -49,6 +49,7 @@ class DynABT(ABT, DynamicProtocol):
         paper="Omomowo, Arana, Ahriz 2008",
         dynamic=True,
         privacy="constraints of lower robots",
+        use_when="the problem changes during the run",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -77,16 +78,16 @@ class DynABT(ABT, DynamicProtocol):
         self.lower = list(dict.fromkeys((*problem.children, *(robot for robot in self.lower if robot in order.rank))))
         self.problem, self.order = problem, order
 
-    def resume(self, *, quiet: bool) -> None:
+    def resume(self, *, lossless: bool) -> None:
         """Tell what the others may have missed, and check the view."""
-        if not quiet:
+        if not lossless:
             for agent in sorted(self.higher.difference(self.problem.parents), key=self.order.rank.__getitem__):
                 self.send(agent, AddLink())
         before = self.value
         self._check_agent_view()
         current = self._current()
         if current is not None and self.value == before:
-            for child in self.untold if quiet else self.lower:
+            for child in self.untold if lossless else self.lower:
                 self.send(child, Ok(current))
         self.untold = []
 

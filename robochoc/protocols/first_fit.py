@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import cast
 
 from robochoc.model.message import Message, Value
+from robochoc.model.wording import Wording
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
@@ -24,12 +25,18 @@ class Placed(Message, frozen=True):
 
     value: Value | None
 
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        if self.value is None:
+            return "I step aside"
+        return f"I fly, with {words.own_value(self.value, 'a value')}"
+
 
 class FirstFit(Protocol):
     """One robot. `view` holds the values of the parents that fly, `awaited` the parents not yet heard."""
 
     messages = Placed
-    traits = Traits(concludes=(), paper="paper, Section 5.2", complete=False, beyond=False)
+    traits = Traits(concludes=(), paper="paper, Section 5.2", complete=False, writes_to_non_neighbours=False)
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

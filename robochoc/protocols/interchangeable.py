@@ -30,3 +30,13 @@ def one_by_one(distinct: Sequence[T], runs: Sequence[Run]) -> list[T]:
 def fitting(kinds: int, runs: Sequence[Run], robots: int) -> bool:
     """Whether `runs` of so many kinds tell of so many robots."""
     return sum(count for _, count in runs) == robots and all(0 <= at < kinds and count > 0 for at, count in runs)
+
+
+def cut_off(runs: Iterable[Run], robots: int) -> list[Run]:
+    """Return `runs` as far as they tell of no more than so many robots."""
+    cut: list[Run] = []
+    for place, count in runs:
+        taken = max(0, min(count, robots))
+        cut.append((place, taken))
+        robots -= taken
+    return cut

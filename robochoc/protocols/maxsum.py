@@ -44,8 +44,10 @@ from collections.abc import Mapping, Sequence
 from operator import add, sub
 
 from robochoc.model import message as wire
+from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.model.wording import Wording, costs_text
 from robochoc.protocols.cycles import CycleProtocol, CycleSettings, Domain
 from robochoc.protocols.maxsum_factor import Factor, Row
 from robochoc.protocols.order import PriorityOrder
@@ -58,11 +60,31 @@ class R(wire.Message, frozen=True):
 
     rows: list[Row]
 
+    act = Act(Performative.INFORM, "the receiver comes to know what each of its values costs")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        many = len(self.rows)
+        by = "our function" if many == 1 else f"our {many:,} functions, one after the other"
+        return f"by {by}, {words.receiver}'s values cost {_rows_in_words(self.rows)}"
+
 
 class Q(wire.Message, frozen=True):
     """What each value of the sender costs by all but one function: for each of the receiver's, in the order of R."""
 
     rows: list[Row]
+
+    act = Act(Performative.INFORM, "the receiver comes to know what each value costs elsewhere")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        many = len(self.rows)
+        by = "our function" if many == 1 else f"each of our {many:,} functions in turn"
+        return f"without {by}, {words.sender}'s values cost {_rows_in_words(self.rows)}"
+
+
+def _rows_in_words(rows: Sequence[Row]) -> str:
+    return "; ".join(map(costs_text, rows[:4]))
 
 
 class MaxSumSettings(CycleSettings, frozen=True):
@@ -93,8 +115,9 @@ class MaxSum(CycleProtocol):
         paper="Farinelli, Rogers, Petcu, Jennings 2008",
         complete=False,
         costs=True,
-        beyond=False,
+        writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="costs, large team, graph with few cycles; no proof",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -30,10 +30,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from robochoc.model import message as wire
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, Value, gain, said
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import Burden, LocalProblem
+
+
+def saving_in_words(broken: int, cost: float) -> str:
+    """Return what a move saves: `1 broken constraint and 3 of cost`, or `nothing`."""
+    saved = [counted(broken, "broken constraint")] if broken else []
+    return listed([*saved, f"{cost_text(cost)} of cost"] if cost else saved) or "nothing"
 
 
 class Gain(wire.Message, frozen=True):
@@ -41,6 +49,12 @@ class Gain(wire.Message, frozen=True):
 
     broken: int
     cost: int | float
+
+    act = Act(Performative.INFORM, "the receiver comes to know what the sender's move would save")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return f"my move would save {saving_in_words(self.broken, self.cost)}"
 
 
 class Gainers(CycleProtocol):
@@ -82,9 +96,10 @@ class MGM(Gainers):
         paper="Maheswaran, Pearce, Tambe 2004",
         complete=False,
         costs=True,
-        everywhere=True,
-        beyond=False,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="as DSA, and the cost never rises; ends in a local optimum",
     )
 
     def begin(self) -> None:

@@ -37,8 +37,11 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from robochoc.model import message as wire
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.wording import Wording, counted
+from robochoc.protocols import acts
 from robochoc.protocols.cycles import NO_GAIN, CycleSettings, Domain, Value, gain, said
-from robochoc.protocols.mgm import Gain, Gainers
+from robochoc.protocols.mgm import Gain, Gainers, saving_in_words
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import Burden, LocalProblem
@@ -54,6 +57,18 @@ class Offer(wire.Message, frozen=True):
 
     gains: Gains | None
 
+    act = Act(Performative.PROPOSE, "what both would gain by moving together")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        if self.gains is None:
+            return "I have no offer for you"
+        best = max(saving for row in self.gains for saving in row)
+        many = f"{counted(len(self.gains), 'value')} of yours and {len(self.gains[0]):,} of mine"
+        if best <= (0, 0):
+            return f"let us move together: of {many}, no two would save me anything"
+        return f"let us move together: of {many}, the best two would save me {saving_in_words(*best)}"
+
 
 class Accept(wire.Message, frozen=True):
     """The receiver is to take its value at `place`, which would save so much in all (`accept`)."""
@@ -62,15 +77,36 @@ class Accept(wire.Message, frozen=True):
     broken: int
     cost: int | float
 
+    act = acts.ACCEPT
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        saved = saving_in_words(self.broken, self.cost)
+        return f"I take your offer: you take your value number {self.place + 1}, and we save {saved} in all"
+
 
 class Reject(wire.Message, frozen=True):
     """Your offer is not taken (`reject`)."""
+
+    act = Act(Performative.REJECT_PROPOSAL, "the offer that was proposed is not taken")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return "I do not take your offer"
 
 
 class Go(wire.Message, frozen=True):
     """Whether the sender, who is committed to the receiver, gains most among its neighbours (`go`, `no go`)."""
 
     go: bool
+
+    act = Act(Performative.INFORM, "the receiver comes to know whether the sender gains most")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        if self.go:
+            return "go: of my neighbours, nobody is to move before us"
+        return "no go: one of my neighbours is to move instead"
 
 
 class Move(NamedTuple):
@@ -103,9 +139,10 @@ class MGM2(Gainers):
         paper="Maheswaran, Pearce, Tambe 2004",
         complete=False,
         costs=True,
-        everywhere=True,
-        beyond=False,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
         privacy="constraints among others",
+        use_when="as MGM: better answers, more messages",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -122,5 +122,5 @@ class DynamicProtocol(Protocol):
         """
 
     @abstractmethod
-    def resume(self, *, quiet: bool) -> None:
+    def resume(self, *, lossless: bool) -> None:
         """Go on with the search; before any message. `quiet`: no message of the epoch before was lost."""

@@ -20,6 +20,8 @@ from typing import assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
+from robochoc.model.wording import Wording
+from robochoc.protocols import acts
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_EITHER, Traits
@@ -31,9 +33,22 @@ class CPA(Message, frozen=True):
 
     assignments: tuple[Value, ...]
 
+    act = acts.PROPOSE_CPA
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"so far {words.partial(self.assignments)}; it is {words.receiver}'s turn"
+
 
 class Backtrack(Message, frozen=True):
     """Nobody below has a value left that goes with the receiver's: it has to take its next one."""
+
+    act = acts.REJECT_VALUE
+    backtracks = True
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"nobody below {words.receiver} has a value left that goes with its own: take another one"
 
 
 class SBT(Protocol):
@@ -45,6 +60,7 @@ class SBT(Protocol):
         paper="Yokoo et al. 1992, 1998; Zivan & Meisels 2003",
         synchronous=True,
         privacy="constraints of lower robots",
+        use_when="a simple baseline without costs",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

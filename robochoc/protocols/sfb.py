@@ -45,16 +45,17 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterable, Sequence
-from typing import Self, assert_never, cast
+from collections.abc import Sequence
+from typing import assert_never, cast
 
-from robochoc.model.message import Message, Value
+from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.findings import NOTHING, Best, Findings
-from robochoc.protocols.interchangeable import Run, fitting, grouped, one_by_one
+from robochoc.protocols.interchangeable import fitting, one_by_one
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol, Settings
 from robochoc.protocols.sfb_bounds import BOUND, ForwardBounds, Rows, dearest
+from robochoc.protocols.sfb_messages import Above, Below, Charges, CPAs, Domain, Explored, Solution
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.exact import EXACT, refuse_inexact
@@ -62,66 +63,6 @@ from robochoc.solver.exact import EXACT, refuse_inexact
 MIB = 1 << 20
 LARGEST = 4 * MIB
 """No message of several CPAs has more bytes of them, however much memory there is: runtimes have limits, too."""
-Domain = tuple[Value, ...]
-Charges = tuple[float, ...]
-
-
-class Above(Message, frozen=True):
-    """The values of all robots above the receiver: `domains` are the distinct ones, `runs` say who has which."""
-
-    domains: list[Domain]
-    runs: list[Run]
-
-    @classmethod
-    def of(cls, domains: Iterable[Domain]) -> Self:
-        """Tell of robots with these `domains`, in priority order."""
-        return cls(*grouped(domains))
-
-
-class Below(Message, frozen=True):
-    """The values of all robots below the receiver, and what each of them is charged for each; `runs` say who has which.
-
-    `most` is the most that these charges, and the constraints whose lowest two robots are below, can come to.
-    """
-
-    domains: list[Domain]
-    charges: list[Charges]
-    runs: list[Run]
-    most: int
-
-    @classmethod
-    def of(cls, robots: Iterable[tuple[Domain, Charges]], most: int) -> Self:
-        """Tell of robots with these domains and charges, in priority order."""
-        kinds, runs = grouped(robots)
-        return cls([domain for domain, _ in kinds], [charges for _, charges in kinds], runs, most)
-
-    @property
-    def robots(self) -> list[tuple[Domain, Charges]]:
-        """Each robot's domain and charges."""
-        return one_by_one(list(zip(self.domains, self.charges, strict=True)), self.runs)
-
-
-class CPAs(Message, frozen=True):
-    """`count` partial assignments of all robots above the receiver (see `sfb_bounds`) that may cost below `least`.
-
-    `least` is what the cheapest known solution costs, or the `ceiling`, which no cost reaches.
-    """
-
-    count: int
-    rows: bytes
-    least: int
-    ceiling: int
-
-
-class Explored(Message, frozen=True):
-    """Nothing is left of the oldest `CPAs` that I have had from you and have not yet answered."""
-
-
-class Solution(Message, frozen=True):
-    """A solution that costs less than all before, as the place of each robot's value in its domain."""
-
-    cost: int
-    places: list[int]
 
 
 class SFBSettings(Settings, frozen=True):
@@ -195,8 +136,9 @@ class SFB(Protocol):
         paper="Hirayama & Yokoo 1997; Gershman, Meisels, Zivan 2009",
         synchronous=True,
         costs=True,
-        everywhere=True,
+        shared_scopes=True,
         tables=True,
+        use_when="costs: the default; few messages",
     )
     settings: SFBSettings = SFBSettings()
 

@@ -31,6 +31,8 @@ import msgspec
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
+from robochoc.model.wording import Wording, cost_text, incumbent_text
+from robochoc.protocols import acts
 from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
@@ -53,17 +55,45 @@ class Path(Message, frozen=True):
     assignments: list[tuple[Value, Cost]]
     best: BestPath
 
+    act = acts.PROPOSE_CPA
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        values = words.partial([value for value, _ in self.assignments])
+        paid = cost_text(sum(cost for _, cost in self.assignments))
+        known = incumbent_text(self.best.bound)
+        return f"so far {values}, which costs {paid}; {known}; it is {words.receiver}'s turn"
+
 
 class Backtrack(Message, frozen=True):
     """All that the robots below can make of the receiver's value costs at least as much as the best path."""
 
     best: BestPath
 
+    act = acts.REJECT_VALUE
+    backtracks = True
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        if math.isinf(self.best.bound):
+            return f"{words.receiver}'s value leads to no solution: take another one"
+        bound = cost_text(self.best.bound)
+        return f"{words.receiver}'s value leads to nothing that costs less than {bound}: take another one"
+
 
 class Terminate(Message, frozen=True):
     """Nothing is cheaper than the best path: the search is over."""
 
     best: BestPath
+
+    act = acts.TERMINATE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        if math.isinf(self.best.bound):
+            return "the search is over, and there is no solution"
+        values = words.partial(self.best.values)
+        return f"the search is over: nothing costs less than {cost_text(self.best.bound)}, with {values}"
 
 
 class SyncBB(Protocol):
@@ -79,6 +109,7 @@ class SyncBB(Protocol):
         synchronous=True,
         costs=True,
         privacy="constraints of lower robots",
+        use_when="a simple baseline with costs",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

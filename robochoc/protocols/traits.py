@@ -16,17 +16,26 @@ UNDECLARED = (Verdict.SOLUTION, Verdict.NO_SOLUTION, Verdict.UNKNOWN)
 
 @dataclass(frozen=True)
 class Traits:
-    """Declared by each protocol's class as `traits`; the run refuses what is not declared, in one sentence.
+    """What a protocol's class declares of itself as `traits`. A run refuses what is not declared.
 
-    `paper`: who published it, and when. `complete`: it ends on every problem, with a solution or a proof that there
-    is none. `synchronous`: one robot acts at a time. `costs`: it minimises (a DisWCSP). `n_ary`: constraints
-    may be over more than two robots. `partially_known`: it takes PKC constraints. `everywhere`: its order changes
-    during the search, so each robot of a constraint's scope has to know the constraint, and not only the lowest.
-    `beyond`: its robots also write to robots that they share no constraint with; where they do not, access control
-    across machines keeps them from it. `tree`: it works on a pseudo-tree. `dynamic`: it goes on when the problem
-    changes (then it is a `DynamicProtocol`). `concludes`: the verdicts with which one robot alone may end the search;
-    whoever claims another is refused. `tables`: it computes with tables of floats, and refuses costs that could add up
-    to 2^53 or more (`solver/exact.py`). `privacy`: what neighbours do not come to know.
+    Attributes:
+        paper: Who published the protocol, and when.
+        complete: It ends on every problem, with a solution or a proof that there is none.
+        synchronous: One robot acts at a time.
+        costs: It minimises costs (a DisWCSP).
+        n_ary: Constraints may be over more than two robots.
+        partially_known: It takes partially known constraints (PKC).
+        shared_scopes: Every robot of a constraint's scope knows the constraint, because the order of the robots changes
+            during the search. Otherwise only the lowest robot of the scope knows it.
+        writes_to_non_neighbours: Its robots also write to robots that they share no constraint with. Where they do not,
+            access control across machines prevents it.
+        tree: It works on a pseudo-tree.
+        dynamic: It continues when the problem changes (then it is a `DynamicProtocol`).
+        concludes: The verdicts with which one robot alone may end the search. Other verdicts are refused.
+        tables: It computes with tables of floats, and refuses costs that could add up to 2^53 or more
+            (`solver/exact.py`).
+        privacy: What neighbours do not learn.
+        use_when: When to choose it, in a few words, for `robochoc protocols`.
     """
 
     paper: str = ""
@@ -35,13 +44,14 @@ class Traits:
     costs: bool = False
     n_ary: bool = True
     partially_known: bool = False
-    everywhere: bool = False
-    beyond: bool = True
+    shared_scopes: bool = False
+    writes_to_non_neighbours: bool = True
     tree: bool = False
     dynamic: bool = False
     concludes: tuple[Verdict, ...] = UNDECLARED
     tables: bool = False
     privacy: str = ""
+    use_when: str = ""
 
     def fault_of_conclusion(self, verdict: str) -> str:
         """Return why no robot of this protocol ends the search with `verdict`; empty if one may.

@@ -16,7 +16,7 @@ from robochoc.communication.run_result import RunResult
 from robochoc.journal.entries import STAMPED_LATE
 from robochoc.journal.events import AnyEvent, Lost, Received, Sent
 from robochoc.journal.journal import Header, Journal, metrics_of
-from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.replay.rebuild import Ensemble
 from robochoc.replay.steps import Run
 from robochoc.run.evaluation import evaluate, evaluate_withdrawal
@@ -43,7 +43,7 @@ class Played:
     """A run that was played to its end: who played it, and the answer that follows; None where nothing can be said."""
 
     run: Run
-    answer: Epoch | Outcome | None
+    answer: EpochOutcome | Outcome | None
 
 
 def played(run: Run, ensemble: Ensemble, outcome: Outcome | None) -> Played:
@@ -92,7 +92,9 @@ def _beginning(header: Header, runs: Sequence[Run], placed_by: str | None) -> It
         yield Contradiction(what="the header's order", recorded=header.order, replayed=order)
 
 
-def _answers(whose: str, recorded: Epoch | Outcome, replayed: Epoch | Outcome | None) -> Iterator[Contradiction]:
+def _answers(
+    whose: str, recorded: EpochOutcome | Outcome, replayed: EpochOutcome | Outcome | None
+) -> Iterator[Contradiction]:
     if replayed is None or recorded.verdict is Verdict.UNKNOWN:  # limits are not in a journal
         return
     yield from _differing(whose, recorded, replayed, ("verdict", "assignment", "cost"))
@@ -109,7 +111,7 @@ def _differing(whose: str, recorded: object, replayed: object, names: Sequence[s
             yield Contradiction(what=whose + name, recorded=left, replayed=right)
 
 
-def _answer(run: Run, ensemble: Ensemble, outcome: Outcome) -> Epoch | Outcome | None:
+def _answer(run: Run, ensemble: Ensemble, outcome: Outcome) -> EpochOutcome | Outcome | None:
     """What the robots of `run` have come to, as a run would tell it; None where the journal does not say enough."""
     given = run.given
     if given is None or given.why or len(ensemble.hosts) < len(ensemble.compiled.team.robots):
@@ -128,9 +130,9 @@ def _answer(run: Run, ensemble: Ensemble, outcome: Outcome) -> Epoch | Outcome |
         if given.aside is not None or _places(run, outcome):
             bare = Outcome(outcome.team, outcome.protocol, outcome.runtime, outcome.seed, Verdict.UNKNOWN)
             return evaluate_withdrawal(bare, team, result, ensemble.compiled, given.aside)
-        return evaluate(Epoch(result.verdict, team.order), team, result, traits, ensemble.compiled)
+        return evaluate(EpochOutcome(result.verdict, team.order), team, result, traits, ensemble.compiled)
     except (RefutedError, TooManySolutionsError):
-        return Epoch(Verdict.UNKNOWN, team.order)
+        return EpochOutcome(Verdict.UNKNOWN, team.order)
 
 
 def _places(run: Run, outcome: Outcome) -> bool:

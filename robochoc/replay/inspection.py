@@ -11,7 +11,7 @@ from itertools import islice
 from typing import Any
 
 from robochoc.model.message import Message, Value
-from robochoc.model.priorities import natural
+from robochoc.model.priorities import natural_key
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.afc import AFC
 from robochoc.protocols.awc import AWC, NogoodList
@@ -79,7 +79,7 @@ class Look:
     def _rank(self, robot: str) -> tuple[int, object]:
         """In the priority order; those who are not in it come last."""
         rank = self._ranks.get(robot)
-        return (0, rank) if rank is not None else (1, natural(robot))
+        return (0, rank) if rank is not None else (1, natural_key(robot))
 
     def said(self, sender: str, message: Message, receiver: str = "") -> str:
         """What `sender` has said, to this robot if to no other `receiver`."""

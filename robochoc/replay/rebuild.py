@@ -12,8 +12,8 @@ from robochoc.communication.session import Epoch
 from robochoc.journal.events import Given, Lost
 from robochoc.journal.given import GivenProblemError, TeamReader, brief_of, void_of
 from robochoc.journal.journal import Header
-from robochoc.model.change import ChangeError, changed_by, still_showing, without
-from robochoc.model.orders import Order, OrderError, order_of, reordered
+from robochoc.model.change import ChangeError, keep_interfaces, team_after_events, without_robots
+from robochoc.model.orders import Order, OrderError, compute_order, with_priorities
 from robochoc.model.problem import Robot, Team
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.replay.steps import Run
@@ -75,7 +75,7 @@ class Ensemble(NamedTuple):
     protocol: type[Protocol]
     hosts: Mapping[str, Host]
     parts: Mapping[str, AgentProblem]
-    quiet: bool
+    lossless: bool
     mindful: Collection[str]
     compiled: CompiledTeam
 
@@ -110,9 +110,9 @@ class Cast:
             raise CannotReplayError(str(why)) from why
         self._lost.update(event.robot for event in run.events if isinstance(event, Lost))
         kept = issubclass(protocol, DynamicProtocol)
-        mindful = [name for name in parts if kept and name in before and name not in epoch.fresh]
-        quiet = run.given is None or run.given.quiet
-        return Ensemble(protocol, self._hosts, parts, quiet, mindful, epoch.compiled)
+        mindful = [name for name in parts if kept and name in before and name not in epoch.restarted]
+        lossless = run.given is None or run.given.quiet
+        return Ensemble(protocol, self._hosts, parts, lossless, mindful, epoch.compiled)
 
     def _protocol(self, run: Run) -> type[Protocol]:
         """The class that the run names; of a master's journal, the header's."""
@@ -154,7 +154,7 @@ class Cast:
         if run.began is not None and isinstance(run.began.epoch, int):
             raise CannotReplayError("the journal does not say what the robots were given when their problem changed")
         try:
-            filed = self._ordered(changed_by(self._means.team, events=0))
+            filed = self._ordered(team_after_events(self._means.team, events=0))
             team = self._left(filed)
         except (OrderError, ChangeError, ValueError) as why:
             raise CannotReplayError(f"the team cannot be brought into the order of the run: {why}") from why
@@ -170,16 +170,16 @@ class Cast:
         """Return `team` in the order of the run. Raises `OrderError`, `ValueError`."""
         order = self._header.order if self._header else None
         if isinstance(order, str):
-            order = order_of(team, Order(order), self._header.seed if self._header else 0)
+            order = compute_order(team, Order(order), self._header.seed if self._header else 0)
         if isinstance(order, tuple):
-            return reordered(team, order)
+            return with_priorities(team, order)
         return team
 
     def _left(self, team: Team) -> Team:
         """Return `team` without the robots that were lost before. On a network the others show what they did show."""
-        left = without(team, [name for name in self._lost if name in team])
+        left = without_robots(team, [name for name in self._lost if name in team])
         on_network = self._header is not None and self._header.runtime == "network"
-        return still_showing(left, team) if on_network else left
+        return keep_interfaces(left, team) if on_network else left
 
     def _compiled(self, team: Team) -> CompiledTeam:
         """Return `team` with those compiled who play; what did not change is not compiled again."""
@@ -199,7 +199,7 @@ def _host(protocol: type[Protocol], part: AgentProblem, before: Host | None, epo
     """The robot of `part`: the one that was there before, if it goes on, or a new one. Raises `CannotReplayError`."""
     name = part.robot.name
     try:
-        if before is None or name in epoch.fresh:
+        if before is None or name in epoch.restarted:
             return Host.of(protocol, part)
         before.change(part, epoch.void)
     except _UNCOMPILED:

@@ -198,7 +198,7 @@ class Scene:
             if step.received and (step.whole or step.done):
                 said = host.settle()
             elif not step.received and step.robot not in self._begun:  # nobody begins a run twice
-                said = host.start(quiet=self.ensemble.quiet)
+                said = host.start(lossless=self.ensemble.lossless)
             self._begun.add(step.robot)
         except ReplayStopsError:
             raise

@@ -12,23 +12,23 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from robochoc.flight.crafts import crafts_of
-from robochoc.flight.mission import VAST_M, Cast, Drone, Leg, Mission, everybody, mission_of
+from robochoc.flight.mission import VAST_M, Drone, Leg, Mission, MissionBuilder, all_robots, mission_of
 from robochoc.flight.reports import Report
-from robochoc.model.change import possible
-from robochoc.model.outcome import Epoch, Outcome
-from robochoc.model.problem import Assignment, Change, Event, Robot, Team
-from robochoc.ros.outlet import Outlet
+from robochoc.model.change import apply_possible_changes
+from robochoc.model.outcome import EpochOutcome, Outcome
+from robochoc.model.problem import Assignment, Change, Robot, ScenarioEvent, Team
 from robochoc.ros.sink import Sink
+from robochoc.ros.sink_publisher import SinkPublisher
 from robochoc.ros.situation import BATTERY, Situation
 
 TOGETHER_S = 0.5
 """What is reported within so many seconds of a report that changes the problem belongs to the same event."""
 
 
-class Senses(ABC):
+class Feedback(ABC):
     """How a loop learns of its robots' situation: they fly in a simulation, or a source is listened to."""
 
-    outlets: Sequence[Outlet] = ()
+    publishers: Sequence[SinkPublisher] = ()
     """Where reports are to be published as they come."""
     idle: Callable[[], None] = staticmethod(lambda: None)
     """Called now and then while nothing comes."""
@@ -45,7 +45,7 @@ class Senses(ABC):
         """The time, by the clock of the reports."""
 
     @abstractmethod
-    def decided(self, cast: Cast, leg: Leg, left_s: float | None) -> None:
+    def decided(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:
         """A decision was made and published: from now on, `next` gives what follows of it, for so many seconds."""
 
     @abstractmethod
@@ -53,61 +53,63 @@ class Senses(ABC):
         """The next report, or None: none comes any more. With `until_s`, one that comes no later than that."""
 
 
-class Loop:
-    """A field (`robochoc.run.scenario.Field`) that publishes each epoch's decision, and senses what the robots report.
+class ClosedLoop:
+    """An environment of a run: publishes each decision, and opens an epoch when robots report a change.
 
-    `team` is as its files have it. Without `senses`, nothing changes the problem. What is published goes into `sinks`
-    (opened, and closed, by others), with the times of `senses`. What was heard over a ROS is not said there again, or
+    `team` is as its files have it. Without `feedback`, nothing changes the problem. What is published goes into `sinks`
+    (opened, and closed, by others), with the times of `feedback`. What was heard over a ROS is not said there again, or
     we would hear ourselves: recordings alone get it. `frame` is of places, `scale` in metres a unit of the
     problem (None: `mission.py` says), `battery` the level below which a drone is out of order.
 
     Raises `NameClashError`, `NoMappingError`, `NothingToPublishError`; calls raise `SinkError` and `SourceError`.
     """
 
-    events: list[Event]
+    events: list[ScenarioEvent]
     """What the robots' situation has changed."""
-    outlets: list[Outlet]
+    publishers: list[SinkPublisher]
     """What was published, for each of the sinks."""
 
     def __init__(
         self,
         team: Team,
         sinks: Sequence[Sink] = (),
-        senses: Senses | None = None,
+        feedback: Feedback | None = None,
         *,
         frame: str = "map",
         scale: float | None = None,
         battery: float = BATTERY,
     ) -> None:
         self._team = team
-        self._robots = everybody(team)
-        self.senses = senses
+        self._robots = all_robots(team)
+        self.feedback = feedback
         self._scale = scale
         self._battery = battery
-        self._cast: Cast | None = None
+        self._builder: MissionBuilder | None = None
         self._situation: Situation | None = None
         self._legs: list[Leg] = []
         self._happened = 0
         self._lost = True
         self.events = []
-        self.outlets = [Outlet(team.name, drones_of(team), sink, frame) for sink in sinks]
-        if senses:
-            senses.outlets = [outlet for outlet in self.outlets if senses.simulated or not outlet.live]
+        self.publishers = [SinkPublisher(team.name, drones_of(team), sink, frame) for sink in sinks]
+        if feedback:
+            feedback.publishers = [
+                publisher for publisher in self.publishers if feedback.simulated or not publisher.live
+            ]
 
-    def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
+    def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
         """Publish what `epoch` has decided for `team`, and see what follows of it within `left_s` seconds."""
         self._happened += not self._lost
         self._lost = bool(epoch.lost)
-        cast = self._cast = self._cast or self._new_cast(epoch.assignment)
-        leg = cast.leg(epoch)
+        builder = self._builder = self._builder or self._new_builder(epoch.assignment)
+        leg = builder.leg(epoch)
         self._legs.append(leg)
         self._decide(leg)
-        if self.senses is None:
+        if self.feedback is None:
             return None
-        self.senses.decided(cast, leg, left_s)
+        self.feedback.decided(builder, leg, left_s)
         if epoch.lost or left_s == 0:
             return None
-        event = self._sensed(self.senses, self._coming(team), cast)
+        event = self._sensed(self.feedback, self._coming(team), builder)
         if event:
             self.events.append(event)
         return event
@@ -127,56 +129,56 @@ class Loop:
     @property
     def mission(self) -> Mission | None:
         """What was asked of the drones so far; None before the first epoch is over."""
-        return self._cast.mission(self._team.name, self._legs) if self._cast else None
+        return self._builder.mission(self._team.name, self._legs) if self._builder else None
 
     @property
     def notes(self) -> list[str]:
         """What was reported and could not be heeded, in clear sentences."""
-        heard = self.senses.notes if self.senses else []
+        heard = self.feedback.notes if self.feedback else []
         return [*heard, *(self._situation.notes if self._situation else [])]
 
     # Decisions
 
-    def _new_cast(self, assignment: Assignment) -> Cast:
+    def _new_builder(self, assignment: Assignment) -> MissionBuilder:
         """Who flies, and where they stand: below where they go first, or could go as far as nobody has decided."""
         first = {**_values(self._robots, 0), **assignment}
         near = {**_values(self._robots, 0, VAST_M), **assignment}
         far = {**near, **_values(self._robots, -1, VAST_M)}
         others = [craft for values in (near, far) for robot in self._robots for craft in crafts_of(robot, values)]
-        return Cast(self._robots, first, others=others, scale=self._scale)
+        return MissionBuilder(self._robots, first, others=others, scale=self._scale)
 
     def _decide(self, leg: Leg) -> None:
-        at_ns = self.senses.now_ns() if self.senses else time.time_ns()
-        for outlet in self.outlets:
-            outlet.decide(leg, at_ns)
+        at_ns = self.feedback.now_ns() if self.feedback else time.time_ns()
+        for publisher in self.publishers:
+            publisher.decide(leg, at_ns)
 
     # The situation
 
     def _coming(self, team: Team) -> Team:
         """`team` after all that is already known to come."""
         for event in self.team.scenario[self._happened :]:
-            team, _ = possible(team, event.changes)
+            team, _ = apply_possible_changes(team, event.changes)
         return team
 
-    def _sensed(self, senses: Senses, team: Team, cast: Cast) -> Event | None:
+    def _sensed(self, feedback: Feedback, team: Team, builder: MissionBuilder) -> ScenarioEvent | None:
         """The event that follows of a decision: the first reports that change `team`."""
         if self._situation is None:
-            self._situation = Situation(cast.drones, cast.scale, self._battery)
+            self._situation = Situation(builder.drones, builder.scale, self._battery)
         changes: list[Change] = []
         until_s = None
-        while (report := senses.next(until_s)) is not None:
-            found = self._situation.heed(team, report)
+        while (report := feedback.next(until_s)) is not None:
+            found = self._situation.changes(team, report)
             if found:
                 changes += found
-                team, _ = possible(team, found)
+                team, _ = apply_possible_changes(team, found)
                 until_s = report.at_s + TOGETHER_S if until_s is None else until_s
-        return Event(tuple(changes)) if changes else None
+        return ScenarioEvent(tuple(changes)) if changes else None
 
 
 def drones_of(team: Team) -> tuple[Drone, ...]:
     """All drones that ever take part, before anything is decided: who they are is known, where they stand is not."""
-    robots = everybody(team)
-    return Cast(robots, _values(robots, 0)).drones
+    robots = all_robots(team)
+    return MissionBuilder(robots, _values(robots, 0)).drones
 
 
 def _values(robots: Sequence[Robot], place: int, span: float | None = None) -> dict[str, int]:

@@ -39,7 +39,7 @@ class NameClashError(Exception):
     """Two topics would have one name in ROS, or a name is too long for it: which, and what to do."""
 
 
-class Names:
+class TopicNames:
     """The names in ROS of what `drones` publish; drones are known by their numbers. Raises `NameClashError`."""
 
     original: Mapping[str, str]
@@ -48,7 +48,7 @@ class Names:
 
     def __init__(self, drones: Sequence[Drone]) -> None:
         self._waypoints = [None if drone.topic is None else ros_name(drone.topic.name) for drone in drones]
-        self._spaces = [*_spaces(drones, self._waypoints)]
+        self._namespaces = [*_namespaces(drones, self._waypoints)]
         owners: dict[str, int] = {}
         for number, topic in self._topics():
             if len(topic) > LONGEST:
@@ -56,7 +56,7 @@ class Names:
             other = owners.setdefault(topic, number)
             if other != number:
                 raise NameClashError(_clash(topic, drones[other], drones[number]))
-        table = zip(self._waypoints, self._spaces, drones, strict=True)
+        table = zip(self._waypoints, self._namespaces, drones, strict=True)
         self.original = MappingProxyType(
             {topic or space: drone.name if drone.topic is None else drone.topic.name for topic, space, drone in table}
         )
@@ -65,21 +65,21 @@ class Names:
         """The topic of a drone's waypoints; None if its robot's file names none."""
         return self._waypoints[number]
 
-    def space(self, number: int) -> str:
+    def namespace(self, number: int) -> str:
         """The namespace of what a drone reports: `/drone3_1`, so that its battery is `/drone3_1/battery`."""
-        return self._spaces[number]
+        return self._namespaces[number]
 
     def reports(self) -> dict[str, str]:
         """The topics of all that drones may report, and their types."""
-        return {f"{space}/{token}": kind for space in self._spaces for token, kind in REPORTS.items()}
+        return {f"{space}/{token}": kind for space in self._namespaces for token, kind in REPORTS.items()}
 
     def _topics(self) -> Iterator[tuple[int, str]]:
         for number, topic in enumerate(self._waypoints):
             if topic is not None:
                 yield number, topic
-        for number in range(len(self._spaces)):
+        for number in range(len(self._namespaces)):
             for token in REPORTS:
-                yield number, f"{self._spaces[number]}/{token}"
+                yield number, f"{self._namespaces[number]}/{token}"
 
 
 def ros_name(name: str) -> str:
@@ -106,7 +106,7 @@ def _plain(char: str) -> str:
     return f"u{ord(char):x}" if char.isalnum() else "_"
 
 
-def _spaces(drones: Sequence[Drone], waypoints: Sequence[str | None]) -> Iterator[str]:
+def _namespaces(drones: Sequence[Drone], waypoints: Sequence[str | None]) -> Iterator[str]:
     """The first token of the waypoints' topic where no other drone's topic has it, else all of that topic."""
     names = [ros_name(drone.name.replace("/", "_")) for drone in drones]
     first = ["/" + topic.split("/")[1] if topic else name for topic, name in zip(waypoints, names, strict=True)]

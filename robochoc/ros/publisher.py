@@ -13,7 +13,7 @@ from robochoc.flight.mission import Drone, Leg
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.mappings import NoMappingError, WaypointMapping, mapping_of, point
-from robochoc.ros.names import REPORTS, Names
+from robochoc.ros.names import REPORTS, TopicNames
 from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.waypoint import Waypoint, waypoints
 
@@ -42,7 +42,7 @@ class Publisher:
             raise NothingToPublishError(
                 on_one_line(f"{told}: give its robot's file a <topic> (docs/reference/format.md)")
             )
-        self.names = Names(drones)
+        self.names = TopicNames(drones)
         self._drones = drones
         self._sinks = sinks
         self._frame = frame
@@ -101,7 +101,7 @@ class Publisher:
         return {"stamp": at_ns, "frame_id": self._frame}
 
     def _report(self, number: int, token: str, fields: Fields, at_ns: int) -> None:
-        self._publish(f"{self.names.space(number)}/{token}", REPORTS[token], fields, at_ns)
+        self._publish(f"{self.names.namespace(number)}/{token}", REPORTS[token], fields, at_ns)
 
     def _publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
         for sink in self._sinks:

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from robochoc.flight.crafts import crafts_of
-from robochoc.flight.mission import Cast, Drone, Goal, Leg
-from robochoc.model.outcome import Epoch, Verdict
+from robochoc.flight.mission import Drone, Goal, Leg, MissionBuilder
+from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import Assignment, Robot
 
 _ANSWERED = (Verdict.SOLUTION, Verdict.OPTIMAL)
 
 
-def crew_alone(robot: Robot) -> tuple[Drone, ...]:
+def drones_of_robot(robot: Robot) -> tuple[Drone, ...]:
     """The drones of `robot`, before anything is decided."""
-    return Cast([robot], {}).drones
+    return MissionBuilder([robot], {}).drones
 
 
-def leg_alone(robot: Robot, why: str, assignment: Assignment, scale: float | None = None) -> Leg:
-    """What the end of a run asks of the drones of `robot`, by the numbers of `crew_alone`.
+def leg_of_robot(robot: Robot, why: str, assignment: Assignment, scale: float | None = None) -> Leg:
+    """What the end of a run asks of the drones of `robot`, by the numbers of `drones_of_robot`.
 
     `why` is the master's word for how it ended (`optimal, 6 step aside`). A robot that stepped aside, and so has no
     `assignment`, lands where it stood, below its cell: that spot is its own, while one at the edge might be another's.
@@ -25,10 +25,10 @@ def leg_alone(robot: Robot, why: str, assignment: Assignment, scale: float | Non
     verdict, _, others = why.partition(",")
     if verdict not in _ANSWERED or not (assignment or "aside" in others):
         return Leg(why, Verdict.UNKNOWN, {})
-    cast = Cast([robot], assignment, scale=scale)
+    builder = MissionBuilder([robot], assignment, scale=scale)
     known = {craft.name for craft in crafts_of(robot, assignment) if craft.cell}
     if assignment:
-        goals = cast.leg(Epoch(Verdict(verdict), (robot.name,), assignment=dict(assignment))).goals
+        goals = builder.leg(EpochOutcome(Verdict(verdict), (robot.name,), assignment=dict(assignment))).goals
     else:
-        goals = {number: Goal(drone.home, lands=True) for number, drone in enumerate(cast.drones)}
-    return Leg(why, Verdict(verdict), {n: goal for n, goal in goals.items() if cast.drones[n].name in known})
+        goals = {number: Goal(drone.home, lands=True) for number, drone in enumerate(builder.drones)}
+    return Leg(why, Verdict(verdict), {n: goal for n, goal in goals.items() if builder.drones[n].name in known})

@@ -15,7 +15,7 @@ from typing import assert_never
 from robochoc.flight.crafts import Craft, crafts_of
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone
-from robochoc.flight.places import Places
+from robochoc.flight.point_index import PointIndex
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.model.expression import Expression, Name, UndefinedValueError, evaluate, names
 from robochoc.model.problem import AddValue, Change, Domain, RemoveAgent, RemoveValue, Robot, Team
@@ -68,11 +68,11 @@ class Situation:
         self._scale = scale
         self._battery = battery
         self._seen: dict[str, _Seen] = {}
-        self._obstacles = Places()
+        self._obstacles = PointIndex()
         self._taken: dict[tuple[str, int], set[Point]] = {}
         self.notes = []
 
-    def heed(self, team: Team, report: Report) -> tuple[Change, ...]:
+    def changes(self, team: Team, report: Report) -> tuple[Change, ...]:
         """What `report` changes in `team`, which can take these changes; nothing if its robot is not there."""
         drone = self._drones.get(report.drone)
         if drone is None or drone.robot not in team:

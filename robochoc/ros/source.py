@@ -14,7 +14,7 @@ class SourceError(Exception):
     """The source cannot be opened, or read any further: why, and what might help."""
 
 
-class Heard(NamedTuple):
+class ReceivedMessage(NamedTuple):
     """A message: where it was published, its ROS type, its fields (as a sink takes them), and when it was received."""
 
     topic: str
@@ -45,7 +45,7 @@ class Source(ABC):
         """
 
     @abstractmethod
-    def next(self, wait_s: float) -> Heard | None:
+    def next(self, wait_s: float) -> ReceivedMessage | None:
         """The next message. None: a recording is over, or nothing came within `wait_s`. Raises `SourceError`."""
 
     @abstractmethod

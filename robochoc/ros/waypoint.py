@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone, Leg
-from robochoc.ros.names import Names
+from robochoc.ros.names import TopicNames
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Waypoint:
     """When it was decided, in nanoseconds."""
 
 
-def waypoints(leg: Leg, drones: Sequence[Drone], names: Names, frame: str, stamp: int) -> tuple[Waypoint, ...]:
+def waypoints(leg: Leg, drones: Sequence[Drone], names: TopicNames, frame: str, stamp: int) -> tuple[Waypoint, ...]:
     """What `leg` has `drones` publish, by their numbers: who flies, and who lands. Who stays publishes nothing.
 
     Nor does a drone whose robot's file names no topic.

@@ -6,15 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from robochoc.communication.run_result import RunResult
-from robochoc.model.outcome import Epoch, Outcome, Verdict
-from robochoc.model.problem import Kind, Team
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.problem import ProblemKind, Team
 from robochoc.protocols.traits import Traits
 from robochoc.run.incumbent import absent, best_of, bound_of, joined, tree_of
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.verification.checker import RefutedError, cost, could_join, objections
+from robochoc.verification.checker import RefutedError, assignment_cost, needlessly_withdrawn, violations
 
 
-def evaluate(epoch: Epoch, team: Team, result: RunResult, traits: Traits, compiled: CompiledTeam) -> Epoch:
+def evaluate(
+    epoch: EpochOutcome, team: Team, result: RunResult, traits: Traits, compiled: CompiledTeam
+) -> EpochOutcome:
     """`epoch`, with the answer of a search by a protocol that has `traits`; as it is where there is none.
 
     `team` is what the answer is held against, as the files have it; `compiled` is what the robots have worked on.
@@ -32,7 +34,7 @@ def evaluate(epoch: Epoch, team: Team, result: RunResult, traits: Traits, compil
     epoch = replace(epoch, bound=bound_of(result.findings))
     if found is None:
         return replace(epoch, verdict=Verdict.UNKNOWN)
-    return _with(epoch, team, found.assignment, Verdict.SOLUTION if team.kind is Kind.DISCSP else result.verdict)
+    return _with(epoch, team, found.assignment, Verdict.SOLUTION if team.kind is ProblemKind.DISCSP else result.verdict)
 
 
 def evaluate_withdrawal(
@@ -56,9 +58,9 @@ def evaluate_withdrawal(
     out = absent(team, assignment)
     check(team, assignment, out, maximal=ended)
     if ended:
-        proven = aside is not None and (out or team.kind is Kind.DISWCSP)
+        proven = aside is not None and (out or team.kind is ProblemKind.DISWCSP)
         outcome = replace(outcome, verdict=Verdict.OPTIMAL if proven else Verdict.SOLUTION)
-    paid = cost(team, assignment)
+    paid = assignment_cost(team, assignment)
     return replace(
         outcome, assignment=_in_order(team, assignment), withdrawn=(*outcome.withdrawn, *out), cost=paid, verified=True
     )
@@ -69,16 +71,18 @@ def check(team: Team, assignment: Mapping[str, int], withdrawn: Sequence[str] = 
 
     Raises `RefutedError`.
     """
-    faults = [*objections(team, assignment, withdrawn)]
+    faults = [*violations(team, assignment, withdrawn)]
     if maximal:
-        faults += [f"{name} has stepped aside and could be added" for name in could_join(team, assignment, withdrawn)]
+        faults += [
+            f"{name} has stepped aside and could be added" for name in needlessly_withdrawn(team, assignment, withdrawn)
+        ]
     if faults:
         raise RefutedError(f"the checker refutes the answer for {team.name}: {faults[0]} ({len(faults)} objections)")
 
 
 def _best_verdict(team: Team) -> Verdict:
     """What the answer of a complete protocol is."""
-    return Verdict.OPTIMAL if team.kind is Kind.DISWCSP else Verdict.SOLUTION
+    return Verdict.OPTIMAL if team.kind is ProblemKind.DISWCSP else Verdict.SOLUTION
 
 
 def _in_order(team: Team, assignment: Mapping[str, int]) -> dict[str, int]:
@@ -86,7 +90,7 @@ def _in_order(team: Team, assignment: Mapping[str, int]) -> dict[str, int]:
     return {name: assignment[name] for name in team.variables if name in assignment}
 
 
-def _with(epoch: Epoch, team: Team, assignment: dict[str, int], verdict: Verdict) -> Epoch:
+def _with(epoch: EpochOutcome, team: Team, assignment: dict[str, int], verdict: Verdict) -> EpochOutcome:
     check(team, assignment)
     assignment = _in_order(team, assignment)
-    return replace(epoch, verdict=verdict, assignment=assignment, cost=cost(team, assignment), verified=True)
+    return replace(epoch, verdict=verdict, assignment=assignment, cost=assignment_cost(team, assignment), verified=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from robochoc.model.orders import Order
 from robochoc.run.defaults import SATISFIES
@@ -34,13 +34,20 @@ class ScheduleName(StrEnum):
 
 
 class Withdrawal(StrEnum):
-    """Who steps aside when the whole team has no solution.
+    """Which robots withdraw when the whole team has no solution.
 
-    As few as possible, by their weights, and proven; or whoever finds no place, in priority order.
+    A minimum withdrawal: as few as possible, by their weights, and proven; or those that find no place, in priority
+    order.
     """
 
-    FEWEST = "fewest"
+    MINIMUM = "minimum"
     MAXIMAL = "maximal"
+    FEWEST = MINIMUM
+
+    @classmethod
+    def _missing_(cls, value: object) -> Self | None:
+        """Return the member that an earlier version spelt `value`."""
+        return cls("minimum") if value == "fewest" else None
 
 
 class OnLoss(StrEnum):

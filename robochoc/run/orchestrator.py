@@ -13,9 +13,9 @@ from robochoc.communication.run_result import Progress
 from robochoc.communication.session import Session
 from robochoc.formats import check_team, held_to_rules
 from robochoc.journal.events import Observer
-from robochoc.model.change import changed_by, describe_change
-from robochoc.model.orders import Order, OrderError, favourable, order_of
-from robochoc.model.outcome import Epoch, Metrics, Outcome, Verdict
+from robochoc.model.change import describe_change, team_after_events
+from robochoc.model.orders import Order, OrderError, compute_order, with_dom_deg_order
+from robochoc.model.outcome import EpochOutcome, Metrics, Outcome, Verdict
 from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
@@ -96,7 +96,7 @@ class _Run:
         self._deadline = None if options.timeout is None else self._began + options.timeout
         self._cache = SolutionCache() if options.cache else None
         self._compiler = TeamCompiler(options.local, self._cache, self._deadline, solver, self._show)
-        self._epochs: list[Epoch] = []
+        self._epochs: list[EpochOutcome] = []
         self._outcome = Outcome(
             team=team.name,
             protocol=options.protocol,
@@ -112,7 +112,11 @@ class _Run:
         options = self._options
         protocol = protocol_named(options.protocol)
         refuse_unfit(self._team, options, protocol)
-        names = order_of(self._team, options.order, options.seed) if isinstance(options.order, Order) else options.order
+        names = (
+            compute_order(self._team, options.order, options.seed)
+            if isinstance(options.order, Order)
+            else options.order
+        )
         journey = ScenarioRun(
             self._team,
             names,
@@ -141,7 +145,9 @@ class _Run:
             outcome = _without(self._summary(), journey)
         except NoLocalSolutionError as alone:
             sure = self._confirmed(journey.team, alone.robot)
-            epoch = Epoch(Verdict.NO_SOLUTION, journey.team.order, verified=sure, witness=alone.robot, confirmed=sure)
+            epoch = EpochOutcome(
+                Verdict.NO_SOLUTION, journey.team.order, verified=sure, witness=alone.robot, confirmed=sure
+            )
             outcome = replace(self._told(epoch), reason=str(alone))
         if outcome.verdict is Verdict.UNKNOWN and outcome.reason is None:
             outcome = replace(outcome, reason=self._limit(outcome.witness, sum(outcome.metrics.messages.values())))
@@ -191,7 +197,7 @@ class _Run:
         while True:
             team = journey.arranged()
             if outcome.placed_by == MINIMISES and self._options.order is None:
-                team = favourable(team)
+                team = with_dom_deg_order(team)
             compiled = self._compiler.compile(team, every=True)
             self._announce(protocol, Opening.of(compiled, brief))
             with self._session(protocol, compiled, brief) as session:
@@ -215,10 +221,10 @@ class _Run:
 
     # Epochs
 
-    def _epoch(self, played: Played, traits: Traits) -> Epoch:
+    def _epoch(self, played: Played, traits: Traits) -> EpochOutcome:
         """What an epoch has come to, held against every constraint, or against the judge if that is asked for."""
         team, result, opened, compiled = played
-        epoch = Epoch(
+        epoch = EpochOutcome(
             verdict=result.verdict,
             robots=team.order,
             opened_by=opened,
@@ -234,7 +240,7 @@ class _Run:
             return epoch
         return replace(epoch, confirmed=self._confirmed(team, total=epoch.cost))
 
-    def _told(self, epoch: Epoch) -> Outcome:
+    def _told(self, epoch: EpochOutcome) -> Outcome:
         """The outcome of a run that ended with `epoch`."""
         return replace(
             self._outcome,
@@ -270,7 +276,7 @@ class _Run:
             for events in range(len(self._team.scenario) + 1):
                 changes = self._team.scenario[events - 1].changes if events else ()
                 opened = ", ".join(map(describe_change, changes)) or "nothing" if events else "the start"
-                count = self._judged(changed_by(self._team, events), opened)
+                count = self._judged(team_after_events(self._team, events), opened)
         outcome = replace(self._summary(), count=count)
         aside = absent(self._team, outcome.assignment) if self._options.withdraw and outcome.verified else ()
         return replace(outcome, withdrawn=aside)
@@ -283,7 +289,7 @@ class _Run:
         count = None
         if self._options.count:
             judgement = self._judge().judge(team, count=True)
-            epoch, count = Epoch(judgement.verdict, team.order), judgement.count
+            epoch, count = EpochOutcome(judgement.verdict, team.order), judgement.count
         else:
             epoch = decided(self._judge(), team, self._options, int(withdrawal_cost(team)))
         if epoch.verified:

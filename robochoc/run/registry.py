@@ -11,6 +11,7 @@ from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import DynamicProtocol, Protocol, Settings
 from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import FIRST_FIT, MINIMISES
+from robochoc.run.options import CENTRAL
 from robochoc.system.entry_points import EntryPoint
 from robochoc.system.installed import all_in, loaded, missing, named, names_in
 
@@ -49,6 +50,13 @@ class Offer:
 def protocol_names() -> tuple[str, ...]:
     """The names of all protocols that are installed, ours and others', sorted."""
     return names_in(GROUP)
+
+
+def installed_spelling(name: str) -> str:
+    """Return `name` as its package spells it (`ABT` is `abt`), or `name` itself where it fits none, or several."""
+    names = (*protocol_names(), CENTRAL)
+    spellings = [one for one in names if one.lower() == name.lower()]
+    return spellings[0] if name not in names and len(spellings) == 1 else name
 
 
 def offers() -> tuple[Offer, ...]:

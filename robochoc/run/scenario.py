@@ -22,18 +22,18 @@ from robochoc.journal.events import Began, Observer
 from robochoc.journal.given import TeamWriter
 from robochoc.model.change import (
     ChangeError,
-    changed,
-    changed_by,
-    concerns,
+    affected_robots,
+    apply_changes,
+    apply_possible_changes,
     describe_change,
-    possible,
-    rejoined,
-    without,
+    rejoin,
+    team_after_events,
+    without_robots,
 )
-from robochoc.model.orders import reordered
-from robochoc.model.outcome import Epoch as Answered
+from robochoc.model.orders import with_priorities
+from robochoc.model.outcome import EpochOutcome as Answered
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import AddAgent, Change, Event, Robot, Team
+from robochoc.model.problem import AddAgent, Change, Robot, ScenarioEvent, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
@@ -41,7 +41,7 @@ from robochoc.solver.explanation import Invalidated, invalidated_by
 
 Compile = Callable[[Team], CompiledTeam]
 
-Environment = Callable[[Team, Answered, float | None], Event | None]
+Environment = Callable[[Team, Answered, float | None], ScenarioEvent | None]
 """Where decisions go and changes come from, while the team waits: the robots' surroundings.
 
 It is given each epoch's team and how that epoch ended, once the answer was held against every constraint, and how many
@@ -91,9 +91,9 @@ class Announcer:
         if protocol.traits.costs:
             detail["minimises"] = True
         self._observer(Began(t=0, protocol=protocol.__name__, **detail))
-        fresh = epoch.team.order if session and session.anew else epoch.fresh
-        quiet = session is None or session.quiet
-        self._observer(self._writer.given(epoch.team, epoch.brief, epoch.void, fresh=fresh, quiet=quiet))
+        fresh = epoch.team.order if session and session.anew else epoch.restarted
+        lossless = session is None or session.lossless
+        self._observer(self._writer.given(epoch.team, epoch.brief, epoch.void, fresh=fresh, quiet=lossless))
 
 
 class ScenarioRun:
@@ -117,7 +117,7 @@ class ScenarioRun:
         spares: int = 0,
         brief: RunParameters = NO_BRIEF,
     ) -> None:
-        self.team = self._full = changed_by(team, events=0)
+        self.team = self._full = team_after_events(team, events=0)
         self.withdrawn: list[str] = []
         self.regrets: list[str] = []
         self._files = team
@@ -133,7 +133,7 @@ class ScenarioRun:
 
     def arranged(self) -> Team:
         """The team as the robots see it: in the order of the run. Raises `OrderError`."""
-        return self.team if self._order is None else reordered(self.team, self._order)
+        return self.team if self._order is None else with_priorities(self.team, self._order)
 
     def compiled(self) -> CompiledTeam:
         """Return the team as the robots see it, compiled. Raises `OrderError`, and what compiling raises."""
@@ -176,7 +176,7 @@ class ScenarioRun:
         return result
 
     @property
-    def _next(self) -> Event | None:
+    def _next(self) -> ScenarioEvent | None:
         """The event that comes next."""
         return self._files.scenario[self._happened] if self._happened < len(self._files.scenario) else None
 
@@ -185,7 +185,7 @@ class ScenarioRun:
         """Whether the time is over, or all messages have been sent."""
         return self._left_s() == 0 or (self._messages is not None and self._messages <= 0)
 
-    def expect(self, event: Event) -> None:
+    def expect(self, event: ScenarioEvent) -> None:
         """`event` will happen, too, after all that is known to come. What of it cannot be is left out then."""
         self._files = replace(self._files, scenario=(*self._files.scenario, event))
         self._loose = True
@@ -195,23 +195,23 @@ class ScenarioRun:
         self.withdrawn += lost
         self._take_stock(())
 
-    def _described(self, event: Event) -> str:
+    def _described(self, event: ScenarioEvent) -> str:
         """What of `event` can still happen, in a few words."""
         out = set(self.withdrawn)
-        changes = possible(self._full, event.changes)[1] if self._loose else event.changes
-        words = [describe_change(change) for change in changes if out.isdisjoint(concerns(self._full, change))]
+        changes = apply_possible_changes(self._full, event.changes)[1] if self._loose else event.changes
+        words = [describe_change(change) for change in changes if out.isdisjoint(affected_robots(self._full, change))]
         return ", ".join(words) or "nothing"
 
-    def _added_by(self, event: Event) -> Collection[str]:
+    def _added_by(self, event: ScenarioEvent) -> Collection[str]:
         """Let `event` happen; returns who comes. After losses, what cannot be any more is left out."""
         self._happened += 1
         changes: Sequence[Change] = event.changes
         if self._lossy:
-            self._full = changed_by(self._files, self._happened)
+            self._full = team_after_events(self._files, self._happened)
         elif self._loose:
-            self._full, changes = possible(self._full, changes)
+            self._full, changes = apply_possible_changes(self._full, changes)
         else:
-            self._full = changed(self._full, changes)
+            self._full = apply_changes(self._full, changes)
         return [change.robot.name for change in changes if isinstance(change, AddAgent)]
 
     def _back_after(self, lost: Mapping[str, str]) -> Collection[str]:
@@ -228,14 +228,14 @@ class ScenarioRun:
                     self.regrets.append(f"{name} could not come back: {why}")
         self.withdrawn += [name for name in lost if name not in back]
         if back:
-            self._full = changed_by(self._files, self._happened)
+            self._full = team_after_events(self._files, self._happened)
             self._order = self._order or self.team.order
         return back
 
     def _take_stock(self, fresh: Collection[str]) -> None:
         """Who is there now, and in which order: whoever is in `fresh` comes last."""
         self.withdrawn = [name for name in self.withdrawn if name in self._full and name not in fresh]
-        self.team = without(self._full, self.withdrawn)
+        self.team = without_robots(self._full, self.withdrawn)
         if self._order is not None:
             stay = [name for name in self._order if name in self.team and name not in fresh]
             self._order = (*stay, *(name for name in self.team.order if name not in stay))
@@ -253,7 +253,7 @@ class ScenarioRun:
         """Take what the file of `name` says now for what it said from the beginning."""
         robot = read_robot(Path(self.team[name].file))
         if name in self._files:
-            self._files = rejoined(self._files, robot)
+            self._files = rejoin(self._files, robot)
         else:
             self._files = replace(self._files, scenario=tuple(_with_newcomer(e, robot) for e in self._files.scenario))
 
@@ -266,7 +266,7 @@ def _loss(lost: Iterable[str], back: Collection[str]) -> str:
     return "; ".join(words)
 
 
-def _with_newcomer(event: Event, robot: Robot) -> Event:
+def _with_newcomer(event: ScenarioEvent, robot: Robot) -> ScenarioEvent:
     """`event`, in which whoever comes under the name of `robot` is that robot."""
     changes = (AddAgent(robot) if isinstance(c, AddAgent) and c.robot.name == robot.name else c for c in event.changes)
     return replace(event, changes=tuple(changes))

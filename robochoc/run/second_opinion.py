@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from robochoc.model.outcome import Epoch, Verdict
-from robochoc.model.problem import INFINITE, Kind, Team
+from robochoc.model.outcome import EpochOutcome, Verdict
+from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.run.incumbent import absent
 from robochoc.run.options import Options, Withdrawal
 from robochoc.solver.central import CentralSolver, Judgement
 from robochoc.solver.failures import SolverLostError
-from robochoc.verification.checker import RefutedError, cost, has_local_solution
+from robochoc.verification.checker import RefutedError, assignment_cost, has_local_solution
 
 
-def decided(judge: CentralSolver, team: Team, options: Options, aside: int) -> Epoch:
+def decided(judge: CentralSolver, team: Team, options: Options, aside: int) -> EpochOutcome:
     """What `judge` makes of `team`, with the fewest robots aside if that is asked for and has to be.
 
     `aside` is the price at which a robot of weight 1 steps aside. Raises as `Judge.judge` does, and `SolverLostError`
@@ -21,7 +21,7 @@ def decided(judge: CentralSolver, team: Team, options: Options, aside: int) -> E
     """
     price = None
     judgement = None
-    if options.withdraw is not Withdrawal.FEWEST or team.kind is Kind.DISCSP:
+    if options.withdraw is not Withdrawal.FEWEST or team.kind is ProblemKind.DISCSP:
         judgement = judge.judge(team)
     if judgement is None or (options.withdraw is not None and judgement.verdict is Verdict.NO_SOLUTION):
         price = aside
@@ -71,10 +71,12 @@ def contradiction(opinion: Judgement, total: float) -> str | None:
 
 def total_cost(team: Team, assignment: Mapping[str, int], aside: float | None) -> float:
     """What `assignment` costs, and those who have stepped aside, one of weight 1 at the price `aside`."""
-    return cost(team, assignment) + (aside or 0) * sum(team[name].weight for name in absent(team, assignment))
+    return assignment_cost(team, assignment) + (aside or 0) * sum(
+        team[name].weight for name in absent(team, assignment)
+    )
 
 
-def _told(judgement: Judgement, team: Team, aside: int | None) -> Epoch:
+def _told(judgement: Judgement, team: Team, aside: int | None) -> EpochOutcome:
     verdict, assignment, bound = judgement.verdict, judgement.assignment, None
     if judgement.cost is not None:
         total = total_cost(team, assignment, aside)
@@ -82,8 +84,8 @@ def _told(judgement: Judgement, team: Team, aside: int | None) -> Epoch:
             raise SolverLostError(f"the constraint solver's answer costs {total:,}, and it says {judgement.cost:,}")
     if verdict is Verdict.UNKNOWN and judgement.bound is not None:
         bound = judgement.bound // (aside or 1)
-    if verdict is Verdict.OPTIMAL and team.kind is Kind.DISCSP and not absent(team, assignment):
+    if verdict is Verdict.OPTIMAL and team.kind is ProblemKind.DISCSP and not absent(team, assignment):
         verdict = Verdict.SOLUTION
     answered = judgement.cost is not None or verdict is Verdict.SOLUTION
-    paid = cost(team, assignment) if answered else None
-    return Epoch(verdict, team.order, assignment=assignment, cost=paid, bound=bound, verified=answered)
+    paid = assignment_cost(team, assignment) if answered else None
+    return EpochOutcome(verdict, team.order, assignment=assignment, cost=paid, bound=bound, verified=answered)

@@ -20,7 +20,6 @@ from robochoc.model.message import Envelope, Message
 from robochoc.protocols.protocol import Protocol
 from robochoc.services.identifier import AgentIdentifier, identifier_on
 from robochoc.sniffer.acl import ACLError, ACLMessage
-from robochoc.sniffer.performatives import act_of
 
 ONTOLOGY = "robochoc"
 JSON = ("json", "utf-8")
@@ -64,7 +63,7 @@ class Conversation:
         said = _json_of(envelope.content, self._fields)
         language, encoding = PACKED if said is None else JSON
         return ACLMessage(
-            performative=act_of(type(message).__name__).performative,
+            performative=message.act.performative,
             sender=identifier_on(self._platform, envelope.sender),
             receiver=(identifier_on(self._platform, envelope.receiver),),
             content=b64encode(envelope.content).decode() if said is None else said,
@@ -95,7 +94,7 @@ class Conversation:
             raise ACLError(f"{CLOCK} {_shown(clock)} is to be a number of constraint checks")
         content = self._content(acl)
         message = self._decoded(content)
-        performative = act_of(type(message).__name__).performative
+        performative = message.act.performative
         if acl.performative is not performative:
             raise ACLError(f"a message of type {type(message).__name__} is {performative}, not {acl.performative}")
         if acl.sender is None or len(acl.receiver) != 1:

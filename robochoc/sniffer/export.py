@@ -43,7 +43,6 @@ def table(feed: Feed, messages: Sequence[int]) -> Iterator[bytes]:
     """The messages as CSV, a row each, after the headings."""
     yield _row(HEADINGS)
     trace, of, steps = feed.trace, feed.trace.messages, feed.trace.steps
-    performatives = feed.performatives()
     for message in messages:
         taken = of.taken[message]
         seen = taken != NOT_YET
@@ -58,7 +57,7 @@ def table(feed: Feed, messages: Sequence[int]) -> Iterator[bytes]:
                 trace.robots[of.sender[message]],
                 trace.robots[of.receiver[message]],
                 trace.kinds[of.kind[message]],
-                performatives[of.kind[message]],
+                feed.protocols.act_of(message).performative,
                 of.bytes[message],
                 int(of.clock[message]),
                 int(steps.clock[taken]) if seen else "",

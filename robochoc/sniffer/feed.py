@@ -17,16 +17,16 @@ from typing import Any, assert_never
 import msgspec
 
 from robochoc.formats.result import result_json
-from robochoc.model.outcome import Epoch, Outcome, Verdict
-from robochoc.model.priorities import natural
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.priorities import natural_key
 from robochoc.sniffer.acl import text
 from robochoc.sniffer.columns import packed
 from robochoc.sniffer.names import Names
-from robochoc.sniffer.performatives import act_of
+from robochoc.sniffer.recorded_messages import RunProtocols
 from robochoc.sniffer.rows import Note, Run
+from robochoc.sniffer.sentences import sentence
 from robochoc.sniffer.speech import Speech
 from robochoc.sniffer.trace import Trace
-from robochoc.sniffer.words import sentence
 
 FORMAT = 1
 MOST_ROWS = 1 << 16
@@ -78,8 +78,9 @@ class Feed:
         self.trace = trace
         self._live = live
         self._chosen = list(chosen)
-        self.names = Names(trace)
-        self.speech = Speech(trace)
+        self.protocols = RunProtocols(trace)
+        self.names = Names(trace, self.protocols)
+        self.speech = Speech(trace, self.protocols)
 
     def about(self) -> bytes:
         """What was run, who took part, and how far it is."""
@@ -97,7 +98,7 @@ class Feed:
                 "order": order if order is None or isinstance(order, str) else "listed",
                 "channel": None if header.channel is msgspec.UNSET else header.channel,
                 "robots": [{"name": name, "variables": self.names.variables(name)} for name in trace.robots],
-                "kinds": [_kind(name) for name in trace.kinds],
+                "kinds": [self._kind(name) for name in trace.kinds],
                 "runs": [_run(run) for run in trace.runs],
                 "outcome": msgspec.Raw(result_json(trace.outcome)) if trace.outcome else None,
                 "notes": [_note_of(note) for note in _told(trace.notes)],
@@ -167,17 +168,17 @@ class Feed:
             "fields": self.speech.fields(acl),
         }
 
-    def performatives(self) -> list[str]:
-        """What is done by messages of each type, in FIPA's terms, in the order of the trace's types."""
-        return [str(act_of(name).performative) for name in self.trace.kinds]
-
     def words(self, message: int) -> str:
-        """What one message says, in words."""
+        """Return what one message says, in words."""
         trace, of = self.trace, self.trace.messages
         run = of.run[message]
-        setting = self.names.setting(run, trace.robots[of.sender[message]], trace.robots[of.receiver[message]])
-        ours = self.speech.is_ours(run)
-        return sentence(trace.kinds[of.kind[message]], trace.content(message), setting, ours=ours)
+        words = self.names.wording(run, trace.robots[of.sender[message]], trace.robots[of.receiver[message]])
+        kind = trace.kinds[of.kind[message]]
+        return sentence(kind, trace.content(message), words, self.protocols.type_of(message))
+
+    def _kind(self, name: str) -> dict[str, str]:
+        act = self.protocols.act_of_type(name)
+        return {"name": name, "performative": str(act.performative), "why": act.why}
 
 
 def _check(first: int, end: int, count: int) -> None:
@@ -185,11 +186,6 @@ def _check(first: int, end: int, count: int) -> None:
         raise BadRequestError(f"there are no rows from {first} to {end}, only {count}")
     if end - first > MOST_ROWS:
         raise BadRequestError(f"{end - first} rows are too many at once: at most {MOST_ROWS}")
-
-
-def _kind(name: str) -> dict[str, str]:
-    act = act_of(name)
-    return {"name": name, "performative": str(act.performative), "why": act.why}
 
 
 def _run(run: Run) -> dict[str, Any]:
@@ -257,7 +253,7 @@ def _by(outcome: Outcome) -> str:
     return f", as {outcome.ruled_out if outcome.verdict is Verdict.NO_SOLUTION else f'{outcome.witness} has concluded'}"
 
 
-def _epochs(epochs: Sequence[Epoch]) -> str:
+def _epochs(epochs: Sequence[EpochOutcome]) -> str:
     """How many there were, and how each of the first ones ended."""
     ends = [f"{_cut(epoch.lost, 3)} lost" if epoch.lost else _said(epoch.verdict) for epoch in epochs[:MOST_EPOCHS]]
     more = len(epochs) - len(ends)
@@ -265,6 +261,6 @@ def _epochs(epochs: Sequence[Epoch]) -> str:
 
 
 def _cut(names: Sequence[str], most: int = 8) -> str:
-    shown = sorted(names, key=natural)
+    shown = sorted(names, key=natural_key)
     more = f" and {len(shown) - most} more" if len(shown) > most else ""
     return ", ".join(shown[:most]) + more

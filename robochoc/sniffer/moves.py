@@ -14,15 +14,15 @@ from typing import Any
 
 import msgspec
 
-from robochoc.flight.crafts import Craft, crafts_of, lone_craft, possible_crafts
-from robochoc.flight.layout import Field, Point, field_of
+from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts
+from robochoc.flight.layout import Layout, Point, layout_of
 from robochoc.formats import InvalidInputError, robot_in
-from robochoc.model.priorities import natural
+from robochoc.model.priorities import natural_key
 from robochoc.model.problem import Assignment, Robot
 from robochoc.sniffer.feed import BadRequestError
 from robochoc.sniffer.trace import Trace
-from robochoc.view.scene import Drone, Scene
-from robochoc.view.stage import path_of, still
+from robochoc.view.drawing import path_of, still
+from robochoc.view.scene import DrawnDrone, Scene
 
 _MOST_DRONES = 2_000
 """More than that no browser moves smoothly, nor can anybody tell them apart."""
@@ -56,13 +56,13 @@ class Stage:
 
     def __init__(self, trace: Trace, robots: Mapping[str, Robot]) -> None:
         self._trace = trace
-        self._robots = {name: robots.get(name) for name in sorted({*trace.robots, *robots}, key=natural)}
+        self._robots = {name: robots.get(name) for name in sorted({*trace.robots, *robots}, key=natural_key)}
         crew = [(name, craft) for name in self._robots for craft in self._crafts(name, {})]
         crew = crew if len(crew) <= _MOST_DRONES else []
-        order = sorted(range(len(crew)), key=lambda place: (natural(crew[place][1].name), crew[place][1].name))
+        order = sorted(range(len(crew)), key=lambda place: (natural_key(crew[place][1].name), crew[place][1].name))
         self._owners = [crew[place][0] for place in order]
         crafts = [crew[place][1] for place in order]
-        self._field: Field = field_of(crafts, self._others())
+        self._field: Layout = layout_of(crafts, self._others())
         self._drones: dict[str, list[int]] = {}
         for number, owner in enumerate(self._owners):
             self._drones.setdefault(owner, []).append(number)
@@ -105,13 +105,15 @@ class Stage:
 
     def _commands(self) -> list[bytes]:
         homes = zip(self._names, self._field.homes, strict=True)
-        return still(Scene("", (), tuple(Drone(name, round(home[0]), home) for name, home in homes), self._field.axes))
+        return still(
+            Scene("", (), tuple(DrawnDrone(name, round(home[0]), home) for name, home in homes), self._field.axes)
+        )
 
     def _crafts(self, name: str, values: Assignment) -> list[Craft]:
         robot = self._robots[name]
         if robot is not None:
             return crafts_of(robot, values)
-        return [lone_craft(variable, values) for variable in self._trace.variables.get(name, ())]
+        return [craft_of_variable(variable, values) for variable in self._trace.variables.get(name, ())]
 
     def _places(self, name: str, values: Assignment) -> Iterator[tuple[int, Point]]:
         """Where the drones of a robot are, by its decision."""

@@ -8,18 +8,17 @@ from typing import NamedTuple
 from robochoc.formats import InvalidInputError
 from robochoc.journal.given import GivenProblemError, TeamReader
 from robochoc.model.problem import Team
+from robochoc.model.wording import Wording
 from robochoc.protocols.order import PseudoTree
-from robochoc.sniffer.phrases import Setting
+from robochoc.sniffer.recorded_messages import RunProtocols
 from robochoc.sniffer.trace import Trace
 
-_TREES = {"AFCTree"}
-"""Classes of protocols that work on the pseudo-tree that the order induces."""
 
-
-class _Known(NamedTuple):
+class _RunNames(NamedTuple):
     order: tuple[str, ...] = ()
     interfaces: Mapping[str, tuple[str, ...]] = {}
-    above: Mapping[str, tuple[str, ...]] = {}
+    tree: PseudoTree | None = None
+    """The pseudo-tree that the order induces, where the protocol works on it."""
 
 
 class _Seen(Mapping[str, tuple[str, ...]]):
@@ -45,11 +44,12 @@ class Names:
     to decide are taken for those that its messages are about: true of robots without private variables.
     """
 
-    def __init__(self, trace: Trace) -> None:
+    def __init__(self, trace: Trace, protocols: RunProtocols) -> None:
         self._trace = trace
+        self._protocols = protocols
         self._teams: list[Team | None] = []
         self._reader = TeamReader()
-        self._known: dict[int, _Known] = {}
+        self._known: dict[int, _RunNames] = {}
 
     def variables(self, robot: str) -> list[str]:
         """All variables of a robot that are known of."""
@@ -59,24 +59,32 @@ class Names:
                 return [variable.name for variable in team[robot].variables]
         return list(self._trace.variables.get(robot, ()))
 
-    def setting(self, run: int, sender: str, receiver: str) -> Setting:
-        """Who speaks to whom in a run, and what is known of it."""
-        known = self._of_run(run)
-        interfaces = known.interfaces or _Seen(self._trace.variables)
-        return Setting(self._trace.runs[run].protocol, sender, receiver, known.order, known.above, interfaces)
+    def wording(self, run: int, sender: str, receiver: str) -> Wording:
+        """Return the words for a message of a run."""
+        names = self._of_run(run)
+        interfaces = names.interfaces or _Seen(self._trace.variables)
+        branch = names.order
+        if self._works_on_tree(run):
+            known = names.tree if names.tree and sender in names.tree.parents else None
+            branch = (*reversed(known.ancestors(sender)), sender) if known else ()
+        return Wording(sender, receiver, names.order, interfaces, branch)
 
-    def _of_run(self, number: int) -> _Known:
+    def _works_on_tree(self, run: int) -> bool:
+        found = self._protocols.of_run(run)
+        return found is not None and found[1].traits.tree
+
+    def _of_run(self, number: int) -> _RunNames:
         if number not in self._known:
             team = self._team(number)
             if team is None:
-                return _Known()
-            above: dict[str, tuple[str, ...]] = {}
-            if self._trace.runs[number].protocol in _TREES:
-                links = {robot.name: [parent.name for parent in robot.parents] for robot in team.robots}
-                tree = PseudoTree.induced(team.order, links)
-                above = {name: tuple(reversed(tree.ancestors(name))) for name in team.order}
+                return _RunNames()
+            tree = None
+            if self._works_on_tree(number):
+                tree = PseudoTree.induced(
+                    team.order, {robot.name: [parent.name for parent in robot.parents] for robot in team.robots}
+                )
             interfaces = {robot.name: robot.interface for robot in team.robots}
-            self._known[number] = _Known(tuple(team.order), interfaces, above)
+            self._known[number] = _RunNames(tuple(team.order), interfaces, tree)
         return self._known[number]
 
     def _team(self, number: int) -> Team | None:

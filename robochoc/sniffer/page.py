@@ -13,8 +13,8 @@ from html import escape
 from importlib.resources import files
 from typing import Literal
 
+from robochoc.view.content_security import content_security_policy
 from robochoc.view.label import printable
-from robochoc.view.policy import policy
 from robochoc.view.script import viewer_script
 
 Mode = Literal["served", "embedded"]
@@ -37,7 +37,7 @@ def page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title: str = "
     if mode == "served" or "scene" in answers:
         scripts.append(viewer_script())  # the last: the page need not wait until it has been read
     head = (
-        f'<meta http-equiv="Content-Security-Policy" content="{policy(scripts, connections)}">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{content_security_policy(scripts, connections)}">\n'
         f'<link rel="icon" href="data:,">\n<style>\n{_asset("style.css")}</style>\n'
     )
     body = [_block(name, content) for name, content in answers.items()] + [_script(script) for script in scripts]

@@ -21,7 +21,7 @@ from tornado.websocket import WebSocketClosedError
 from robochoc.sniffer.feed import BadRequestError
 from robochoc.sniffer.page import page
 from robochoc.sniffer.session import NotBegunError, Session
-from robochoc.view.address import listening, secret_path, url_of
+from robochoc.view.address import loopback_socket, secret_path, url_of
 from robochoc.view.loopback import SecretHandler, SecretPage, SecretSocket, application, in_browser, served
 
 POLL_S = 0.1
@@ -49,7 +49,7 @@ def serve(
 
 
 async def _serve(session: Session, port: int, ready: Callable[[str], None] | None, *, open_browser: bool) -> None:
-    with listening(port) as here:
+    with loopback_socket(port) as here:
         token = secret_path()
         url = url_of(here, f"{token}/")
         serving = asyncio.create_task(Server(session, here, token).serve())
@@ -60,17 +60,15 @@ async def _serve(session: Session, port: int, ready: Callable[[str], None] | Non
 
 
 class Server:
-    """Serves the journal of `session` on the socket `listening`, below `/token/`.
+    """Serves the journal of `session` on the socket `listener`, below `/token/`.
 
     `seen` is told when the first page has connected. The journal is not read before anybody asks.
     """
 
-    def __init__(
-        self, session: Session, listening: socket, token: str, seen: Callable[[], None] = lambda: None
-    ) -> None:
+    def __init__(self, session: Session, listener: socket, token: str, seen: Callable[[], None] = lambda: None) -> None:
         self.session = session
         self.token = token
-        self._listening = listening
+        self._listener = listener
         self._seen = seen
         self._reader = ThreadPoolExecutor(1, "reader")
         self._insight = ThreadPoolExecutor(1, "insight")
@@ -84,7 +82,7 @@ class Server:
         """Serve until cancelled."""
         following = asyncio.create_task(self._follow())
         try:
-            async with served(self._application(), self._listening):
+            async with served(self._application(), self._listener):
                 await asyncio.Event().wait()
         finally:
             following.cancel()

@@ -10,17 +10,15 @@ import math
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from typing import Any, get_args
+from typing import Any
 
 import msgspec
 
 from robochoc.model.message import Envelope, Message, encode
-from robochoc.protocols.protocol import Protocol
-from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_by_name
 from robochoc.services.identifier import AgentIdentifier, identifier_on
 from robochoc.sniffer.acl import ACLMessage
 from robochoc.sniffer.conversation import CLOCK, JSON, ONTOLOGY, Conversation
-from robochoc.sniffer.performatives import act_of
+from robochoc.sniffer.recorded_messages import RunProtocols
 from robochoc.sniffer.trace import Trace
 
 _MARKS = {"base64", "float", "map"}
@@ -33,10 +31,10 @@ _FIELDS = tuple(field.name for field in msgspec.structs.fields(ACLMessage) if fi
 class Speech:
     """The ACL messages of `trace`."""
 
-    def __init__(self, trace: Trace) -> None:
+    def __init__(self, trace: Trace, protocols: RunProtocols) -> None:
         self._trace = trace
-        self._protocols: dict[int, tuple[str, type[Protocol]] | None] = {}
-        self._runs: dict[int, tuple[Conversation, Mapping[str, type[Message]]] | None] = {}
+        self._protocols = protocols
+        self._conversations: dict[int, Conversation | None] = {}
 
     def acl_of(self, message: int) -> ACLMessage:
         """One message. It answers another where the step that said it took in one message of the receiver's only."""
@@ -45,23 +43,13 @@ class Speech:
         reply_to = of.sequence[answered[0]] if len(answered) == 1 else None
         envelope = self._envelope(message)
         if envelope is not None:
-            talk = self._talk(message)
-            if talk is not None:
+            conversation = self._conversation(self._trace.messages.run[message])
+            if conversation is not None:
                 try:
-                    return talk[0].acl_of(envelope, of.sequence[message], reply_to)
+                    return conversation.acl_of(envelope, of.sequence[message], reply_to)
                 except ValueError:  # BadACL is one; and so is a name that no agent has
                     pass
         return self._made_up(message, reply_to)
-
-    def is_ours(self, run: int) -> bool:
-        """Whether the protocol of a run is one of robochoc's; also if it is not to be found, as an older one's."""
-        found = self._spoken(run)
-        return found is None or found[1].__module__.startswith("robochoc.")
-
-    def _spoken(self, run: int) -> tuple[str, type[Protocol]] | None:
-        if run not in self._protocols:
-            self._protocols[run] = spoken_in(self._trace, run)
-        return self._protocols[run]
 
     def plain(self, message: int) -> dict[str, Any]:
         """The fields of a message as JSON can hold them."""
@@ -76,8 +64,7 @@ class Speech:
     def _envelope(self, message: int) -> Envelope | None:
         """The message as it travelled; None where its protocol is not there, or does not know it."""
         trace, of = self._trace, self._trace.messages
-        talk = self._talk(message)
-        kind = None if talk is None else talk[1].get(trace.kinds[of.kind[message]])
+        kind = self._protocols.type_of(message)
         if kind is None:
             return None
         size, said = of.bytes[message], list(_packings(kind, trace.content(message)))
@@ -87,30 +74,23 @@ class Speech:
         sender, receiver = trace.robots[of.sender[message]], trace.robots[of.receiver[message]]
         return Envelope(sender, receiver, content, int(of.clock[message]))
 
-    def _talk(self, message: int) -> tuple[Conversation, Mapping[str, type[Message]]] | None:
-        number = self._trace.messages.run[message]
-        if number not in self._runs:
-            self._runs[number] = self._conversation(number)
-        return self._runs[number]
-
-    def _conversation(self, number: int) -> tuple[Conversation, Mapping[str, type[Message]]] | None:
-        found = self._spoken(number)
-        if found is None:
-            return None
-        name, protocol = found
-        kinds = {kind.__name__: kind for kind in get_args(protocol.messages) or (protocol.messages,)}
-        if not all(kind.__struct_config__.array_like for kind in kinds.values()):
-            return None
-        return Conversation(protocol, name, PLATFORM, _conversation_id(number)), kinds
+    def _conversation(self, run: int) -> Conversation | None:
+        if run not in self._conversations:
+            found = self._protocols.of_run(run)
+            as_arrays = all(kind.__struct_config__.array_like for kind in self._protocols.message_types(run).values())
+            self._conversations[run] = (
+                Conversation(found[1], found[0], PLATFORM, _conversation_id(run)) if found and as_arrays else None
+            )
+        return self._conversations[run]
 
     def _made_up(self, message: int, reply_to: int | None) -> ACLMessage:
         """The message without its protocol's help."""
         trace, of = self._trace, self._trace.messages
         sender, receiver = trace.robots[of.sender[message]], trace.robots[of.receiver[message]]
         kind, number = trace.kinds[of.kind[message]], of.run[message]
-        found = self._spoken(number)
+        found = self._protocols.of_run(number)
         return ACLMessage(
-            performative=act_of(kind).performative,
+            performative=self._protocols.act_of(message).performative,
             sender=_identifier(sender),
             receiver=(_identifier(receiver),),
             content=msgspec.json.encode([kind, self.plain(message)]).decode(),
@@ -123,15 +103,6 @@ class Speech:
             in_reply_to=None if reply_to is None else f"{receiver}/{reply_to}",
             user=((CLOCK, str(int(of.clock[message]))),),
         )
-
-
-def spoken_in(trace: Trace, number: int) -> tuple[str, type[Protocol]] | None:
-    """The protocol of a run, and its name, if it is installed: journals name runs' protocols by their classes."""
-    called = trace.runs[number].protocol
-    if called == trace.header.protocol:  # a journal of one run without a beginning
-        with suppress(UnknownProtocolError):
-            return called, protocol_by_name(called)
-    return protocol_by_class(called, [trace.header.protocol])
 
 
 def plain(value: object, depth: int = 32) -> Any:  # noqa: ANN401 - any JSON

@@ -17,7 +17,7 @@ from contextlib import suppress
 from typing import Self
 
 from robochoc.communication.resources import signals_held
-from robochoc.view.address import listening, secret_path, url_of
+from robochoc.view.address import loopback_socket, secret_path, url_of
 from robochoc.view.redirect import RedirectFile
 
 _PATIENCE_S = 2.0
@@ -36,7 +36,7 @@ class Viewer:
     def __init__(self, journal: int, chosen: Sequence[str] = (), port: int = 0, *, open_browser: bool = False) -> None:
         heard, theirs_out = os.pipe()
         theirs_in, lifeline = os.pipe()
-        with listening(port) as here:
+        with loopback_socket(port) as here:
             token = secret_path()
             self.url = url_of(here, f"{token}/")
             self._redirect: RedirectFile | None = None

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-from robochoc.model.problem import Domain, Model, Robot, Team
+from robochoc.model.problem import ConstraintModel, Domain, Robot, Team
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, as_compiled
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.explanation import Known, held
@@ -69,11 +69,11 @@ class AgentProblem(NamedTuple):
 
 
 def agent_problems(
-    team: Team | CompiledTeam, brief: RunParameters = NO_BRIEF, *, everywhere: bool = False, tree: bool = False
+    team: Team | CompiledTeam, brief: RunParameters = NO_BRIEF, *, shared_scopes: bool = False, tree: bool = False
 ) -> dict[str, AgentProblem]:
     """Return the part of each robot of `team` that is compiled, in priority order.
 
-    `everywhere`: every robot of a constraint's scope knows it. `tree`: all know who is whose parent.
+    `shared_scopes`: every robot of a constraint's scope knows it. `tree`: all know who is whose parent.
     """
     compiled = as_compiled(team)
     team = compiled.team
@@ -81,11 +81,11 @@ def agent_problems(
     known = {name: team.variables[name].domain for names in shown.values() for name in names}
     links = {robot.name: tuple(parent.name for parent in robot.parents) for robot in team.robots} if tree else None
     copies: dict[str, list[Known]] = {robot.name: [] for robot in team.robots}
-    if everywhere:
+    if shared_scopes:
         for robot in team.robots:
             for one in held(robot):
                 for owner in {team.owner[name] for name in one.constraint.variables} - {robot.name}:
-                    if one.constraint.model is not Model.PKC:
+                    if one.constraint.model is not ConstraintModel.PKC:
                         copies[owner].append(one)
     secretive: dict[str, list[str]] = {robot.name: [] for robot in team.robots}
     for robot in team.robots:

@@ -15,7 +15,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Kind, Team
+from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_words import Strategy
 from robochoc.solver.cache import SolutionCache
@@ -99,7 +99,7 @@ class CentralSolver:
         """
         if aside is not None:
             return self._minimum(team, with_robots_aside(team, aside))
-        if team.kind is Kind.DISWCSP and not count:
+        if team.kind is ProblemKind.DISWCSP and not count:
             return self._minimum(team, priced(team.variables.values(), list(team.constraints())))
         with ExitStack() as processes:
             ace = self._solver or processes.enter_context(AceProcess(always=self._always_ace))

@@ -18,7 +18,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, Model
+from robochoc.model.problem import INFINITE, ConstraintModel
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.explanation import Known, held, held_below
 from robochoc.solver.filters import Filters
@@ -83,7 +83,7 @@ class LocalProblem:
         self.neighbours = tuple(sorted({*self.parents, *self.children, *met}, key=rank.__getitem__))
         self._table: ConflictTable | None = self._looked_up() if len(self.values) >= LARGE else None
         self._below = _by_robot(ready(known) for _, known in held_below(robot))
-        parts_above = [constraint for model, constraint in above if model is Model.PKC]
+        parts_above = [constraint for model, constraint in above if model is ConstraintModel.PKC]
         secretive = {*part.secretive, *_by_robot(parts_above)}
         self.partners = tuple(parent for parent in self.parents if parent in secretive)
         below = itertools.chain.from_iterable(self._below.values())

@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from robochoc.model.expression import UndefinedValueError, compiled
+from robochoc.model.expression import UndefinedValueError, compile_expression
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Variable
 
 MOST_TUPLES = 4_000_000
@@ -140,7 +140,7 @@ def is_soft(constraint: Constraint) -> bool:
 def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
     """Whether the predicate of `constraint` is true of values of `names`; where it is undefined, it is not."""
     arguments = _arguments(constraint, names)
-    body = compiled(predicate.body, predicate.parameters)
+    body = compile_expression(predicate.body, predicate.parameters)
 
     def holds(values: Sequence[int]) -> bool:
         try:

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from robochoc.model.problem import Constraint, Kind, Team
+from robochoc.model.problem import Constraint, ProblemKind, Team
 from robochoc.solver.cliques import strengthened
 from robochoc.solver.encoding import Codes, Component, Network, Table, UnsupportedError, components, is_soft
 from robochoc.solver.propagation import propagated
@@ -48,7 +48,7 @@ def merged(team: Team) -> tuple[Network, Codes]:
             charges += _charges(part, places, [one for one in soft if one.variables[0] in known])
     paid = [tuple(sorted({row[-1] for row in table.rows})) for table in charges]
     anyway = charged_anyway(team)
-    if anyway or (team.kind is Kind.DISWCSP and not paid):
+    if anyway or (team.kind is ProblemKind.DISWCSP and not paid):
         paid.append((anyway,))
     if sum(map(max, paid)) > HIGHEST:
         raise UnsupportedError(

@@ -9,14 +9,14 @@ _LOOPBACK = "127.0.0.1"
 _SECRET_BYTES = 18
 
 
-def listening(port: int = 0) -> socket:
+def loopback_socket(port: int = 0) -> socket:
     """A socket that listens on the loopback interface; port 0 is any free one. Raises `OSError` when it is taken."""
     return create_server((_LOOPBACK, port))
 
 
-def url_of(listening: socket, path: str = "") -> str:
+def url_of(listener: socket, path: str = "") -> str:
     """Where a browser of this machine finds `path`."""
-    return f"http://{_LOOPBACK}:{listening.getsockname()[1]}/{path}"
+    return f"http://{_LOOPBACK}:{listener.getsockname()[1]}/{path}"
 
 
 def secret_path() -> str:

@@ -12,11 +12,11 @@ from contextlib import suppress
 
 from tornado.web import Application
 
-from robochoc.view.address import listening, secret_path, url_of
+from robochoc.view.address import loopback_socket, secret_path, url_of
+from robochoc.view.drawing import commands
 from robochoc.view.loopback import SecretPage, SecretSocket, application, in_browser, served
 from robochoc.view.page import live_page
 from robochoc.view.scene import Scene
-from robochoc.view.stage import commands
 
 
 def serve(
@@ -31,7 +31,7 @@ def serve(
 
 
 async def _serve(scene: Scene, port: int, ready: Callable[[str], None] | None, *, open_browser: bool) -> None:
-    with listening(port) as here:
+    with loopback_socket(port) as here:
         secret = secret_path()
         url = url_of(here, f"{secret}/")
         async with served(_application(scene, here.getsockname()[1], secret), here):

@@ -12,7 +12,7 @@ class Names {
     this.followed = -1;
   }
 
-  // Once a frame. What moves slowly needs no more than a few looks a second.
+  // Once a frame. What moves slowly needs no more than a few states a second.
   step(now) {
     if (now < this.due) return;
     this.due = now + Names.EVERY;

@@ -2,8 +2,8 @@
 try {
   const THREE = MeshCat.THREE;
   const element = (id) => document.getElementById(id);
-  const film = JSON.parse(element("film").textContent);
-  const viewer = new MeshCat.Viewer(element("stage"));
+  const playback = JSON.parse(element("playback").textContent);
+  const viewer = new MeshCat.Viewer(element("scene"));
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const still = matchMedia("(prefers-reduced-motion: reduce)");
   const narrow = matchMedia("(max-width: 40rem)");
@@ -18,17 +18,17 @@ try {
     const beside = Math.max(Math.min(caption.right, innerWidth - bottom), 0);
     return { left: beside, top: 0, right: innerWidth, bottom };
   };
-  for (const one of document.querySelectorAll(".film")) one.hidden = !film.duration;
+  for (const one of document.querySelectorAll(".playback")) one.hidden = !playback.duration;
   element("facts").open = !narrow.matches;
   element("controls").hidden = false;
   const object = (path) => viewer.scene_tree.find(["meshcat", ...path.split("/")]).object;
-  const player = new Player(film.duration);
-  const timeline = film.duration ? new Timeline(film, player) : null;
+  const player = new Player(playback.duration);
+  const timeline = playback.duration ? new Timeline(playback, player) : null;
   const trails = new Trails(viewer);
-  const camera = new Camera(viewer, film.corners, film.cell, free, still);
+  const camera = new Camera(viewer, playback.corners, playback.cell, free, still);
   const fit = () => { trails.resize(); camera.fit(); timeline?.spread(); };
-  const drones = film.drones.map((drone) => object(drone.path));
-  const names = new Names(viewer, film.drones.map((drone) => object(`${drone.path}/name`)));
+  const drones = playback.drones.map((drone) => object(drone.path));
+  const names = new Names(viewer, playback.drones.map((drone) => object(`${drone.path}/name`)));
 
   const frame = (now) => {
     player.step(now);
@@ -62,7 +62,7 @@ try {
     if (String(command.path).startsWith("/Cameras")) fit();
   };
 
-  // The film comes with the commands, at once or over the WebSocket: from then on its time is ours.
+  // The playback comes with the commands, at once or over the WebSocket: from then on its time is ours.
   const load = viewer.animator.load.bind(viewer.animator);
   viewer.animator.load = (animations, options) => {
     load(animations, options);
@@ -71,7 +71,7 @@ try {
     for (const action of viewer.animator.actions) {
       const number = drones.indexOf(action.getRoot());
       const moves = action.getClip().tracks.find((track) => track.name === ".position");
-      if (number >= 0 && moves) ways.push([moves.times, moves.values, film.drones[number].looks, film.drones[number].colour]);
+      if (number >= 0 && moves) ways.push([moves.times, moves.values, playback.drones[number].states, playback.drones[number].colour]);
     }
     trails.draw(ways, viewer.scene_tree.find(["meshcat"]).object);
     setTrail(element("trail").value);
@@ -82,7 +82,7 @@ try {
   // Camera
   const views = ["overview", "top", "front"];
   const chosen = element("drone");
-  for (const [number, drone] of film.drones.entries()) {
+  for (const [number, drone] of playback.drones.entries()) {
     const option = document.createElement("option");
     option.value = String(number);
     option.textContent = drone.name;
@@ -113,9 +113,9 @@ try {
     return found;
   };
   let pressed = null;
-  element("stage").addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
-  element("stage").addEventListener("pointermove", (event) => {
-    if (!event.buttons) element("stage").classList.toggle("pointed", under(event) >= 0);
+  element("scene").addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
+  element("scene").addEventListener("pointermove", (event) => {
+    if (!event.buttons) element("scene").classList.toggle("pointed", under(event) >= 0);
   });
   addEventListener("pointerup", (event) => {
     const clicked = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) < 5;
@@ -176,7 +176,7 @@ try {
   viewer.set_3d_pane_size();
   fit();
   requestAnimationFrame(frame);
-  globalThis.Film = { viewer, camera, player, trails, drones, names };
+  globalThis.Playback = { viewer, camera, player, trails, drones, names };
 } catch (error) {
   const trouble = document.getElementById("trouble");
   trouble.append(error.message);

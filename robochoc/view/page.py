@@ -11,12 +11,12 @@ from html import escape
 from importlib.resources import files
 from string import Template
 
-from robochoc.view.film_json import film_json
+from robochoc.view.content_security import content_security_policy
+from robochoc.view.drawing import commands
 from robochoc.view.label import printable
-from robochoc.view.policy import policy
+from robochoc.view.playback_json import playback_json
 from robochoc.view.scene import Scene
 from robochoc.view.script import viewer_script
-from robochoc.view.stage import commands
 
 _PLAYER = ("names.js", "trails.js", "camera.js", "player.js", "timeline.js", "page.js")
 """The player's parts, in this order one script."""
@@ -38,11 +38,11 @@ def _filled(scene: Scene, embedded: str, connections: str) -> bytes:
     return (
         Template((here / "page.html").read_text(encoding="utf-8"))
         .substitute(
-            policy=policy((viewer, player), connections),
+            policy=content_security_policy((viewer, player), connections),
             title=_text(scene.title),
             facts="".join(f"<dt>{_text(name)}</dt><dd>{_text(fact)}</dd>" for name, fact in scene.facts),
             commands=embedded,
-            film=film_json(scene),
+            playback=playback_json(scene),
             viewer=viewer,
             player=player,
         )

@@ -1,8 +1,8 @@
-// What time it is in the film. meshcat's animator shows that time; it does not run by itself, so that speed, pauses and
+// What time it is in the playback. meshcat's animator shows that time; it does not run by itself, so that speed, pauses and
 // steps are ours alone.
 class Player {
   static SPEEDS = [0.25, 0.5, 1, 2, 4];
-  static LEAD = 0.7; // seconds before the film begins by itself
+  static LEAD = 0.7; // seconds before the playback begins by itself
   static LONGEST = 0.5; // seconds from frame to frame: after more, the page was out of sight
 
   constructor(duration) {

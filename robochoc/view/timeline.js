@@ -3,18 +3,18 @@ class Timeline {
   static APART = 20; // pixels
   static BRIEF = 0.5; // seconds: an epoch in which nobody had to fly is told together with the next
 
-  constructor(film, player) {
-    this.film = film;
+  constructor(playback, player) {
+    this.playback = playback;
     this.player = player;
     this.slider = document.getElementById("time");
     this.hint = document.getElementById("hint");
-    this.slider.max = film.duration;
+    this.slider.max = playback.duration;
     this.slider.addEventListener("input", () => { player.pause(); player.seek(this.slider.valueAsNumber); });
-    const dated = film.chapters.length > 1 ? film.chapters : [];
+    const dated = playback.chapters.length > 1 ? playback.chapters : [];
     this.buttons = dated.map((chapter, number) => this.add(
       chapter.at, String(number), `Epoch ${number}: ${chapter.opened}, ${chapter.says}`, ""));
-    for (const mark of film.marks)
-      this.add(mark.at, "", `${film.drones[mark.drone].name}: ${mark.says}`, "happened");
+    for (const mark of playback.marks)
+      this.add(mark.at, "", `${playback.drones[mark.drone].name}: ${mark.says}`, "happened");
     this.chapter = -1;
     this.spread();
   }
@@ -38,7 +38,7 @@ class Timeline {
     const room = this.slider.parentElement.clientWidth;
     const marks = [...document.querySelectorAll("#marks button")].sort((a, b) => a.dataset.at - b.dataset.at);
     const apart = Math.min(Timeline.APART, room / marks.length);
-    const wanted = marks.map((mark) => room * mark.dataset.at / this.film.duration);
+    const wanted = marks.map((mark) => room * mark.dataset.at / this.playback.duration);
     const spots = [];
     for (const spot of wanted) spots.push(Math.max(spot, (spots.at(-1) ?? -Infinity) + apart));
     for (let mark = marks.length - 1, most = room; mark >= 0; mark--, most -= apart) {
@@ -57,18 +57,18 @@ class Timeline {
 
   // The epoch that flies at a time.
   at(time) {
-    return this.film.chapters.reduce((found, chapter, number) => (chapter.at <= time + 1e-6 ? number : found), 0);
+    return this.playback.chapters.reduce((found, chapter, number) => (chapter.at <= time + 1e-6 ? number : found), 0);
   }
 
   // Where the epoch before, or after, begins.
   beside(time, forth) {
-    const begins = [...this.film.chapters.map((chapter) => chapter.at), this.film.duration];
-    return forth ? begins.find((at) => at > time + 1e-3) ?? this.film.duration
+    const begins = [...this.playback.chapters.map((chapter) => chapter.at), this.playback.duration];
+    return forth ? begins.find((at) => at > time + 1e-3) ?? this.playback.duration
       : begins.reverse().find((at) => at < time - 0.2) ?? 0;
   }
 
   show(time) {
-    const { duration, chapters } = this.film;
+    const { duration, chapters } = this.playback;
     const chapter = this.at(time);
     this.slider.value = time;
     this.slider.style.setProperty("--done", `${100 * time / duration}%`);

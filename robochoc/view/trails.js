@@ -42,7 +42,7 @@ class Trails {
     };
   }
 
-  // `ways` are the drones' [times, positions, looks, colour]; `parent` has the frame of their positions.
+  // `ways` are the drones' [times, positions, states, colour]; `parent` has the frame of their positions.
   draw(ways, parent) {
     const THREE = MeshCat.THREE;
     const parts = { begin: [], end: [], tint: [], span: [] };
@@ -63,8 +63,8 @@ class Trails {
     parent.add(this.mesh);
   }
 
-  // The pieces of one way, cut where its drone changes its looks.
-  static add(parts, times, positions, looks, colour) {
+  // The pieces of one way, cut where its drone changes its states.
+  static add(parts, times, positions, states, colour) {
     const at = (time, key) => {
       const between = (time - times[key]) / (times[key + 1] - times[key]);
       return [0, 1, 2].map((axis) => {
@@ -72,7 +72,7 @@ class Trails {
         return from + between * (positions[3 * key + 3 + axis] - from);
       });
     };
-    const paints = [[-1, "", colour], ...looks];
+    const paints = [[-1, "", colour], ...states];
     let paint = 0;
     for (let key = 0; key + 1 < times.length; key++) {
       let from = times[key];

@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 
 from robochoc.replay.insight import states_of
-from tests.support.sniffed import Served
 from tests.support.sniffer_pages import (
     ALL,
     COUNT,
@@ -29,12 +28,13 @@ from tests.support.sniffer_pages import (
     text_is,
     until,
 )
+from tests.support.sniffer_server import SnifferServer
 
 pytestmark = pytest.mark.usefixtures("without_the_scenes_viewer")
 
 
 @pytest.fixture(scope="module")
-def tab(browser: Any, server: Served) -> Iterator[Page]:  # noqa: ANN401
+def tab(browser: Any, server: SnifferServer) -> Iterator[Page]:  # noqa: ANN401
     with shown(browser, server.url) as page:
         yield page
 
@@ -47,7 +47,7 @@ def page(tab: Page) -> Page:
 
 
 @pytest.fixture
-def loaded(tab: Page, server: Served) -> Page:
+def loaded(tab: Page, server: SnifferServer) -> Page:
     """The same, loaded anew: nothing has the focus."""
     tab.goto("about:blank")
     tab.goto(server.url)

@@ -10,7 +10,6 @@ import pytest
 
 from robochoc.journal.journal import lines_of
 from robochoc.sniffer.session import Session
-from tests.support.sniffed import Served, served
 from tests.support.sniffer_pages import (
     ALL,
     CONTRAST,
@@ -29,6 +28,7 @@ from tests.support.sniffer_pages import (
     text_is,
     until,
 )
+from tests.support.sniffer_server import SnifferServer, sniffer_server
 
 IN_SIGHT = """(m) => {
   const { filter, view, chart, list } = Sniffer.page;
@@ -43,7 +43,7 @@ pytestmark = pytest.mark.usefixtures("without_the_scenes_viewer")
 
 
 @pytest.fixture(scope="module")
-def tab(browser: Any, server: Served) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
+def tab(browser: Any, server: SnifferServer) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
     with shown(browser, server.url) as page:
         yield page
 
@@ -197,8 +197,8 @@ def test_keys_go_from_value_to_value(page: Page) -> None:
 def test_a_live_page_waits_for_robots_and_knows_when_nobody_saw_the_end(tab: Page, tmp_path: Any) -> None:  # noqa: ANN401
     file = tmp_path / "run.journal"
     file.write_bytes(b"")
-    server: Served
-    with served(Session(file, live=True)) as server:
+    server: SnifferServer
+    with sniffer_server(Session(file, live=True)) as server:
         page = tab.context.new_page()
         page.goto(server.url)
         text_is(page, "#nothing", "Waiting for the robots")

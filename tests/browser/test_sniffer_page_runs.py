@@ -16,7 +16,6 @@ from robochoc.journal.journal import lines_of
 from robochoc.sniffer.packed import packed_feed
 from robochoc.sniffer.page import page as page_of
 from robochoc.sniffer.session import Session
-from tests.support.sniffed import Served, journal_of, served
 from tests.support.sniffer_pages import (
     ALL,
     CONTRAST,
@@ -31,6 +30,7 @@ from tests.support.sniffer_pages import (
     text_is,
     until,
 )
+from tests.support.sniffer_server import SnifferServer, journal_of, sniffer_server
 
 HOSTILE = "</script><img src=x onerror=document.title='broken'>"
 
@@ -46,7 +46,7 @@ def test_a_run_is_followed_until_somebody_looks_elsewhere(browser: Any, tmp_path
     file = tmp_path / "run.journal"
     place = 600
     file.write_bytes(b"".join(lines[:place]))
-    with served(Session(file, live=True)) as server, file.open("ab") as writing:
+    with sniffer_server(Session(file, live=True)) as server, file.open("ab") as writing:
 
         def more(end: int) -> None:
             nonlocal place
@@ -73,7 +73,7 @@ def test_a_server_that_ends_is_told_and_what_is_seen_stays(browser: Any, tmp_pat
     file = tmp_path / "run.journal"
     file.write_bytes(b"".join(list(lines_of(JOURNAL))[:600]))
     with ExitStack() as ends:
-        server = ends.enter_context(served(Session(file, live=True)))
+        server = ends.enter_context(sniffer_server(Session(file, live=True)))
         count = server.json("about")["messages"]
         with shown(browser, server.url, f"{count} messages") as page:
             ends.close()
@@ -85,12 +85,12 @@ def test_a_server_that_ends_is_told_and_what_is_seen_stays(browser: Any, tmp_pat
 def test_damage_and_an_empty_journal_are_told(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401
     file = tmp_path / "run.journal"
     file.write_bytes(b"".join(list(lines_of(JOURNAL))[:300]) + b"nonsense\n")
-    with served(Session(file)) as server:
+    with sniffer_server(Session(file)) as server:
         until(lambda: server.json("about")["damage"], "no damage")
         with shown(browser, server.url, f"{server.json('about')['messages']} messages") as page:
             assert "The journal is damaged" in page.inner_text("#notices")
     file.write_bytes(journal_of([], OUTCOME))
-    with served(Session(file)) as server, shown(browser, server.url, "0 messages") as page:
+    with sniffer_server(Session(file)) as server, shown(browser, server.url, "0 messages") as page:
         until(lambda: "Nobody has said anything" in page.inner_text("#notices"), "an empty page, and nobody says why")
 
 
@@ -104,7 +104,7 @@ def test_names_of_strangers_are_text(browser: Any, tmp_path: Path) -> None:  # n
     file = tmp_path / "run.journal"
     kept = [json.dumps(line, separators=(",", ":")) + "\n" for line in lines if line["event"] != "Given"]
     file.write_text("".join(kept))
-    with served(Session(file)) as server, shown(browser, server.url) as page:
+    with sniffer_server(Session(file)) as server, shown(browser, server.url) as page:
         names = [one["name"] for one in server.json("about")["robots"]]
         page.evaluate(f"Sniffer.page.robot({names.index(HOSTILE)})")
         choose(page, 0)
@@ -129,7 +129,7 @@ def test_an_export_needs_no_server(browser: Any, tmp_path: Path) -> None:  # noq
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_it_can_be_read_in_light_and_dark(browser: Any, server: Served, scheme: str) -> None:  # noqa: ANN401
+def test_it_can_be_read_in_light_and_dark(browser: Any, server: SnifferServer, scheme: str) -> None:  # noqa: ANN401
     with shown(browser, server.url, color_scheme=scheme, reduced_motion="reduce") as page:
         corner = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("L"))[3, 3]
         assert (corner < 60) == (scheme == "dark")
@@ -146,7 +146,7 @@ def test_it_can_be_read_in_light_and_dark(browser: Any, server: Served, scheme: 
         until(lambda: page.evaluate("document.documentElement.dataset.theme") != scheme, "the theme stays")
 
 
-def test_a_narrow_window_has_all_in_reach(browser: Any, server: Served) -> None:  # noqa: ANN401
+def test_a_narrow_window_has_all_in_reach(browser: Any, server: SnifferServer) -> None:  # noqa: ANN401
     with shown(browser, server.url, viewport={"width": 360, "height": 700}) as page:
         assert page.evaluate("document.documentElement.scrollWidth") <= 360
         page.click("#grid .row[data-message='3']")

@@ -16,12 +16,12 @@ import numpy.typing as npt
 import pytest
 from PIL import Image
 
+from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import mission_of
-from robochoc.flight.quadrotor.flown import Flown
 from robochoc.view.page import page
 from robochoc.view.scene import Scene, scene_of
+from tests.support.browser_pages import watched_page
 from tests.support.flights import LEG_S, epochs_of_three, five, straight
-from tests.support.pages import watched
 from tests.support.program import ROOT
 from tests.support.sniffer_pages import CONTRAST, NAMELESS, until
 
@@ -35,8 +35,8 @@ Page = Any
 def scene(**how: Any) -> Scene:  # noqa: ANN401 - `straight`'s
     outcome = epochs_of_three(HOSTILE)
     mission = mission_of(outcome, five())
-    flown: Flown = straight(mission, **how)
-    return scene_of(outcome, mission=mission, flown=flown)
+    flown: FlightLog = straight(mission, **how)
+    return scene_of(outcome, mission, flown)
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +49,9 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @contextmanager
 def opened(browser: Any, url: str, **options: Any) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
     """The page, once it is drawn. No script may complain, and nothing may be asked for anything."""
-    with watched(browser, **{"viewport": {"width": 700, "height": 560}, **options}) as (page, complaints, asked):
+    with watched_page(browser, **{"viewport": {"width": 700, "height": 560}, **options}) as (page, complaints, asked):
         page.goto(url)
-        until(lambda: page.evaluate("Boolean(globalThis.Film)"), "it does not begin")
+        until(lambda: page.evaluate("Boolean(globalThis.Playback)"), "it does not begin")
         yield page
         assert page.locator("#trouble").is_hidden()
     assert not [one for one in complaints if "GL Driver Message" not in one]  # it is slow to photograph
@@ -67,7 +67,7 @@ def one(browser: Any, file: Path) -> Iterator[Page]:  # noqa: ANN401 - Playwrigh
 @pytest.fixture
 def player(one: Page) -> Page:
     """The page, paused at the beginning."""
-    one.evaluate("Film.player.pause(); Film.player.seek(0); Film.camera.see('overview', true)")
+    one.evaluate("Playback.player.pause(); Playback.player.seek(0); Playback.camera.see('overview', true)")
     one.select_option("#speed", "1")
     one.select_option("#trail", "all")
     one.locator("#play").focus()
@@ -76,13 +76,13 @@ def player(one: Page) -> Page:
 
 
 def now(page: Page) -> float:
-    time: float = page.evaluate("Film.player.time")
+    time: float = page.evaluate("Playback.player.time")
     return time
 
 
 def place(page: Page, drone: int) -> list[float]:
     """Where a drone is, as it is drawn: x, y and z in cells."""
-    at: list[float] = page.evaluate(f"Film.drones[{drone}].position.toArray()")
+    at: list[float] = page.evaluate(f"Playback.drones[{drone}].position.toArray()")
     return at
 
 
@@ -112,20 +112,22 @@ def test_of_names_that_would_cover_each_other_one_is_written(player: Page) -> No
     """That of the drone which is nearest, or which is followed."""
 
     def named() -> list[bool]:
-        written: list[bool] = player.evaluate("Film.names.choose(), Film.names.names.map((name) => name.visible)")
+        written: list[bool] = player.evaluate(
+            "Playback.names.choose(), Playback.names.names.map((name) => name.visible)"
+        )
         return written
 
     assert all(named())
-    player.evaluate("Film.drones[1].position.copy(Film.drones[0].position)")
+    player.evaluate("Playback.drones[1].position.copy(Playback.drones[0].position)")
     assert sorted(named()[:2]) == [False, True]
     assert all(named()[2:])
     hidden = named().index(False)
     player.select_option("#drone", str(hidden))
-    until(lambda: player.evaluate("!Film.camera.turning"), "it does not turn there")
+    until(lambda: player.evaluate("!Playback.camera.turning"), "it does not turn there")
     assert named()[:2] == [hidden == 0, hidden == 1]
     player.click("#overview")
-    player.evaluate("Film.player.seek(1), Film.player.seek(0)")
-    until(lambda: player.evaluate("!Film.camera.turning"), "it does not turn back")
+    player.evaluate("Playback.player.seek(1), Playback.player.seek(0)")
+    until(lambda: player.evaluate("!Playback.camera.turning"), "it does not turn back")
     assert all(named())
 
 
@@ -148,10 +150,10 @@ def test_it_plays_to_its_end_and_again(player: Page) -> None:
 
 
 def test_it_begins_anew(player: Page) -> None:
-    player.evaluate("Film.player.seek(5)")
+    player.evaluate("Playback.player.seek(5)")
     player.click("#again")
     assert now(player) < 1
-    assert player.evaluate("Film.player.playing")
+    assert player.evaluate("Playback.player.playing")
 
 
 def test_the_slider_is_the_time(player: Page) -> None:
@@ -160,7 +162,7 @@ def test_the_slider_is_the_time(player: Page) -> None:
     assert now(player) == pytest.approx(END_S / 2, abs=0.05)
     assert player.inner_text("#clock") == f"{now(player):.1f} / 6.0 s"
     assert player.get_attribute("#time", "aria-valuetext").endswith("of 6.0 seconds, epoch 1 (0 to 2)")
-    assert not player.evaluate("Film.player.playing")
+    assert not player.evaluate("Playback.player.playing")
 
 
 def test_steps_and_epochs_by_keys(player: Page) -> None:
@@ -192,7 +194,7 @@ def test_keys_step_while_the_slider_has_the_focus(player: Page) -> None:
 def test_the_caption_tells_the_epoch(player: Page) -> None:
     said = ["the start: solution, 4 fly", "-R5.1: no solution, 3 hover on", "V2.1 without <2>: solution, 4 fly"]
     for number, words in enumerate(said):
-        player.evaluate(f"Film.player.seek({LEG_S * number + 0.5})")
+        player.evaluate(f"Playback.player.seek({LEG_S * number + 0.5})")
         assert player.inner_text("#epoch").split("\n") == [f"Epoch {number} (0 to 2)", words]
 
 
@@ -215,8 +217,8 @@ def test_marks_say_what_happened_and_lead_there(player: Page) -> None:
 
 def test_cameras_by_keys_and_by_buttons(player: Page) -> None:
     def looked_from() -> list[float]:
-        until(lambda: player.evaluate("!Film.camera.turning"), "it turns for ever")
-        return list(player.evaluate("Film.viewer.camera.position.toArray()"))
+        until(lambda: player.evaluate("!Playback.camera.turning"), "it turns for ever")
+        return list(player.evaluate("Playback.viewer.camera.position.toArray()"))
 
     overview = looked_from()
     player.keyboard.press("2")
@@ -238,9 +240,9 @@ def test_cameras_by_keys_and_by_buttons(player: Page) -> None:
 def test_a_drone_is_followed(player: Page) -> None:
     player.select_option("#drone", "2")
     assert pressed(player) == "follow"
-    until(lambda: player.evaluate("!Film.camera.turning"), "it turns for ever")
-    player.evaluate("Film.player.seek(2)")
-    off = "Film.viewer.controls.target.distanceTo(Film.drones[2].getWorldPosition(new MeshCat.THREE.Vector3()))"
+    until(lambda: player.evaluate("!Playback.camera.turning"), "it turns for ever")
+    player.evaluate("Playback.player.seek(2)")
+    off = "Playback.viewer.controls.target.distanceTo(Playback.drones[2].getWorldPosition(new MeshCat.THREE.Vector3()))"
     until(lambda: player.evaluate(off) < 1e-6, "it is not followed")
     player.keyboard.press("4")
     assert player.input_value("#drone") == "3"
@@ -250,7 +252,8 @@ def test_a_drone_is_followed(player: Page) -> None:
 
 def test_a_click_chooses_a_drone(player: Page) -> None:
     spot = player.evaluate(
-        "(() => { const at = Film.drones[3].getWorldPosition(new MeshCat.THREE.Vector3()).project(Film.viewer.camera);"
+        "(() => { const at = Playback.drones[3].getWorldPosition(new MeshCat.THREE.Vector3());"
+        " at.project(Playback.viewer.camera);"
         " return [(at.x + 1) / 2 * innerWidth, (1 - at.y) / 2 * innerHeight]; })()"
     )
     player.mouse.click(*spot)
@@ -263,11 +266,11 @@ def test_trails_grow_and_can_be_left_out(player: Page) -> None:
         scene = picture(player)
         return int(((scene[..., 2] - scene[..., 0]) > 60).sum())
 
-    player.evaluate("Film.player.seek(2.9)")
+    player.evaluate("Playback.player.seek(2.9)")
     whole = painted()
     player.keyboard.press("t")
     assert player.input_value("#trail") == "3"
-    assert player.evaluate("Film.trails.uniforms.lasting.value") == 3
+    assert player.evaluate("Playback.trails.uniforms.lasting.value") == 3
     player.keyboard.press("t")
     assert player.input_value("#trail") == "none"
     assert painted() < whole - 50
@@ -290,12 +293,12 @@ def test_all_can_be_named_and_read(player: Page) -> None:
 def small(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
     """A telephone at night, of one who wants little motion; the last two epochs begin at the same time."""
     whole = scene()
-    film = whole.film
-    assert film
-    first, second, third = film.chapters
-    film = replace(film, chapters=(first, second, replace(third, begins_s=second.begins_s)))
+    playback = whole.playback
+    assert playback
+    first, second, third = playback.chapters
+    playback = replace(playback, chapters=(first, second, replace(third, begins_s=second.begins_s)))
     html = tmp_path_factory.mktemp("small") / "page.html"
-    html.write_bytes(page(replace(whole, film=film)))
+    html.write_bytes(page(replace(whole, playback=playback)))
     screen = {"width": 360, "height": 640}
     with opened(browser, html.as_uri(), viewport=screen, color_scheme="dark", reduced_motion="reduce") as shown:
         yield shown
@@ -303,10 +306,10 @@ def small(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pa
 
 def test_with_little_motion_it_begins_at_its_end(small: Page) -> None:
     assert now(small) == END_S
-    assert not small.evaluate("Film.player.playing")
+    assert not small.evaluate("Playback.player.playing")
     small.keyboard.press("2")
     assert pressed(small) == "top"
-    assert small.evaluate("Film.camera.turning") is None
+    assert small.evaluate("Playback.camera.turning") is None
 
 
 def test_epochs_that_begin_together_are_told_together(small: Page) -> None:
@@ -357,7 +360,7 @@ from robochoc.flight.mission import mission_of
 from robochoc.view.live import serve
 from robochoc.view.scene import scene_of
 outcome, mission = epochs_of_three(), mission_of(epochs_of_three(), five())
-serve(scene_of(outcome, mission=mission, flown=straight(mission)), ready=lambda url: print(url, flush=True))
+serve(scene_of(outcome, mission, straight(mission)), ready=lambda url: print(url, flush=True))
 """
 
 
@@ -366,12 +369,12 @@ def test_the_live_page_plays_the_same(browser: Any, one: Page) -> None:  # noqa:
         try:
             assert server.stdout
             with opened(browser, server.stdout.readline().strip(), viewport=one.viewport_size) as live:
-                until(lambda: live.evaluate("Boolean(Film.trails.mesh)"), "nothing to play has come")
-                live.evaluate("Film.player.pause(); Film.player.seek(4.5)")
+                until(lambda: live.evaluate("Boolean(Playback.trails.mesh)"), "nothing to play has come")
+                live.evaluate("Playback.player.pause(); Playback.player.seek(4.5)")
                 assert live.inner_text("#epoch").startswith("Epoch 2 (0 to 2)")
                 assert place(live, 0) != pytest.approx(place(live, 1), abs=0.5)
                 assert pressed(live) == "overview"
-                away = "Film.viewer.camera.position.length()"
+                away = "Playback.viewer.camera.position.length()"
                 assert live.evaluate(away) > 2, "as the window wants it"
         finally:
             server.kill()
@@ -393,6 +396,6 @@ def test_its_keys_are_a_key_away(player: Page) -> None:
 def test_space_plays_after_a_click_on_a_button(player: Page) -> None:
     player.click("#top")
     player.keyboard.press(" ")
-    until(lambda: player.evaluate("Film.player.playing"), "it does not play")
+    until(lambda: player.evaluate("Playback.player.playing"), "it does not play")
     player.keyboard.press(" ")
-    assert not player.evaluate("Film.player.playing")
+    assert not player.evaluate("Playback.player.playing")

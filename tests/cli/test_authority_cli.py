@@ -52,7 +52,7 @@ def test_where_it_is_if_nothing_is_said(tmp_path: Path, monkeypatch: pytest.Monk
     assert result.exit_code == 0
     assert "next: robochoc authority enrol NAME" in result.stdout
     (key,) = tmp_path.rglob("ca.key")
-    assert CliRunner().invoke(cli, ["authority", "list"]).stdout.startswith("nobody is enrolled")
+    assert CliRunner().invoke(cli, ["authority", "list"]).stdout.startswith("no names are enrolled")
     assert key.parent.name == "authority"
 
 
@@ -119,7 +119,7 @@ def test_who_may_sniff(folder: Path) -> None:
 def test_revoked_and_readmitted(folder: Path) -> None:
     say(folder, "enrol", "A")
     result = say(folder, "revoke", "A")
-    assert "to let it in again: robochoc authority enrol A" in result.stdout
+    assert "to accept it again: robochoc authority enrol A" in result.stdout
     assert states(folder) == {"A": "revoked"}
     say(folder, "enrol", "A")
     assert states(folder) == {"A": "invited"}

@@ -11,7 +11,7 @@ import pytest
 
 from robochoc.communication.simulator.channel import CHANNELS, LARGEST_FILE, ChannelModel, read_channel
 from robochoc.formats import InvalidInputError
-from tests.support.entries import entries_of
+from tests.support.journal_entries import entries_of
 from tests.support.program import ROOT, robochoc
 
 

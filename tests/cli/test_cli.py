@@ -16,7 +16,7 @@ from click import Context
 from robochoc.cli.group import COMMANDS, cli
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.problem import Constraint, Model, Relation, Robot, Semantics
+from robochoc.model.problem import Constraint, ConstraintModel, Relation, Robot, Semantics
 from tests.support.broken import CASES
 from tests.support.broken_case import Broken
 from tests.support.problems import team_of
@@ -150,7 +150,7 @@ def test_solve_json_is_the_contract(runtime: str) -> None:
     ("words", "verdict", "placed_by"),
     [
         (["--withdraw"], "optimal", "sfb"),
-        (["--withdraw", "fewest"], "optimal", "sfb"),
+        (["--withdraw", "minimum"], "optimal", "sfb"),
         (["--withdraw", "maximal"], "solution", "first-fit"),
         (["--withdraw=maximal"], "solution", "first-fit"),
     ],
@@ -203,7 +203,7 @@ def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
         (["--runtime", "threads"], "threads"),
         (["--seed", "-1"], "--seed"),
         (["--timeout", "0"], "--timeout"),
-        (["--withdraw=most"], "fewest"),
+        (["--withdraw=most"], "minimum"),
         (["--set", "cycles"], "NAME=VALUE"),
         (["--set", "cycles=5"], "no setting"),
         (["--protocol", "dsa", "--set", "cycles=0"], "cycles"),
@@ -246,7 +246,7 @@ def test_one_file_cannot_hold_several_teams(tmp_path: Path) -> None:
 
 def test_what_this_version_cannot_solve_is_said_in_one_sentence(tmp_path: Path) -> None:
     differ = Relation("R", 2, Semantics.CONFLICTS, ((1, 1),))
-    part = Constraint("C", differ, ("A", "B"), ("A", "B"), model=Model.PKC)
+    part = Constraint("C", differ, ("A", "B"), ("A", "B"), model=ConstraintModel.PKC)
     write_team(team_of({"A": (1, 2), "B": (1, 2)}, [part]), tmp_path / "private")
     done = robochoc("solve", tmp_path / "private", "--withdraw")
     assert done.returncode == 2
@@ -299,13 +299,13 @@ def test_progress_is_shown_on_a_terminal_only(tmp_path: Path) -> None:
 # the whole
 
 
-def test_every_command_has_help_and_is_in_the_readme() -> None:
-    readme = (ROOT / "README.md").read_text()
+def test_every_command_has_help_and_is_in_the_docs() -> None:
+    pages = "".join(page.read_text() for page in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))))
     for name in COMMANDS:
         command = cli.get_command(Context(cli), name)
         assert command
         assert command.help, name
-        assert f"robochoc {name}" in readme, name
+        assert f"robochoc {name}" in pages, name
     assert robochoc("--help").returncode == 0
 
 

@@ -13,7 +13,7 @@ import pytest
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.journal import read_journal
-from tests.support.entries import entries_of
+from tests.support.journal_entries import entries_of
 from tests.support.program import PROGRAM, ROOT, robochoc, robochoc_within
 
 

@@ -132,8 +132,8 @@ def test_nothing_is_done_by_half_where_a_path_is_wrong(command: list[str], four:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--withdraw", "minimal"], "'minimal' is no kind of withdrawal and no folder: fewest or maximal"),
-        (["--withdraw", "maximla"], "'maximla' is no kind of withdrawal and no folder: fewest or maximal"),
+        (["--withdraw", "minimal"], "'minimal' is no kind of withdrawal and no folder: minimum or maximal"),
+        (["--withdraw", "maximla"], "'maximla' is no kind of withdrawal and no folder: minimum or maximal"),
         (["--spare", "two"], "'two' is no number of robots and no folder"),
         (["--sniff", "Robto1.*"], "no robot of queens3d-4 is called 'Robto1.*'"),
         (["--sniff=Robot1.1,Nobody"], "no robot of queens3d-4 is called 'Nobody'"),

@@ -25,7 +25,7 @@ from robochoc.sniffer.export import MOST_ARROWS, drawable, mermaid
 from robochoc.sniffer.feed import Feed
 from robochoc.sniffer.patterns import matching, patterns_in
 from robochoc.sniffer.trace import Trace
-from tests.support.recorded import recorded
+from tests.support.recorded_journals import recorded
 
 NAME = "R;#1\nend"
 

@@ -12,9 +12,9 @@ from robochoc.formats import InvalidInputError, read_team, write_team
 from robochoc.formats.order import read_order
 from robochoc.journal.journal import read_journal
 from robochoc.model.orders import Order
-from tests.support.entries import entries_of
+from tests.support.journal_entries import entries_of
 from tests.support.program import robochoc
-from tests.unit.model.test_orders import graph_team, pkc_team
+from tests.support.small_teams import graph_team, pkc_team
 
 
 def test_the_command_line_knows_every_order() -> None:

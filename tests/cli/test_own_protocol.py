@@ -6,8 +6,11 @@ the environment changes.
 
 from __future__ import annotations
 
+import csv
+import io
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -135,6 +138,44 @@ def _explained(head: str) -> set[str]:
 
 def _without_seconds(text: str) -> str:
     return re.sub(r"\d+\.\d+ s\b", "some s", text)
+
+
+# Its messages, where others look at them
+
+
+def exported(form: str, journal: Path, environ: Mapping[str, str]) -> str:
+    done = run(f"robochoc journal export {journal} --format {form}", environ)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_its_words_and_acts_are_in_the_sniffer_and_the_exports(installed: dict[str, str], tmp_path: Path) -> None:
+    journal = tmp_path / "breakout.journal"
+    solve = f"robochoc solve {SCOUTS} --protocol breakout --runtime simulator --journal {journal}"
+    assert run(solve, installed).returncode == 0
+    ok, improve = "V1 = 1 in this wave", "I have 0 weighted violations, and could do with 0 less"
+    rows = list(csv.DictReader(io.StringIO(exported("csv", journal, installed))))
+    assert {row["type"]: row["performative"] for row in rows} == {"Ok": "inform", "Improve": "propose"}
+    assert {f"Scout says: {ok}", f"Scout says: {improve}"} <= {row["words"] for row in rows}
+    acl = exported("acl", journal, installed)
+    assert acl.count("(PROPOSE ") == sum(row["type"] == "Improve" for row in rows)
+    assert acl.count("(INFORM ") == sum(row["type"] == "Ok" for row in rows)
+    feed = run(f"{sys.executable} -c {shlex.quote(FEED)} {journal}", installed)
+    assert feed.stdout.splitlines() == ["Improve propose, of neighbours, the one that improves most is to move", ok]
+
+
+FEED = """
+import json, sys
+from pathlib import Path
+from robochoc.journal.journal import read_journal
+from robochoc.sniffer.feed import Feed
+from robochoc.sniffer.trace import Trace
+feed = Feed(Trace.of(read_journal(Path(sys.argv[1]).read_bytes())))
+about, details = json.loads(feed.about()), json.loads(feed.details(0))
+(improve,) = [kind for kind in about["kinds"] if kind["name"] == "Improve"]
+print(improve["name"], improve["performative"] + ",", improve["why"])
+print(next(one["words"] for one in details if "V1" in one["words"]).removeprefix("Scout says: "))
+"""
 
 
 # What may go wrong

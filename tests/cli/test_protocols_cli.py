@@ -32,7 +32,7 @@ WITHOUT_DOCSTRING = """
 
         def change(self, problem, order, void): ...
 
-        def resume(self, *, quiet): ...
+        def resume(self, *, lossless): ...
 
     class Static(FirstFit):
         traits = Traits(dynamic=True)
@@ -145,12 +145,15 @@ def test_of_two_with_one_name_none_is_taken(package: Path) -> None:
 
 def test_json_is_an_object_a_line() -> None:
     found = objects(run("--json"))
+    traits = vars(abt.ABT.traits)
+    renamed = {"everywhere": traits["shared_scopes"], "beyond": traits["writes_to_non_neighbours"]}
     assert found["abt"] == {
         "name": "abt",
         "place": "robochoc.protocols.abt:ABT",
         "package": f"robochoc {__version__}",
         "distributed": True,
-        **vars(abt.ABT.traits),
+        **{key: value for key, value in traits.items() if key not in {"shared_scopes", "writes_to_non_neighbours"}},
+        **renamed,
         "concludes": ["no-solution"],
         "settings": {},
     }

@@ -17,9 +17,8 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Sent
 from robochoc.journal.journal import Journal, Recorder, lines_of
 from robochoc.model.outcome import Verdict
-from robochoc.run.options import Options
-from tests.support.replays import recorded, with_events
-from tests.unit.replay.test_replay import FOUR, without_given
+from robochoc.run.options import Options, Runtime, Withdrawal
+from tests.support.replays import recorded, with_events, without_given
 
 THE_SAME = """\
 queens3d-2: abt, runtime simulator, seed 0
@@ -33,7 +32,7 @@ queens3d-2: abt, runtime simulator, seed 0
 
 @pytest.fixture(scope="module")
 def two() -> Journal:
-    return recorded(queens3d(2), FOUR)
+    return recorded(queens3d(2), Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MINIMUM))
 
 
 def written(journal: Journal, path: Path) -> Path:

@@ -19,7 +19,7 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.sniffer.viewer import Viewer
 from tests.support.faults import PROGRAM, Run, gone_within_s, running, wait_until
 from tests.support.program import ROOT
-from tests.support.sniffed import journal_of, told
+from tests.support.sniffer_server import journal_of, run_events
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 LONG = ("--timeout", "60")
@@ -84,7 +84,7 @@ def test_no_process_shows_the_secret_address_to_others(
     (tmp_path / "tmp").mkdir()
     monkeypatch.setenv("BROWSER", str(program))
     monkeypatch.setenv("TMPDIR", str(tmp_path / "tmp"))
-    (tmp_path / "journal").write_bytes(journal_of(*told()))
+    (tmp_path / "journal").write_bytes(journal_of(*run_events()))
     words = ["sniff", str(tmp_path / "journal")] if command == "sniff" else ["solve", str(teams / "short"), "--sniff"]
     with running([PROGRAM, *words, "--open"], tmp_path / "run") as run:
         url = url_of(run)
@@ -134,7 +134,7 @@ def test_a_file_that_is_not_there_or_none_is_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("signum", "status"), [(signal.SIGINT, 0), (signal.SIGTERM, 128 + signal.SIGTERM)])
 def test_a_journal_is_shown_until_a_signal(tmp_path: Path, signum: int, status: int) -> None:
-    events, outcome = told()
+    events, outcome = run_events()
     file = tmp_path / "run.journal"
     file.write_bytes(journal_of(events, outcome))
     with running([PROGRAM, "sniff", str(file), "--robots", "Robot1.*"], tmp_path / "run") as run:

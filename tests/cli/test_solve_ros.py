@@ -14,9 +14,9 @@ from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Verdict
 from robochoc.ros.recordings.mcap_file import McapSink
-from robochoc.ros.single_robot import crew_alone, leg_alone
+from robochoc.ros.single_robot import drones_of_robot, leg_of_robot
 from robochoc.ros.sinks import open_source
-from tests.support.machines import Site, ended
+from tests.support.deployments import Deployment, ended
 from tests.support.program import ROOT
 
 HANGAR = ROOT / "docs" / "examples" / "hangar"
@@ -267,7 +267,7 @@ def test_a_flight_that_would_never_end_is_not_begun(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_robot_publishes_its_own_decision(site: Site, tmp_path: Path) -> None:
+def test_a_robot_publishes_its_own_decision(site: Deployment, tmp_path: Path) -> None:
     tokens = site.enrol("--team", SCOUTS)
     master = site.master("--json")
     first = next(iter(tokens))
@@ -283,13 +283,13 @@ def test_a_robot_publishes_its_own_decision(site: Site, tmp_path: Path) -> None:
 
 def test_what_one_robot_knows_of_its_goal() -> None:
     robot = read_team(FOUR)["Robot3.2"]
-    assert leg_alone(robot, "optimal, 6 step aside", {"V3.2": 4}).goals == {0: Goal((3.0, 2.0, 4.0))}
-    assert leg_alone(robot, "optimal, 6 step aside", {}).goals == {0: Goal((3.0, 2.0, 0.0), lands=True)}
-    assert leg_alone(robot, "solution", {"V3.2": 1}, 0.5).goals == {0: Goal((1.5, 1.0, 0.5))}
+    assert leg_of_robot(robot, "optimal, 6 step aside", {"V3.2": 4}).goals == {0: Goal((3.0, 2.0, 4.0))}
+    assert leg_of_robot(robot, "optimal, 6 step aside", {}).goals == {0: Goal((3.0, 2.0, 0.0), lands=True)}
+    assert leg_of_robot(robot, "solution", {"V3.2": 1}, 0.5).goals == {0: Goal((1.5, 1.0, 0.5))}
     for why, values in (("no-solution", {"V3.2": 1}), ("unknown", {"V3.2": 1}), ("solution", {})):
-        assert leg_alone(robot, why, values).goals == {}
-        assert leg_alone(robot, why, values).verdict is Verdict.UNKNOWN
-    assert [drone.name for drone in crew_alone(robot)] == ["Robot3.2"]
+        assert leg_of_robot(robot, why, values).goals == {}
+        assert leg_of_robot(robot, why, values).verdict is Verdict.UNKNOWN
+    assert [drone.name for drone in drones_of_robot(robot)] == ["Robot3.2"]
 
 
 def test_a_result_that_is_flown_is_not_written_over(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.orders import in_order
+from robochoc.model.orders import with_order
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Robot, Team
 from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
@@ -21,26 +21,13 @@ from robochoc.solver import compiled
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import CentralSolver
 from robochoc.solver.compile import Compiler
-from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain, compiled_domain
-from robochoc.solver.encoding import Codes, Network
-from robochoc.verification.checker import objections
-from tests.conformance.test_conformance import random_schedule
+from robochoc.verification.checker import violations
 from tests.support.complex_problems import random_complex_team
 from tests.support.loose_problems import any_order, loosened
 from tests.support.problems import solutions
-
-
-def by_hand(network: Network) -> Iterator[Codes]:
-    """All solutions of a network, by trying everything."""
-    for codes in itertools.product(*network.domains):
-        if all((tuple(codes[p] for p in table.scope) in table.rows) is table.allowed for table in network.tables):
-            yield codes
-
-
-def compiled_by_hand(team: Team) -> CompiledTeam:
-    """`team`, its local problems solved by hand."""
-    return CompiledTeam(team, lambda robot: compiled_domain(robot, by_hand))
+from tests.support.random_options import random_schedule
+from tests.support.solver_networks import brute_force, compiled_by_brute_force
 
 
 def local_solutions(robot: Robot) -> Iterator[dict[str, int]]:
@@ -65,13 +52,13 @@ def check_domain(robot: Robot, domain: CompiledDomain) -> None:
         assert tuple(local[name] for name in robot.interface) == value
 
 
-def solved_by_hand(team: Team, chance: Random) -> Verdict:
+def solved_by_brute_force(team: Team, chance: Random) -> Verdict:
     """ABT's verdict on any schedule, its local problems solved by hand; a solution is held against the files."""
     schedule = RandomChannels(chance.getrandbits(32))
-    result = Simulation(compiled_by_hand(team), protocol_named("abt"), schedule).run(60)
+    result = Simulation(compiled_by_brute_force(team), protocol_named("abt"), schedule).run(60)
     if result.verdict is Verdict.SOLUTION:
         assignment = {name: value for own in result.assignments.values() for name, value in own.items()}
-        assert not list(objections(team, assignment))
+        assert not list(violations(team, assignment))
     return result.verdict
 
 
@@ -83,9 +70,9 @@ def test_domains_and_abt_agree_with_brute_force(batch: int) -> None:
     for _ in range(150):
         team = random_complex_team(chance)
         for robot in team.robots:
-            check_domain(robot, compiled_domain(robot, by_hand))
+            check_domain(robot, compiled_domain(robot, brute_force))
         team = loosened(team, chance)
-        verdict = solved_by_hand(in_order(team, any_order(team, chance)), chance)
+        verdict = solved_by_brute_force(with_order(team, any_order(team, chance)), chance)
         assert verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION), team
         seen[verdict] += 1
     assert min(seen[Verdict.SOLUTION], seen[Verdict.NO_SOLUTION]) > 20, seen
@@ -145,7 +132,7 @@ def test_many_values_are_looked_up_as_few_are(monkeypatch: pytest.MonkeyPatch) -
     chance = Random("tables")
     for _ in range(150):
         team = random_complex_team(chance)
-        by_itself = compiled_by_hand(team)
+        by_itself = compiled_by_brute_force(team)
         seed = chance.getrandbits(32)
         results = []
         for large in (1, 10**9):

@@ -12,19 +12,16 @@ from hypothesis import strategies as st
 from robochoc.communication.run_result import RunResult
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE, Team
-from robochoc.run.orchestrator import Options, Runtime, ScheduleName, Withdrawal, solve
+from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
-from robochoc.verification.checker import objections
-from tests.support.loose_problems import any_order, least, loosened
+from robochoc.verification.checker import violations
+from tests.support.loose_problems import any_order, loosened, minimum_cost
 from tests.support.problems import ON_ONE_MACHINE, random_team, solutions
+from tests.support.random_options import MAX_MESSAGES, random_options
 
 PER_BATCH, FIRST_BATCH = 300, 90
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 10))]
 EVERY_PROTOCOL = pytest.mark.parametrize("protocol", protocol_names())
-
-
-ENOUGH = 3000
-"""Messages after which an incomplete protocol may give up."""
 
 
 def part_of(count: int, protocol: str, batch: int) -> int:
@@ -47,8 +44,8 @@ def agrees(team: Team, options: Options) -> Verdict:
     complete = protocol.traits.complete
     if hasattr(protocol.settings, "cycles"):
         options = replace(options, settings={"cycles": "20"})
-    outcome = solve(team, options if complete else replace(options, messages=ENOUGH))
-    solvable = least(team) < INFINITE
+    outcome = solve(team, options if complete else replace(options, messages=MAX_MESSAGES))
+    solvable = minimum_cost(team) < INFINITE
     expected = Verdict.SOLUTION if solvable else Verdict.NO_SOLUTION
     if not complete and outcome.verdict is Verdict.UNKNOWN:
         return expected
@@ -63,23 +60,6 @@ def team_for(protocol: str, chance: Random) -> Team:
     return loosened(team, chance) if chance.random() < 0.5 else team
 
 
-def any_way(team: Team, protocol: str, chance: Random) -> Options:
-    """On a random schedule, in an order of any kind."""
-    return replace(random_schedule(chance), protocol=protocol, order=any_order(team, chance))
-
-
-def random_schedule(chance: Random) -> Options:
-    """Any channel next, or time in checks with delays from none to long ones."""
-    schedule = chance.choice(list(ScheduleName))
-    return Options(
-        runtime=Runtime.SIMULATOR,
-        schedule=schedule,
-        delay=chance.choice((0, 3, 20, 200)) if schedule is ScheduleName.CONCURRENT else 0,
-        seed=chance.getrandbits(32),
-        timeout=60,
-    )
-
-
 @EVERY_PROTOCOL
 @pytest.mark.parametrize("batch", BATCHES)
 def test_simulator_agrees_with_brute_force(protocol: str, batch: int) -> None:
@@ -88,7 +68,7 @@ def test_simulator_agrees_with_brute_force(protocol: str, batch: int) -> None:
     problems = part_of(PER_BATCH if batch else FIRST_BATCH, protocol, batch)
     for _ in range(problems):
         team = team_for(protocol, chance)
-        seen[agrees(team, any_way(team, protocol, chance))] += 1
+        seen[agrees(team, random_options(team, protocol, chance))] += 1
     assert min(seen.values()) > problems // 4, f"the problems are one-sided: {seen}"
 
 
@@ -97,7 +77,7 @@ def test_simulator_agrees_with_brute_force(protocol: str, batch: int) -> None:
 @settings(max_examples=30, deadline=None)
 def test_simulator_agrees_with_brute_force_and_shrinks(protocol: str, seed: int, chance: Random) -> None:
     team = team_for(protocol, Random(seed))
-    agrees(team, any_way(team, protocol, chance))
+    agrees(team, random_options(team, protocol, chance))
 
 
 @EVERY_PROTOCOL
@@ -143,7 +123,7 @@ def test_withdrawing_is_not_asked_of_a_team_that_has_a_solution() -> None:
         pass
     outcome = solve(team, Options(runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL))
     assert outcome.withdrawn == ()
-    assert not list(objections(team, outcome.assignment))
+    assert not list(violations(team, outcome.assignment))
 
 
 def test_a_result_joins_clocks_by_the_largest() -> None:

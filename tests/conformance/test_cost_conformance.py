@@ -14,10 +14,10 @@ from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import UnsupportedError
-from tests.conformance.test_conformance import ENOUGH, any_way
-from tests.support.cost_problems import fewest_aside, random_complex_cost_team, random_cost_team
-from tests.support.loose_problems import any_order, least, loosened
+from tests.support.cost_problems import minimum_withdrawal, random_complex_cost_team, random_cost_team
+from tests.support.loose_problems import any_order, loosened, minimum_cost
 from tests.support.problems import ON_ONE_MACHINE, random_team
+from tests.support.random_options import MAX_MESSAGES, random_options
 
 MINIMISING = [name for name in protocol_names() if protocol_named(name).traits.costs]
 COMPLETE = [name for name in MINIMISING if protocol_named(name).traits.complete]
@@ -45,7 +45,7 @@ def warm() -> Iterator[AceProcess]:
 
 def agrees(team: Team, options: Options, warm: AceProcess) -> Outcome:
     """Solve `team`; the cost must be brute force's. `solve` itself has the assignment checked."""
-    cost = least(team)
+    cost = minimum_cost(team)
     outcome = solve(team, options, solver=warm)
     if cost == INFINITE:
         assert outcome.verdict is Verdict.NO_SOLUTION, (team, options)
@@ -64,7 +64,7 @@ def test_the_least_cost_is_found_in_the_simulator(protocol: str, batch: int, war
     problems = PER_BATCH if batch else FIRST_BATCH
     for _ in range(problems):
         team = team_for(protocol, chance)
-        seen[agrees(team, any_way(team, protocol, chance), warm).verdict] += 1
+        seen[agrees(team, random_options(team, protocol, chance), warm).verdict] += 1
     assert seen[Verdict.NO_SOLUTION] > problems // 40
     assert seen[Verdict.OPTIMAL] > problems // 2
 
@@ -89,9 +89,9 @@ def test_what_is_not_proven_is_no_better_than_the_least(
     solved = best = 0
     for _ in range(20 if runtime is Runtime.SIMULATOR else 3):
         team = team_for(protocol, chance)
-        cheapest = least(team)
-        schedule = replace(any_way(team, protocol, chance), runtime=runtime)
-        outcome = solve(team, replace(schedule, messages=ENOUGH, settings=SHORT), solver=warm)
+        cheapest = minimum_cost(team)
+        schedule = replace(random_options(team, protocol, chance), runtime=runtime)
+        outcome = solve(team, replace(schedule, messages=MAX_MESSAGES, settings=SHORT), solver=warm)
         if cheapest == INFINITE:
             assert outcome.verdict in {Verdict.UNKNOWN, Verdict.NO_SOLUTION}
             assert outcome.cost is None
@@ -115,9 +115,9 @@ def test_as_few_as_possible_step_aside(protocol: str) -> None:
         team = random_team(chance, n_ary=protocol_named(protocol).traits.n_ary)
         robots = tuple(replace(robot, weight=chance.choice((1, 1, 2, 3))) for robot in team.robots)
         team = replace(team, robots=robots)
-        options = replace(any_way(team, protocol, chance), withdraw=Withdrawal.FEWEST)
+        options = replace(random_options(team, protocol, chance), withdraw=Withdrawal.MINIMUM)
         outcome = solve(team, options)
-        assert sum(team[name].weight for name in outcome.withdrawn) == fewest_aside(team)
+        assert sum(team[name].weight for name in outcome.withdrawn) == minimum_withdrawal(team)
         assert outcome.verdict is (Verdict.OPTIMAL if outcome.withdrawn else Verdict.SOLUTION)
         assert outcome.verified
         aside += bool(outcome.withdrawn)

@@ -14,38 +14,25 @@ from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
-    Constraint,
     Domain,
-    Event,
     Parent,
-    Relation,
     RemoveAgent,
     RemoveConstraint,
     RemoveValue,
     Robot,
-    Semantics,
+    ScenarioEvent,
     Team,
     Variable,
 )
 from robochoc.run.orchestrator import Options, Runtime, solve
 from robochoc.run.registry import protocol_named, protocol_names
-from tests.conformance.test_conformance import random_schedule
-from tests.support.changes import random_journey, stages
 from tests.support.loose_problems import loosened
 from tests.support.problems import ON_ONE_MACHINE, random_team, solutions, team_of
+from tests.support.random_changes import random_changing_team, stages
+from tests.support.random_options import random_schedule
+from tests.support.small_teams import differ, pair
 
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
 SIMULATED = Options(runtime=Runtime.SIMULATOR, protocol="dynabt")
-
-
-def differ(left: str, right: str, name: str = "C") -> Constraint:
-    return Constraint(name, DIFFERENT, (left, right), (left, right))
-
-
-def pair(*events: Event, values: int = 1) -> Team:
-    """Two robots that want to differ."""
-    team = team_of(dict.fromkeys("AB", range(1, values + 1)), [differ("A", "B")])
-    return replace(team, scenario=events)
 
 
 def agrees(team: Team, options: Options) -> int:
@@ -70,7 +57,7 @@ def agrees(team: Team, options: Options) -> int:
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 10))])
 def test_dynabt_agrees_with_brute_force_after_each_change(batch: int) -> None:
     chance = Random(f"dynabt {batch}")
-    steps = sum(agrees(random_journey(chance), random_dynabt(chance)) for _ in range(100 if batch else 60))
+    steps = sum(agrees(random_changing_team(chance), random_dynabt(chance)) for _ in range(100 if batch else 60))
     assert steps > (900 if batch else 540)
 
 
@@ -84,7 +71,7 @@ def test_any_protocol_begins_anew_after_each_change(protocol: str, batch: int) -
     traits = protocol_named(protocol).traits
     chance = Random(f"anew {protocol} {batch}")
     for _ in range(8):
-        team = random_journey(chance, 6)
+        team = random_changing_team(chance, 6)
         if traits.n_ary and traits.complete:
             agrees(team, replace(random_schedule(chance), protocol=protocol))
 
@@ -93,25 +80,25 @@ def test_any_protocol_begins_anew_after_each_change(protocol: str, batch: int) -
 def test_processes_go_through_epochs_as_well(protocol: str) -> None:
     chance = Random(f"processes {protocol}")
     for _ in range(4):
-        agrees(random_journey(chance, 6), Options(protocol=protocol, timeout=60))
+        agrees(random_changing_team(chance, 6), Options(protocol=protocol, timeout=60))
 
 
 def test_epochs_follow_an_order_that_is_asked_for() -> None:
     chance = Random("order")
     for _ in range(25):
-        team = random_journey(chance, 5, lambda team: loosened(team, chance))
+        team = random_changing_team(chance, 5, lambda team: loosened(team, chance))
         order = chance.choice([*Order, tuple(chance.sample(team.order, len(team.order)))])
         agrees(team, replace(random_dynabt(chance), order=order))
 
 
 def test_the_judge_goes_through_the_same_epochs() -> None:
-    team = pair(Event((AddValue("B", 2),)), Event((RemoveValue("B", 2),)))
+    team = pair(ScenarioEvent((AddValue("B", 2),)), ScenarioEvent((RemoveValue("B", 2),)))
     outcome = solve(team, Options(protocol="central", cache=False))
     assert [epoch.verdict for epoch in outcome.epochs] == ["no-solution", "solution", "no-solution"]
 
 
 def test_second_opinions_are_asked_for_in_each_epoch() -> None:
-    team = pair(Event((AddValue("B", 2),)), Event((RemoveValue("B", 2),)))
+    team = pair(ScenarioEvent((AddValue("B", 2),)), ScenarioEvent((RemoveValue("B", 2),)))
     outcome = solve(team, replace(SIMULATED, verify=True, cache=False))
     assert [epoch.verified for epoch in outcome.epochs] == [True, True, True]
 
@@ -125,8 +112,8 @@ def verdicts(outcome: Outcome) -> list[str]:
 
 def test_a_constraint_goes_and_another_comes() -> None:
     team = pair(
-        Event((RemoveConstraint("RB", "RA", "C"),)),
-        Event((AddConstraint("RB", "RA", differ("A", "B", "again")),)),
+        ScenarioEvent((RemoveConstraint("RB", "RA", "C"),)),
+        ScenarioEvent((AddConstraint("RB", "RA", differ("A", "B", "again")),)),
     )
     assert verdicts(solve(team, SIMULATED)) == ["no-solution", "solution", "no-solution"]
 
@@ -137,14 +124,14 @@ def test_a_robot_leaves_and_another_joins() -> None:
         (Variable("C", Domain("D", (range(1, 2),))),),
         parents=(Parent("RB", (differ("B", "C"),)),),
     )
-    team = pair(Event((RemoveAgent("RA"),)), Event((AddAgent(newcomer),)))
+    team = pair(ScenarioEvent((RemoveAgent("RA"),)), ScenarioEvent((AddAgent(newcomer),)))
     outcome = solve(team, SIMULATED)
     assert verdicts(outcome) == ["no-solution", "solution", "no-solution"]
     assert [epoch.robots for epoch in outcome.epochs] == [("RA", "RB"), ("RB",), ("RB", "RC")]
 
 
 def test_a_verdict_that_still_stands_costs_nothing() -> None:
-    team = pair(Event((AddConstraint("RB", "RA", differ("A", "B", "more")),)))
+    team = pair(ScenarioEvent((AddConstraint("RB", "RA", differ("A", "B", "more")),)))
     first, second = solve(team, SIMULATED).epochs
     assert first.verdict is second.verdict is Verdict.NO_SOLUTION
     assert second.metrics.messages == {}
@@ -154,7 +141,7 @@ def test_a_verdict_that_still_stands_costs_nothing() -> None:
 
 
 def test_a_change_that_hurts_nobody_costs_nothing() -> None:
-    team = pair(Event((AddValue("A", 3),)), values=2)
+    team = pair(ScenarioEvent((AddValue("A", 3),)), values=2)
     second = solve(team, SIMULATED).epochs[1]
     assert second.verdict is Verdict.SOLUTION
     assert second.metrics.messages == {}
@@ -163,7 +150,7 @@ def test_a_change_that_hurts_nobody_costs_nothing() -> None:
 def test_an_event_in_mid_run_ends_the_epoch_without_a_verdict() -> None:
     domains = dict.fromkeys("ABCDE", range(1, 4))
     constraints = [differ(left, right) for left in "ABCDE" for right in "ABCDE" if left < right]
-    team = replace(team_of(domains, constraints), scenario=(Event((RemoveAgent("RE"),), after=8),))
+    team = replace(team_of(domains, constraints), scenario=(ScenarioEvent((RemoveAgent("RE"),), after=8),))
     for runtime in ON_ONE_MACHINE:
         first, second = solve(team, replace(SIMULATED, runtime=runtime, timeout=60)).epochs
         assert first.verdict is Verdict.UNKNOWN
@@ -172,14 +159,14 @@ def test_an_event_in_mid_run_ends_the_epoch_without_a_verdict() -> None:
 
 
 def test_an_event_in_mid_run_comes_at_the_end_if_there_are_not_so_many_messages() -> None:
-    team = pair(Event((RemoveAgent("RA"),), after=1000), values=2)
+    team = pair(ScenarioEvent((RemoveAgent("RA"),), after=1000), values=2)
     assert verdicts(solve(team, SIMULATED)) == ["solution", "solution"]
 
 
 def test_the_outcome_sums_up_its_epochs() -> None:
     chance = Random("sum")
     for _ in range(10):
-        outcome = solve(random_journey(chance), replace(SIMULATED, seed=chance.getrandbits(30)))
+        outcome = solve(random_changing_team(chance), replace(SIMULATED, seed=chance.getrandbits(30)))
         last = outcome.epochs[-1]
         assert (outcome.verdict, outcome.assignment) == (last.verdict, last.assignment)
         assert outcome.metrics.messages == sum((e.metrics for e in outcome.epochs), Metrics()).messages
@@ -192,7 +179,7 @@ def test_a_problem_that_does_not_change_has_no_epochs() -> None:
 
 @pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_the_journal_says_what_the_metrics_say(runtime: Runtime) -> None:
-    team = random_journey(Random(5), 6)
+    team = random_changing_team(Random(5), 6)
     recorder = Recorder(Header(team=team.name, protocol="dynabt", runtime=runtime, seed=0))
     outcome = solve(team, replace(SIMULATED, runtime=runtime), observer=recorder)
     told = metrics_of(read_journal(recorder.content()).events)

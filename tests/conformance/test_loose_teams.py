@@ -12,8 +12,8 @@ from robochoc.model.orders import Order
 from robochoc.model.outcome import Verdict
 from robochoc.run.orchestrator import Options, Runtime
 from robochoc.run.registry import protocol_named, protocol_names
-from tests.conformance.test_conformance import random_schedule
-from tests.support.loose_problems import agrees, every_order, loose_team, turned_interface
+from tests.support.loose_problems import check_against_brute_force, every_order, loose_team, turned_interface
+from tests.support.random_options import random_schedule
 
 EVERY_PROTOCOL = pytest.mark.parametrize("protocol", protocol_names())
 FIRST, MANY = 3, 2000
@@ -30,7 +30,7 @@ def solved(protocol: str, seed: str, kind: int, runtime: Runtime = Runtime.SIMUL
         options = Options(protocol=protocol, runtime=runtime, seed=options.seed)
     orders = every_order(team, chance)
     try:
-        return agrees(team, replace(options, order=orders[kind % len(orders)])).verdict
+        return check_against_brute_force(team, replace(options, order=orders[kind % len(orders)])).verdict
     except Exception as error:
         raise AssertionError(f"solved({protocol!r}, {seed!r}, {kind}, {runtime!r}): {error}") from error
 
@@ -42,7 +42,7 @@ def test_a_turned_link_takes_a_variable_out_of_sight(protocol: str) -> None:
     orders: list[Order | tuple[str, ...]] = [("C", "A", "B"), ("B", "C", "A"), Order.RANDOM]
     for order in orders:
         options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, order=order)
-        assert agrees(team, options).verdict is Verdict.SOLUTION
+        assert check_against_brute_force(team, options).verdict is Verdict.SOLUTION
 
 
 @EVERY_PROTOCOL

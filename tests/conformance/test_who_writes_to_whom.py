@@ -26,9 +26,9 @@ from tests.support.sparse_teams import profiles_of, sparse_team
 OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
 WITHIN: list[type[Protocol]] = [
     FirstFit,
-    *(protocol_named(name) for name in OURS if not protocol_named(name).traits.beyond),
+    *(protocol_named(name) for name in OURS if not protocol_named(name).traits.writes_to_non_neighbours),
 ]
-BEYOND = [protocol_named(name) for name in OURS if protocol_named(name).traits.beyond]
+BEYOND = [protocol_named(name) for name in OURS if protocol_named(name).traits.writes_to_non_neighbours]
 MESSAGES = 400
 
 

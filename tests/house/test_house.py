@@ -14,6 +14,8 @@ from tests.support.program import ROOT
 
 SOURCES = sorted((ROOT / "robochoc").rglob("*.py"))
 LINES_AT_MOST = 400
+SHARED = ("support", "fuzz")
+"""Packages of `tests` that others import."""
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
@@ -25,6 +27,16 @@ def test_imports_run_downward() -> None:
     linter = Path(sys.executable).parent / "lint-imports"
     done = subprocess.run([linter], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
+
+
+def test_no_test_imports_another() -> None:
+    """What tests share is in `tests.support`. Programs within strings count as well."""
+    rooms = "|".join(
+        path.parent.name for path in (ROOT / "tests").glob("*/__init__.py") if path.parent.name not in SHARED
+    )
+    imported = re.compile(rf"^\s*(from|import) tests\.({rooms})\b", re.MULTILINE)
+    found = [path for path in (ROOT / "tests").rglob("*.py") if imported.search(path.read_text())]
+    assert found == []
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))

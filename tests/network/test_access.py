@@ -199,9 +199,9 @@ def test_who_stays_within_writes_to_neighbours_and_sharers_only(seed: int, make:
         members.register(name, profile, "visit")
     met = acquaintances(profiles_of(team))
     names = (*team.order, MASTER)
-    within = ways(access_control(members.reach(beyond=False)), names)
+    within = ways(access_control(members.reach(writes_to_non_neighbours=False)), names)
     assert within == {**{name: {MASTER, *met[name]} for name in team.order}, MASTER: set(names)}
-    beyond = ways(access_control(members.reach(beyond=True)), names)
+    beyond = ways(access_control(members.reach(writes_to_non_neighbours=True)), names)
     assert beyond == {name: set(names) for name in names}
 
 
@@ -210,6 +210,6 @@ def test_nobody_writes_to_who_is_lost() -> None:
     for name, profile in profiles_of(sparse_team(1)).items():
         members.register(name, profile, "visit")
     members.remove(["RX03"])
-    reach = members.reach(beyond=False)
+    reach = members.reach(writes_to_non_neighbours=False)
     assert "RX03" not in reach
     assert all("RX03" not in others for others in reach.values())

@@ -12,9 +12,9 @@ import pytest
 from robochoc.formats import read_team
 from robochoc.model.outcome import Verdict
 from robochoc.run.orchestrator import Options, Runtime, solve
-from robochoc.verification.checker import objections
-from tests.support.entries import entries_of
-from tests.support.machines import PAIR, TRIANGLE, Program, Site, ended, one_line, written
+from robochoc.verification.checker import violations
+from tests.support.deployments import PAIR, TRIANGLE, Deployment, Program, ended, one_line, written
+from tests.support.journal_entries import entries_of
 from tests.support.program import ROOT
 
 FOUR = ROOT / "instances" / "queens3d-4"
@@ -27,7 +27,7 @@ FLYING = 10
 
 
 @pytest.mark.slow
-def test_sixteen_machines_find_what_sixteen_processes_do(site: Site) -> None:
+def test_sixteen_machines_find_what_sixteen_processes_do(site: Deployment) -> None:
     tokens = site.enrol("--team", FOUR)
     master = site.master("--team", FOUR, "--json", "--withdraw", "--timeout", 90)
     robots = site.robots(FOUR, tokens)
@@ -49,7 +49,7 @@ def test_sixteen_machines_find_what_sixteen_processes_do(site: Site) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("files", "verdict"), [(FOUR, "no-solution"), (SEVEN, "solution")])
-def test_the_same_verdict_as_processes(files: Path, verdict: str, site: Site) -> None:
+def test_the_same_verdict_as_processes(files: Path, verdict: str, site: Deployment) -> None:
     tokens = site.enrol("--team", files)
     master = site.master("--team", files, "--json")
     robots = site.robots(files, tokens)
@@ -59,7 +59,7 @@ def test_the_same_verdict_as_processes(files: Path, verdict: str, site: Site) ->
     assert master.object["verdict"] == solve(team, Options(runtime=Runtime.PROCESSES)).verdict == verdict
 
 
-def test_a_journal_by_the_robots_own_words(site: Site) -> None:
+def test_a_journal_by_the_robots_own_words(site: Deployment) -> None:
     tokens = site.enrol("--team", SCOUTS)
     journal, page = site.folder / "scouts.jsonl", site.folder / "scouts.html"
     master = site.master("--journal", journal, "--json", "--filter", "signed", "--filter", "sealed")
@@ -78,7 +78,7 @@ def test_a_journal_by_the_robots_own_words(site: Site) -> None:
     assert page.stat().st_size > 0
 
 
-def test_what_robots_keep_to_themselves(site: Site) -> None:
+def test_what_robots_keep_to_themselves(site: Deployment) -> None:
     files = written(PAIR, site)
     tokens = site.enrol("--team", files)
     journal = site.folder / "pair.jsonl"
@@ -94,7 +94,7 @@ def test_what_robots_keep_to_themselves(site: Site) -> None:
     assert written_down == {"Journal", "Granted", "Registered", "Began", "Ended"}
 
 
-def test_a_robot_comes_back_while_others_are_awaited(site: Site) -> None:
+def test_a_robot_comes_back_while_others_are_awaited(site: Deployment) -> None:
     files = written(PAIR, site)
     tokens = site.enrol("--team", files)
     master = site.master("--team", files)
@@ -106,7 +106,7 @@ def test_a_robot_comes_back_while_others_are_awaited(site: Site) -> None:
     ended(robots)
 
 
-def test_robots_that_are_there_before_their_master(site: Site) -> None:
+def test_robots_that_are_there_before_their_master(site: Deployment) -> None:
     files = written(PAIR, site)
     robots = site.robots(files, site.enrol("--team", files))
     master = site.master("--team", files)
@@ -118,7 +118,7 @@ def test_robots_that_are_there_before_their_master(site: Site) -> None:
 # The directory
 
 
-def test_whom_the_directory_knows_while_the_master_waits(site: Site) -> None:
+def test_whom_the_directory_knows_while_the_master_waits(site: Deployment) -> None:
     files = written(TRIANGLE, site)
     tokens = site.enrol("--team", files)
     (token,) = site.enrol("Watcher", "--role", "observer").values()
@@ -156,7 +156,7 @@ def test_whom_the_directory_knows_while_the_master_waits(site: Site) -> None:
     ended({**robots, "RC": last})
 
 
-def test_what_a_parent_leaves_out_its_childs_constraints_say(site: Site) -> None:
+def test_what_a_parent_leaves_out_its_childs_constraints_say(site: Deployment) -> None:
     files = site.folder / "unsaid"
     files.mkdir()
     for path in (ROOT / "docs" / "examples" / "scouts").glob("*.xml"):
@@ -165,7 +165,7 @@ def test_what_a_parent_leaves_out_its_childs_constraints_say(site: Site) -> None
     master = site.master("--team", files, "--json")
     robots = site.robots(files, tokens)
     assert master.status() == 0, master.errors
-    assert not list(objections(read_team(files), master.object["assignment"]))
+    assert not list(violations(read_team(files), master.object["assignment"]))
     ended(robots)
 
 
@@ -173,7 +173,7 @@ def test_what_a_parent_leaves_out_its_childs_constraints_say(site: Site) -> None
 
 
 @pytest.mark.slow
-def test_revoked_while_the_others_wait_for_it(site: Site) -> None:
+def test_revoked_while_the_others_wait_for_it(site: Deployment) -> None:
     files = written(TRIANGLE, site)
     tokens = site.enrol("--team", files)
     late = tokens.pop("RC")
@@ -193,7 +193,7 @@ def test_revoked_while_the_others_wait_for_it(site: Site) -> None:
 
 
 @pytest.mark.slow
-def test_revoked_in_mid_run(site: Site) -> None:
+def test_revoked_in_mid_run(site: Deployment) -> None:
     files = written(TRIANGLE, site)
     tokens = site.enrol("--team", files)
     endless = ("--protocol", "dsa", "--set", "cycles=1000000", "--timeout", 15)
@@ -209,7 +209,7 @@ def test_revoked_in_mid_run(site: Site) -> None:
     ended(robots, 3)
 
 
-def test_ctrl_c_at_the_master_sends_everybody_home(site: Site) -> None:
+def test_ctrl_c_at_the_master_sends_everybody_home(site: Deployment) -> None:
     files = written(TRIANGLE, site)
     tokens = site.enrol("--team", files)
     del tokens["RC"]

@@ -14,14 +14,14 @@ from click.testing import CliRunner
 
 from robochoc.cli.group import cli
 from robochoc.formats import write_team
-from tests.support.machines import LONG_S, LOOPBACK, PAIR, SOON_S, Site, ended, one_line, taken, written
+from tests.support.deployments import LONG_S, LOOPBACK, PAIR, SOON_S, Deployment, ended, one_line, taken, written
 from tests.support.program import ROOT
 
 # Who is turned away
 
 
 @pytest.mark.slow
-def test_tokens_that_do_not_work(site: Site) -> None:
+def test_tokens_that_do_not_work(site: Deployment) -> None:
     files = written(PAIR, site)
     tokens = site.enrol("--team", files)
     expired = site.enrol("Late", "--token-ttl", 1e-6)["Late"]
@@ -40,7 +40,7 @@ def test_tokens_that_do_not_work(site: Site) -> None:
     first = site.robot(files / "RA.xml", "--token", tokens["RA"])
     master.wait_to_say("RA is there")
     assert "used already" in refused(files / "RA.xml", tokens["RA"], "--identity", site.folder / "second")
-    with Site(site.folder / "elsewhere") as elsewhere:
+    with Deployment(site.folder / "elsewhere") as elsewhere:
         foreign = elsewhere.enrol("RB")["RB"]
     assert "not the Authority that the token is from" in refused(files / "RB.xml", foreign)
     second = site.robot(files / "RB.xml", "--token", tokens["RB"])
@@ -48,7 +48,7 @@ def test_tokens_that_do_not_work(site: Site) -> None:
     ended({"RA": first, "RB": second})
 
 
-def test_identities_that_do_not_fit(site: Site) -> None:
+def test_identities_that_do_not_fit(site: Deployment) -> None:
     files = written(PAIR, site)
     tokens = site.enrol("--team", files)
     master = site.master("--gather", 60)
@@ -71,7 +71,7 @@ def test_identities_that_do_not_fit(site: Site) -> None:
 # Nobody there
 
 
-def test_no_master_there(site: Site) -> None:
+def test_no_master_there(site: Deployment) -> None:
     files = written(PAIR, site)
     token = site.enrol("RA")["RA"]
     began = time.monotonic()
@@ -95,7 +95,7 @@ def test_no_master_there(site: Site) -> None:
 
 
 @pytest.mark.slow
-def test_ctrl_c_ends_a_robot_that_waits_for_its_master(site: Site) -> None:
+def test_ctrl_c_ends_a_robot_that_waits_for_its_master(site: Deployment) -> None:
     files = written(PAIR, site)
     master = site.master("--gather", 60)
     site.robot(files / "RA.xml", "--token", site.enrol("RA")["RA"])
@@ -109,7 +109,7 @@ def test_ctrl_c_ends_a_robot_that_waits_for_its_master(site: Site) -> None:
             assert robot.status(SOON_S) == 130, robot.errors
 
 
-def test_a_master_that_nobody_joins(site: Site) -> None:
+def test_a_master_that_nobody_joins(site: Deployment) -> None:
     files = written(PAIR, site)
     master = site.master("--gather", 1, "--team", files)
     assert (master.status(), master.output) == (3, "")
@@ -119,7 +119,7 @@ def test_a_master_that_nobody_joins(site: Site) -> None:
 
 
 @pytest.mark.slow
-def test_a_robot_hears_that_the_others_did_not_come(site: Site) -> None:
+def test_a_robot_hears_that_the_others_did_not_come(site: Deployment) -> None:
     files = written(PAIR, site)
     robot = site.robot(files / "RA.xml", "--token", site.enrol("RA")["RA"])
     master = site.master("--gather", 15)
@@ -133,7 +133,7 @@ def test_a_robot_hears_that_the_others_did_not_come(site: Site) -> None:
 
 
 @pytest.mark.parametrize("higher", [0, 1])
-def test_a_port_in_use(higher: int, site: Site) -> None:
+def test_a_port_in_use(higher: int, site: Deployment) -> None:
     with taken(site.port + higher):
         words = ("--listen", site.place, "--authority", site.authority_folder, "--gather", 5)
         master = site.start("master", "master", *words)
@@ -168,7 +168,7 @@ def test_a_port_in_use(higher: int, site: Site) -> None:
     ],
 )
 def test_what_cannot_be_is_said_in_a_line(
-    words: list[str], status: int, told: str, site: Site, monkeypatch: pytest.MonkeyPatch
+    words: list[str], status: int, told: str, site: Deployment, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_DATA_HOME", str(site.folder))
     given = [*words, "--authority", str(site.authority_folder)] if words[0] == "master" else words
@@ -181,7 +181,7 @@ def test_what_cannot_be_is_said_in_a_line(
 
 
 def test_a_master_without_an_authority(tmp_path: Path) -> None:
-    with Site(tmp_path) as site:
+    with Deployment(tmp_path) as site:
         words = ("--authority", tmp_path / "nowhere", "--listen", site.place)
         master = site.start("master", "master", *words)
         assert master.status() == 1

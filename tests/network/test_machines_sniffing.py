@@ -12,31 +12,31 @@ from click.testing import CliRunner
 
 from robochoc.cli.group import cli
 from robochoc.journal.journal import read_journal
-from tests.support.entries import entries_of
-from tests.support.machines import PAIR, TRIANGLE, Program, Site, ended, one_line, wait_until, written
+from tests.support.deployments import PAIR, TRIANGLE, Deployment, Program, ended, one_line, wait_until, written
+from tests.support.journal_entries import entries_of
 
 OBSERVER = ("--role", "observer")
 SNIFFER = (*OBSERVER, "--may", "sniff")
 ENDLESS = ("--protocol", "dsa", "--set", "cycles=1000000", "--json")
 
 
-def follow(site: Site, name: str, token: str, *words: object) -> Program:
+def follow(site: Deployment, name: str, token: str, *words: object) -> Program:
     """Follow the run of the site's master on a machine of one's own, into a file."""
     kept = ("--no-page", "--journal", copy_of(site, name))
     return site.start(name, "sniff", "--master", site.place, "--as", name, "--token", token, *kept, *words)
 
 
-def copy_of(site: Site, name: str) -> Path:
+def copy_of(site: Deployment, name: str) -> Path:
     return site.folder / f"{name}.journal"
 
 
-def heard(site: Site, name: str) -> set[str]:
+def heard(site: Deployment, name: str) -> set[str]:
     """The kinds of events that a sniffer has heard of by now."""
     file = copy_of(site, name)
     return {type(event).__name__ for event in read_journal(file.read_bytes()).events} if file.exists() else set()
 
 
-def test_who_may_has_the_masters_own_journal_whenever_it_comes(site: Site) -> None:
+def test_who_may_has_the_masters_own_journal_whenever_it_comes(site: Deployment) -> None:
     files = written(PAIR, site)
     tokens = site.enrol("--team", files)
     sniffers = site.enrol("Early", "Late", *SNIFFER)
@@ -70,7 +70,7 @@ def test_who_may_has_the_masters_own_journal_whenever_it_comes(site: Site) -> No
 
 
 @pytest.mark.slow
-def test_sniffers_that_are_stopped_killed_or_revoked_in_mid_run(site: Site) -> None:
+def test_sniffers_that_are_stopped_killed_or_revoked_in_mid_run(site: Deployment) -> None:
     files = written(TRIANGLE, site)
     tokens = site.enrol("--team", files)
     sniffers = site.enrol("Stopped", "Killed", "Revoked", "Whole", *SNIFFER)
@@ -101,7 +101,7 @@ def test_sniffers_that_are_stopped_killed_or_revoked_in_mid_run(site: Site) -> N
         assert read_journal(part).damage is None
 
 
-def test_a_master_that_is_killed_and_the_page_stays(site: Site) -> None:
+def test_a_master_that_is_killed_and_the_page_stays(site: Deployment) -> None:
     files = written(PAIR, site)
     tokens = site.enrol("--team", files)
     token = site.enrol("Sniffer", *SNIFFER)["Sniffer"]
@@ -126,7 +126,7 @@ def test_a_master_that_is_killed_and_the_page_stays(site: Site) -> None:
     assert f"{len(content):,} bytes of its journal are here" in sniffer.errors
 
 
-def test_in_a_private_run_only_robots_that_agreed_are_heard(site: Site) -> None:
+def test_in_a_private_run_only_robots_that_agreed_are_heard(site: Deployment) -> None:
     files = written(PAIR, site)
     tokens = site.enrol("--team", files)
     token = site.enrol("Eye", *SNIFFER)["Eye"]
@@ -144,7 +144,7 @@ def test_in_a_private_run_only_robots_that_agreed_are_heard(site: Site) -> None:
     assert [entry["outcome"]["assignment"] for entry in told if entry["event"] == "Ended"] == [{}]
 
 
-def test_ctrl_c_ends_it_and_a_master_that_is_not_sniffable_says_so(site: Site) -> None:
+def test_ctrl_c_ends_it_and_a_master_that_is_not_sniffable_says_so(site: Deployment) -> None:
     tokens = site.enrol("Eye", "Ear", *SNIFFER)
     master = site.master()
     eye = follow(site, "Eye", tokens["Eye"])

@@ -13,8 +13,8 @@ import pytest
 from robochoc.formats import write_team
 from robochoc.model.problem import Constraint
 from robochoc.run.orchestrator import Options, Runtime, solve
-from tests.support.entries import entries_of
-from tests.support.machines import Program, Site, ended
+from tests.support.deployments import Deployment, Program, ended
+from tests.support.journal_entries import entries_of
 from tests.support.namespaces import DELAY_S, TUN, Link, bad_line, inside, namespaces, route, veth, why_not
 from tests.support.problems import PREDICATES, team_of
 from tests.support.program import ROOT
@@ -37,7 +37,7 @@ CROWD = team_of(
 class Apart(NamedTuple):
     """A master on the hill, robots in the field, and a bad line between them."""
 
-    site: Site
+    site: Deployment
     hill: tuple[str, ...]
     field: tuple[str, ...]
     line: Link
@@ -48,17 +48,19 @@ def apart(tmp_path: Path) -> Iterator[Apart]:
     with (
         namespaces(2) as (hill, field),
         bad_line((hill, f"{HILL}/24"), (field, f"{FIELD}/24"), seed=6) as line,
-        Site(tmp_path, HILL, PORT) as site,
+        Deployment(tmp_path, HILL, PORT) as site,
     ):
         yield Apart(site, inside(hill), inside(field), line)
 
 
-def robots(site: Site, files: Path, tokens: dict[str, str], where: tuple[str, ...], *words: object) -> list[Program]:
+def robots(
+    site: Deployment, files: Path, tokens: dict[str, str], where: tuple[str, ...], *words: object
+) -> list[Program]:
     return [site.robot(files / f"{n}.xml", "--token", t, *words, inside=where) for n, t in tokens.items()]
 
 
 def test_three_machines_that_only_cables_join(tmp_path: Path) -> None:
-    with namespaces(3) as (hill, east, west), Site(tmp_path, HILL, PORT) as site:
+    with namespaces(3) as (hill, east, west), Deployment(tmp_path, HILL, PORT) as site:
         veth((hill, f"{HILL}/24"), (east, f"{FIELD}/24"))
         veth((hill, "10.77.2.1/24"), (west, "10.77.2.2/24"))
         route(west, "10.77.1.0/24", "10.77.2.1")
@@ -78,7 +80,7 @@ def test_three_machines_that_only_cables_join(tmp_path: Path) -> None:
 def test_a_master_with_an_address_for_each_cable(tmp_path: Path) -> None:
     pair = team_of(dict.fromkeys("AB", range(1, 3)), [Constraint("C", PREDICATES[0], ("A", "B"), ("A", "B"))])
     write_team(pair, tmp_path / "pair")
-    with namespaces(3) as (hill, *fields), Site(tmp_path, "0.0.0.0", PORT) as site:  # noqa: S104 - of a namespace
+    with namespaces(3) as (hill, *fields), Deployment(tmp_path, "0.0.0.0", PORT) as site:  # noqa: S104 - of a namespace
         here = {name: f"10.77.{number}.1" for number, name in enumerate(fields)}
         for name, address in here.items():
             veth((hill, f"{address}/24"), (name, f"{address[:-1]}2/24"))

@@ -19,14 +19,14 @@ from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooLargeError
-from robochoc.verification.checker import cost, objections
-from tests.conformance.test_complex_teams import compiled_by_hand
+from robochoc.verification.checker import assignment_cost, violations
 from tests.support.clocks import once
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import least_cost, random_cost_team
-from tests.support.held import CHAIN, Broken, Held, Overwhelmed
+from tests.support.paused_abt import CHAIN, CrashingABT, OverloadedABT, PausedABT
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import random_team, solutions
+from tests.support.solver_networks import compiled_by_brute_force
 
 TIMEOUT_S = 60
 FEW = (("afc-ng", ("signed", "sealed")), ("awc", ()), ("dynabt", ("signed",)))
@@ -53,12 +53,12 @@ def agrees(
     filters: tuple[str, ...] = (),
 ) -> Verdict:
     """The verdict is brute force's, and the robots' own check agrees with the checker's."""
-    result, checked = run_over_network(compiled_by_hand(team), protocol, NetworkSettings(filters))
+    result, checked = run_over_network(compiled_by_brute_force(team), protocol, NetworkSettings(filters))
     truth = next(solutions(team), None)
     assert result.verdict is (Verdict.NO_SOLUTION if truth is None else Verdict.SOLUTION), (team, protocol)
     assert not result.lost
     if truth is not None:
-        assert not list(objections(team, assignment_of(result)))
+        assert not list(violations(team, assignment_of(result)))
         assert checked == (True, 0.0)
     return result.verdict
 
@@ -109,7 +109,7 @@ def test_costs(protocol: str, seed: int) -> None:
         assert result.verdict is Verdict.NO_SOLUTION
         return
     assert result.verdict is Verdict.SOLUTION, "whether that is optimal is for who asked to say"
-    assert cost(team, assignment_of(result)) == least
+    assert assignment_cost(team, assignment_of(result)) == least
     assert checked == (True, least)
 
 
@@ -120,9 +120,9 @@ def test_local_search_ends_by_itself() -> None:
         result = network.search(TIMEOUT_S)
         held, told = network.master.checked(result.assignments)
     assert set(result.assignments) == set(team.order)
-    assert (cost(team, assignment_of(result)) < INFINITE) is held
+    assert (assignment_cost(team, assignment_of(result)) < INFINITE) is held
     if held:
-        assert cost(team, assignment_of(result)) == told
+        assert assignment_cost(team, assignment_of(result)) == told
 
 
 @pytest.mark.parametrize("filters", [("signed", "sealed"), pytest.param((), marks=pytest.mark.slow)])
@@ -159,7 +159,7 @@ def test_what_the_robots_check_is_what_the_checker_checks() -> None:
     with LocalNetwork(CHAIN, protocol_named("abt")) as network:
         result = network.search(TIMEOUT_S)
         wrong = {**result.assignments, "RX0": {"X0": result.assignments["RX1"]["X1"]}}
-        assert list(objections(CHAIN, {name: v for values in wrong.values() for name, v in values.items()}))
+        assert list(violations(CHAIN, {name: v for values in wrong.values() for name, v in values.items()}))
         assert network.master.checked(wrong) == (False, 0.0)
 
 
@@ -172,7 +172,7 @@ def test_limits() -> None:
 
 def test_when_the_time_is_over_there_is_what_was_decided_so_far() -> None:
     def searched(limit: float) -> RunResult:
-        with LocalNetwork(CHAIN, Held, brief=RunParameters(settings={"file": "/nowhere"})) as network:
+        with LocalNetwork(CHAIN, PausedABT, brief=RunParameters(settings={"file": "/nowhere"})) as network:
             return network.search(timeout=limit)
 
     result = once(lambda result: len(result.assignments) == len(CHAIN.order), searched)
@@ -183,13 +183,13 @@ def test_when_the_time_is_over_there_is_what_was_decided_so_far() -> None:
 
 def test_a_problem_that_is_too_much_for_a_robot() -> None:
     """It says so, and the run ends with that."""
-    with LocalNetwork(CHAIN, Overwhelmed) as network, pytest.raises(TooLargeError, match="this is too much for RX2"):
+    with LocalNetwork(CHAIN, OverloadedABT) as network, pytest.raises(TooLargeError, match="this is too much for RX2"):
         network.search(TIMEOUT_S)
 
 
 def test_a_robot_that_breaks() -> None:
     with (
-        LocalNetwork(CHAIN, Broken) as network,
+        LocalNetwork(CHAIN, CrashingABT) as network,
         pytest.raises(RobotsLostError, match="RX2 was lost: ValueError: out of"),
     ):
         network.search(TIMEOUT_S)

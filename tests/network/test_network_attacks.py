@@ -30,8 +30,8 @@ from robochoc.model.outcome import Verdict
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
-from tests.support.held import CHAIN, Held
 from tests.support.network_runs import NetworkRun, free_endpoint, letter, put
+from tests.support.paused_abt import CHAIN, PausedABT
 
 A_DAY_S = 86_400
 JUNK = 10_000
@@ -168,7 +168,7 @@ def test_reading_the_letters_of_others(run: NetworkRun, key: str) -> None:
 
 def test_a_robot_that_writes_to_one_it_has_nothing_to_do_with(run: NetworkRun) -> None:
     """RX0 and RX3 share no constraint, and the protocol says that it goes `beyond` none."""
-    assert not Held.traits.beyond
+    assert not PausedABT.traits.writes_to_non_neighbours
     with run.post("RX3") as post:
         put(post, letter_key("RX0", "RX3"), letter(run, "RX3", "RX0", Said(1, 0, encode(Ok((0,))))))
         run.wait_for_refusal("RX3", "put rc/msg/RX0/RX3", "no rule")
@@ -288,7 +288,7 @@ def test_a_robot_of_a_name_that_is_there_already(run: NetworkRun) -> None:
 
 
 def protocol_named(_name: str) -> type[Protocol]:
-    return Held
+    return PausedABT
 
 
 def test_who_asks_the_directory_without_end(run: NetworkRun) -> None:

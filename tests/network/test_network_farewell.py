@@ -10,8 +10,8 @@ from robochoc.communication.network.framing import MASTER, Framing, Opened
 from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.transport import Transport
-from tests.support.held import CHAIN
 from tests.support.network_runs import SLICE_S, NetworkRun
+from tests.support.paused_abt import CHAIN
 from tests.support.relays import Relay
 
 

@@ -32,8 +32,8 @@ from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.authorities import identity_of
 from tests.support.clocks import waiting
 from tests.support.faults import Run, running, wait_until
-from tests.support.held import CHAIN, Held
 from tests.support.network_runs import NetworkRun, free_endpoint
+from tests.support.paused_abt import CHAIN, PausedABT
 from tests.support.program import ROOT
 from tests.support.relays import Relay
 
@@ -96,7 +96,7 @@ class Team:
 def held_team(folder: Path, conditions: NetworkSettings = NetworkSettings()) -> Iterator[Team]:
     events: list[AnyEvent] = []
     brief = RunParameters(settings={"file": str(folder / "go")})
-    with LocalNetwork(CHAIN, Held, observer=events.append, conditions=conditions, brief=brief) as network:
+    with LocalNetwork(CHAIN, PausedABT, observer=events.append, conditions=conditions, brief=brief) as network:
         team = Team(network, events, folder / "go")
         try:
             yield team
@@ -270,8 +270,8 @@ class Elsewhere:
 
     @contextmanager
     def master(self) -> Iterator[subprocess.Popen[bytes]]:
-        program = str(ROOT.joinpath("support", "network_master.py"))
-        command = [sys.executable, program, str(self.folder / "authority"), self.endpoint, str(self.folder / "go")]
+        given = [str(self.folder / "authority"), self.endpoint, str(self.folder / "go")]
+        command = [sys.executable, "-m", "tests.support.network_master", *given]
         process = subprocess.Popen(command, stdout=subprocess.PIPE)
         try:
             yield process
@@ -305,7 +305,7 @@ class Elsewhere:
     def _take_part(self, name: str, patience_s: float) -> None:
         identity = self.identities[name]
         with Transport(self.endpoint, identity, watch=(), patience_s=30) as post:
-            robot = NetworkRobot(CompiledRobot(CHAIN[name]), identity, post, lambda _: Held, Manner(patience_s))
+            robot = NetworkRobot(CompiledRobot(CHAIN[name]), identity, post, lambda _: PausedABT, Manner(patience_s))
             self.endings[name] = robot.run()
 
 
@@ -352,8 +352,8 @@ def short_path() -> Iterator[Path]:
     "signum", [signal.SIGINT, signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
 )
 def test_a_parent_that_is_struck_leaves_nothing(signum: signal.Signals, short_path: Path) -> None:
-    program = str(ROOT.joinpath("support", "network_parent.py"))
-    with running([sys.executable, program], short_path / "run") as run:
+    program = "tests.support.network_parent"
+    with running([sys.executable, "-m", program], short_path / "run") as run:
         wait_until(lambda: "searching" in run.output() or run.is_over, "it never searched")
         ports = run.ports()
         assert ports, run.errors()
@@ -372,8 +372,8 @@ def test_a_parent_that_is_struck_leaves_nothing(signum: signal.Signals, short_pa
 def test_a_parent_that_is_struck_at_any_time_leaves_no_process(
     signum: signal.Signals, wait_s: float, short_path: Path
 ) -> None:
-    program = str(ROOT.joinpath("support", "network_parent.py"))
-    with running([sys.executable, program], short_path / "run") as run:
+    program = "tests.support.network_parent"
+    with running([sys.executable, "-m", program], short_path / "run") as run:
         time.sleep(wait_s)
         run.strike(signum)
         run.end()

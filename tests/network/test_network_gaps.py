@@ -24,8 +24,8 @@ from robochoc.communication.network.transport import Transport
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.model.outcome import Verdict
 from tests.support.faults import wait_until
-from tests.support.held import CHAIN
 from tests.support.network_runs import NetworkRun, free_endpoint, letter
+from tests.support.paused_abt import CHAIN
 
 FAR = 5000
 WATCHER = "Watcher"

@@ -18,10 +18,10 @@ from robochoc.run.registry import protocol_named
 from robochoc.run.scenario import Played, ScenarioRun
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 from tests.support.complex_problems import complex_team
-from tests.support.held import Held
 from tests.support.loose_problems import untold_interface
+from tests.support.paused_abt import PausedABT
 
 DIFFER = PREDEFINED["ne"]
 TEAM = complex_team(
@@ -49,7 +49,7 @@ def test_those_who_are_left_go_on_with_the_values_that_they_had(tmp_path: Path) 
     journey = ScenarioRun(TEAM, None, CompiledTeam, lambda: None, brief=brief)
     played: list[Played] = []
     with LocalNetwork(
-        journey.compiled(), Held, observer=observe, conditions=NetworkSettings(survive=True), brief=brief
+        journey.compiled(), PausedABT, observer=observe, conditions=NetworkSettings(survive=True), brief=brief
     ) as network:
         for one in journey.go(network, lambda _: None):
             played.append(one)
@@ -69,4 +69,4 @@ def test_who_is_asked_to_show_more_is_not_misread() -> None:
     with LocalNetwork(team, protocol_named("abt")) as network:
         result = network.search(60)
     assert result.verdict is Verdict.SOLUTION
-    assert not list(objections(team, {**result.assignments["A"], **result.assignments["B"]}))
+    assert not list(violations(team, {**result.assignments["A"], **result.assignments["B"]}))

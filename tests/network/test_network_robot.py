@@ -36,12 +36,12 @@ from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.transport import Transport
 from robochoc.protocols.abt import ABT
 from robochoc.solver.compiled_team import CompiledRobot
-from tests.support.lone_robot import LEAVE, UNPROVEN, differ, ok, played, task
-from tests.support.offices import RUN, Scripted
+from tests.support.in_memory_network import RUN, ScriptedTransport
+from tests.support.lone_robot import LEAVE, UNPROVEN, chain_of_three, ok, played, task
 
 
 def test_a_run_from_beginning_to_end() -> None:
-    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         match word:
             case Joined():
                 yield from (Presence("RA", there=True), Woken(), Show(("B", "Z")), task())
@@ -73,7 +73,7 @@ def test_a_run_from_beginning_to_end() -> None:
 
 
 def test_what_others_say_before_the_task_and_the_start_waits() -> None:
-    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         match word:
             case Joined():
                 yield post.letter(Said(1, 0, ok(1)), "RA")
@@ -93,7 +93,7 @@ def test_what_others_say_before_the_task_and_the_start_waits() -> None:
 
 
 def test_what_was_said_in_another_search_is_passed_over() -> None:
-    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         match word:
             case Joined():
                 yield task()
@@ -119,7 +119,7 @@ def test_what_was_said_in_another_search_is_passed_over() -> None:
 
 
 def test_what_comes_with_the_end_of_a_search_changes_nothing_any_more() -> None:
-    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         match word:
             case Joined():
                 yield task()
@@ -145,7 +145,7 @@ def test_what_comes_with_the_end_of_a_search_changes_nothing_any_more() -> None:
     ids=lambda word: type(word).__name__,
 )
 def test_orders_out_of_place_are_objected_to(word: Word) -> None:
-    def script(_post: Scripted, heard: Word) -> Iterator[Word | Item]:
+    def script(_post: ScriptedTransport, heard: Word) -> Iterator[Word | Item]:
         match heard:
             case Joined():
                 yield word
@@ -163,7 +163,7 @@ def test_orders_out_of_place_are_objected_to(word: Word) -> None:
 
 @pytest.mark.parametrize("word", [Search(2), Judge(2, {})], ids=lambda word: type(word).__name__)
 def test_orders_of_another_search_are_objected_to(word: Word) -> None:
-    def script(_post: Scripted, heard: Word) -> Iterator[Word | Item]:
+    def script(_post: ScriptedTransport, heard: Word) -> Iterator[Word | Item]:
         match heard:
             case Joined():
                 yield task()
@@ -193,7 +193,7 @@ def test_orders_of_another_search_are_objected_to(word: Word) -> None:
     ],
 )
 def test_letters_that_are_refused_are_objected_to_and_change_nothing(content: bytes, why: str) -> None:
-    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         match word:
             case Joined():
                 yield task()
@@ -215,7 +215,7 @@ def test_letters_that_are_refused_are_objected_to_and_change_nothing(content: by
 
 
 def test_replays_are_objected_to() -> None:
-    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         match word:
             case Joined():
                 yield task()
@@ -233,7 +233,7 @@ def test_replays_are_objected_to() -> None:
 
 
 def test_what_is_no_message_is_refused_and_takes_no_place() -> None:
-    def script(_post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(_post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         match word:
             case Joined():
                 yield task()
@@ -254,7 +254,7 @@ def test_what_is_no_message_is_refused_and_takes_no_place() -> None:
 def test_who_takes_no_part_is_not_heard() -> None:
     """Such as a robot that was lost before: the protocol knows nothing of it."""
 
-    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         match word:
             case Joined():
                 yield task()
@@ -273,7 +273,7 @@ def test_who_takes_no_part_is_not_heard() -> None:
 
 
 def test_objections_are_limited() -> None:
-    def script(_post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(_post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         if isinstance(word, Joined):
             yield from [Arrived("RA", b"noise")] * 150
             yield LEAVE
@@ -284,17 +284,17 @@ def test_objections_are_limited() -> None:
 
 
 def test_noise_before_the_welcome_is_nothing_to_tell() -> None:
-    def script(_post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(_post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         if isinstance(word, Joined):
             yield LEAVE
 
-    post = Scripted("RB", lambda _word: ())
+    post = ScriptedTransport("RB", lambda _word: ())
     post.inbox.put(Arrived("RA", b"noise"))
     post.inbox.put(Arrived(MASTER, msgspec.msgpack.encode(Letter("", 1, LEAVE))))
     post.inbox.put(Arrived(MASTER, msgspec.msgpack.encode(Letter("", 0, Denied("another's", "no")))))
     post.router = ""
     robot = NetworkRobot(
-        CompiledRobot(differ()["RB"]), UNPROVEN, cast("Transport", post), lambda _name: ABT, Manner(0.01)
+        CompiledRobot(chain_of_three()["RB"]), UNPROVEN, cast("Transport", post), lambda _name: ABT, Manner(0.01)
     )
     assert robot.run().why == "the master is gone: no link to it for 0.01 s"
     assert [type(word) for word in post.heard] == [Register]

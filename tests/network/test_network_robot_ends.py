@@ -32,19 +32,19 @@ from robochoc.communication.network.quotas import Kept, Share
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.shared import PredicateRecord, SharedRecord
 from robochoc.communication.network.transport import Transport
-from robochoc.model.problem import INFINITE, Model
+from robochoc.model.problem import INFINITE, ConstraintModel
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.awc import AWC
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
-from tests.support.lone_robot import LEAVE, UNPROVEN, differ, ok, played, task
-from tests.support.offices import RUN, Scripted
+from tests.support.in_memory_network import RUN, ScriptedTransport
+from tests.support.lone_robot import LEAVE, UNPROVEN, chain_of_three, ok, played, task
 
 
 def failing(*said: Word | Item, protocol: type[Protocol] = ABT, at: type[Word] = Joined) -> tuple[Ending, Failed]:
     """How RB fails when `said` is answered to its first word of the kind `at`: what it says itself, and tells."""
 
-    def script(_post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(_post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         if isinstance(word, at):
             yield from said
         elif isinstance(word, Failed):
@@ -72,7 +72,7 @@ def test_lost_letters_are_told() -> None:
 def test_who_says_too_much_ahead_of_the_task_takes_nobodys_place(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robochoc.communication.network.robot.Kept", lambda: Kept(Share(2, 1000)))
 
-    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         if isinstance(word, Joined):
             yield from (post.letter(Said(1, 0, ok(1)), name) for name in ("RA", "RA", "RA", "RA", "RC"))
             yield task()
@@ -90,7 +90,7 @@ def test_a_gap_is_told_once_a_search_of_each() -> None:
     before: list[Item] = [Missed("RA", 5), Missed("RA", 9)]
     then: list[Item] = [Missed("RA", 2), Missed("RC", 1), Missed("RA", 7)]
 
-    def script(_post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(_post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         if isinstance(word, Joined):
             yield from before
             yield task()
@@ -103,7 +103,9 @@ def test_a_gap_is_told_once_a_search_of_each() -> None:
 
 
 def copy(scope: tuple[str, ...] = ("B", "C"), body: str = "ne(X, Y)") -> SharedRecord:
-    return SharedRecord("RC<RB:C", "C", PredicateRecord("p", ("X", "Y"), body), scope, scope, Model.TKC, INFINITE)
+    return SharedRecord(
+        "RC<RB:C", "C", PredicateRecord("p", ("X", "Y"), body), scope, scope, ConstraintModel.TKC, INFINITE
+    )
 
 
 def copies(sender: str, *records: SharedRecord, number: int = 1) -> Arrived:
@@ -130,7 +132,7 @@ def test_copies_that_cannot_be_are_told(told: list[Arrived], why: str) -> None:
 
 
 def test_copies_before_the_task_are_kept_and_later_ones_change_nothing() -> None:
-    def script(_post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(_post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         match word:
             case Joined():
                 yield copies("RC", copy())
@@ -150,7 +152,7 @@ def test_copies_before_the_task_are_kept_and_later_ones_change_nothing() -> None
 
 
 def test_without_copies_a_robot_is_not_ready_but_reports() -> None:
-    def script(_post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(_post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         match word:
             case Joined():
                 yield task(AWC)
@@ -179,15 +181,17 @@ def test_who_is_denied_ends() -> None:
         yield post.letter(Denied("another's visit", "not meant"))
         yield post.letter(Denied(word.visit, "a robot called RB is registered already"))
 
-    post = Scripted("RB", answers)
-    ending = NetworkRobot(CompiledRobot(differ()["RB"]), UNPROVEN, cast("Transport", post), lambda _name: ABT).run()
+    post = ScriptedTransport("RB", answers)
+    ending = NetworkRobot(
+        CompiledRobot(chain_of_three()["RB"]), UNPROVEN, cast("Transport", post), lambda _name: ABT
+    ).run()
     assert ending == Ending(
         "the master does not take RB: a robot called RB is registered already", failed=True, assignment={}
     )
 
 
 def test_another_master_ends_the_run_the_same_one_does_not() -> None:
-    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         if isinstance(word, Joined):
             (register,) = post.heard_of(Register)
             assert isinstance(register, Register)
@@ -203,7 +207,7 @@ def test_behind_another_router_a_robot_registers_until_it_is_welcomed(monkeypatc
     """Whatever it says at first may get lost there, and so may the answer."""
     monkeypatch.setattr("robochoc.communication.network.robot.REGISTER_AGAIN_S", 0.01)
 
-    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         match word, len(post.heard_of(Register)):
             case Register(visit=visit), 4:
                 yield Welcome(visit, RUN, (), observed=False, private=False)
@@ -220,7 +224,7 @@ def test_behind_another_router_a_robot_registers_until_it_is_welcomed(monkeypatc
 
 
 def test_a_master_that_is_gone_ends_the_run() -> None:
-    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         if isinstance(word, Joined):
             post.router = ""
         yield from ()
@@ -230,7 +234,7 @@ def test_a_master_that_is_gone_ends_the_run() -> None:
 
 
 def test_who_fails_does_not_wait_for_a_master_that_is_gone() -> None:
-    def script(post: Scripted, word: Word) -> Iterator[Word | Item]:
+    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         if isinstance(word, Joined):
             yield Missed(MASTER, 1)
         elif isinstance(word, Failed):

@@ -13,8 +13,8 @@ from robochoc.protocols.abt import ABT
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.cost_problems import least_cost, random_cost_team
-from tests.support.lone_robot import differ
-from tests.support.offices import Office
+from tests.support.in_memory_network import InMemoryNetwork
+from tests.support.lone_robot import chain_of_three
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import known_to_both, random_team, solutions
 
@@ -24,7 +24,7 @@ def test_teams_solve_their_problems(protocol: str) -> None:
     verdicts = set()
     for seed in range(8):
         team = random_team(Random(seed))
-        office = Office(team, protocol_named(protocol))
+        office = InMemoryNetwork(team, protocol_named(protocol))
         for _ in range(2):  # and again, from the beginning
             result = office.search()
             assert (result.verdict is Verdict.SOLUTION) is any(True for _ in solutions(team))
@@ -46,7 +46,7 @@ def test_nobody_is_doubted_who_is_honest(name: str) -> None:
     chance = Random(4)
     team = random_cost_team(chance, n_ary=False) if protocol.traits.costs else random_team(chance, n_ary=False)
     brief = RunParameters(settings={"cycles": "5"} if hasattr(protocol.settings, "cycles") else {})
-    office = Office(known_to_both(team), protocol, brief=brief)
+    office = InMemoryNetwork(known_to_both(team), protocol, brief=brief)
     result = office.search()
     assert not office.failures
     assert not office.tally.doubts_about_counts
@@ -62,7 +62,7 @@ def test_nobody_is_doubted_who_is_honest(name: str) -> None:
 def test_teams_minimise_and_check_their_costs(protocol: str) -> None:
     for seed in range(5):
         team = random_cost_team(Random(seed))
-        office = Office(team, protocol_named(protocol))
+        office = InMemoryNetwork(team, protocol_named(protocol))
         result = office.search()
         least = least_cost(team)
         if least == INFINITE:
@@ -74,7 +74,7 @@ def test_teams_minimise_and_check_their_costs(protocol: str) -> None:
 def test_partially_known_constraints_stay_with_their_holders() -> None:
     for seed in range(5):
         team = random_pkc_team(Random(seed))
-        office = Office(team, protocol_named("disfc"))
+        office = InMemoryNetwork(team, protocol_named("disfc"))
         result = office.search()
         assert (result.verdict is Verdict.SOLUTION) is any(True for _ in solutions(team))
         if result.verdict is Verdict.SOLUTION:
@@ -85,15 +85,15 @@ def test_messages_go_through_filters() -> None:
     team = random_team(Random(3))
     household = Household(team.order)
     identities = {name: household.identity(name) for name in team.order}
-    office = Office(team, ABT, identities, ("signed", "sealed"))
+    office = InMemoryNetwork(team, ABT, identities, ("signed", "sealed"))
     result = office.search()
     assert (result.verdict is Verdict.SOLUTION) is any(True for _ in solutions(team))
     assert not office.objections
 
 
 def test_a_wrong_decision_does_not_pass_the_check() -> None:
-    team = differ()
-    office = Office(team, ABT)
+    team = chain_of_three()
+    office = InMemoryNetwork(team, ABT)
     decided = office.search().assignments
     assert decided == {"RA": {"A": 1}, "RB": {"B": 2}, "RC": {"C": 1}}
     assert office.judge(decided)[0]

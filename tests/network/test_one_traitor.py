@@ -17,7 +17,7 @@ from robochoc.communication.network.search_state import SearchState
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.formats.result import read_result, result_json
-from robochoc.model.outcome import ALL_ROBOTS, Metrics, Outcome, PseudoTreeNode, Thoroughness, Verdict
+from robochoc.model.outcome import ALL_ROBOTS, CheckCounts, Metrics, Outcome, PseudoTreeNode, Verdict
 from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.afc import AFC
@@ -30,7 +30,7 @@ from robochoc.protocols.traits import Traits
 from robochoc.run.networked.lead import claimed
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support import traitors
-from tests.support.offices import Office
+from tests.support.in_memory_network import InMemoryNetwork
 from tests.support.problems import PREDICATES, known_to_both, team_of
 from tests.support.traitors import Lie, changed
 
@@ -41,12 +41,12 @@ VALUES = {"A": 1, "B": 2, "C": 1}
 
 
 @pytest.fixture
-def lied(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Office]:
+def lied(monkeypatch: pytest.MonkeyPatch) -> Callable[..., InMemoryNetwork]:
     """A team in which RB lies, after a search."""
 
-    def searched(lie: Lie, protocol: type[Protocol] = ABT, team: Team = CHAIN) -> Office:
+    def searched(lie: Lie, protocol: type[Protocol] = ABT, team: Team = CHAIN) -> InMemoryNetwork:
         traitors.install(lie, "RB", monkeypatch.setattr)
-        office = Office(team, protocol, traitor="RB")
+        office = InMemoryNetwork(team, protocol, traitor="RB")
         office.search()
         return office
 
@@ -83,7 +83,7 @@ def test_every_protocol_declares_what_its_robots_conclude() -> None:
     ],
 )
 def test_a_verdict_that_its_protocol_does_not_have(
-    lied: Callable[..., Office], protocol: type[Protocol], verdict: str
+    lied: Callable[..., InMemoryNetwork], protocol: type[Protocol], verdict: str
 ) -> None:
     tally = lied(traitors.concluding(verdict), protocol).tally
     said = "what is no verdict" if verdict == "maybe" else verdict
@@ -99,7 +99,7 @@ def test_a_protocol_of_ones_own_is_held_to_the_same() -> None:
     with pytest.raises(
         ValueError, match="it has concluded optimal, and a robot of this protocol concludes no-solution"
     ):
-        Office(CHAIN, Boastful).search()
+        InMemoryNetwork(CHAIN, Boastful).search()
 
 
 class Sly(ABT):
@@ -114,12 +114,12 @@ def test_processes_are_held_to_the_same() -> None:
         run.search()
 
 
-def test_a_verdict_before_the_search(lied: Callable[..., Office]) -> None:
+def test_a_verdict_before_the_search(lied: Callable[..., InMemoryNetwork]) -> None:
     office = lied(traitors.LIES["too early"])
     assert office.tally.lost == {"RB": "it has concluded something before the search began"}
 
 
-def test_no_solution_rests_on_its_word(lied: Callable[..., Office]) -> None:
+def test_no_solution_rests_on_its_word(lied: Callable[..., InMemoryNetwork]) -> None:
     """Nobody can tell it from a proof; that the witness is told is all that there is."""
     office = lied(traitors.LIES["no-solution"])
     result = office.tally.result(0)
@@ -168,7 +168,7 @@ SAID = Outcome("t", "abt", "network", 0, Verdict.NO_SOLUTION, witness="RB")
             "t: solution, checked against every constraint",
         ),
         (
-            {"verdict": Verdict.SOLUTION, "verified": True, "assignment": VALUES, "checked": Thoroughness(1, 1)},
+            {"verdict": Verdict.SOLUTION, "verified": True, "assignment": VALUES, "checked": CheckCounts(1, 1)},
             None,
             "t: solution, checked; on their owner's word alone: 1 of 2 constraints",
         ),
@@ -223,13 +223,13 @@ def test_on_this_machine_a_witness_is_no_more_than_that() -> None:
         (traitors.reporting(lambda one: changed(one, assigned=False)), "it has reported values, and that it has none"),
     ],
 )
-def test_values_that_it_cannot_have(lied: Callable[..., Office], lie: Lie, why: str) -> None:
+def test_values_that_it_cannot_have(lied: Callable[..., InMemoryNetwork], lie: Lie, why: str) -> None:
     office = lied(lie)
     assert office.tally.lost == {"RB": why}
     assert "RB" not in office.tally.result(0).assignments
 
 
-def test_a_private_variable_of_another(lied: Callable[..., Office]) -> None:
+def test_a_private_variable_of_another(lied: Callable[..., InMemoryNetwork]) -> None:
     """Only the two know of it: both are named."""
     office = lied(traitors.valued(Secret=1))
     assert not office.tally.lost, "a name of its own is no lie"
@@ -243,11 +243,11 @@ def test_a_private_variable_of_another(lied: Callable[..., Office]) -> None:
 # Its constraints
 
 
-def judged(office: Office) -> tuple[bool, float]:
+def judged(office: InMemoryNetwork) -> tuple[bool, float]:
     return office.judge({name: dict(values) for name, values in office.tally.result(0).assignments.items()})
 
 
-def test_it_judges_its_own_constraint_alone(lied: Callable[..., Office]) -> None:
+def test_it_judges_its_own_constraint_alone(lied: Callable[..., InMemoryNetwork]) -> None:
     """Nobody else knows the constraint: that is what is said of it."""
     office = lied(traitors.LIES["a wrong value"])
     assert judged(office)[0] is False, "RC's constraint with RB is broken as well, and RC says so"
@@ -257,7 +257,7 @@ def test_it_judges_its_own_constraint_alone(lied: Callable[..., Office]) -> None
     assert office.tally.thoroughness == (0, 1), "on its owner's word alone"
 
 
-def test_its_parent_knows_the_constraint_from_its_own_file(lied: Callable[..., Office]) -> None:
+def test_its_parent_knows_the_constraint_from_its_own_file(lied: Callable[..., InMemoryNetwork]) -> None:
     team = known_to_both(team_of(dict.fromkeys("AB", (1, 2)), _DIFFERENT[:1]))
     office = lied(traitors.LIES["a wrong value"], team=team)
     judged(office)
@@ -266,13 +266,13 @@ def test_its_parent_knows_the_constraint_from_its_own_file(lied: Callable[..., O
     assert doubt.why == ("RA says that the constraint over A B is broken, and RB, which holds it, says that it holds")
 
 
-def test_its_parent_was_told_the_constraint_before_the_search(lied: Callable[..., Office]) -> None:
+def test_its_parent_was_told_the_constraint_before_the_search(lied: Callable[..., InMemoryNetwork]) -> None:
     office = lied(traitors.LIES["a wrong value"], AWC)
     judged(office)
     assert {"RA", "RB"} in [set(doubt.between) for doubt in office.tally.doubts_about_verdict]
 
 
-def test_what_both_ends_check_is_said_to_be_checked(lied: Callable[..., Office]) -> None:
+def test_what_both_ends_check_is_said_to_be_checked(lied: Callable[..., InMemoryNetwork]) -> None:
     for protocol, team in ((ABT, known_to_both(CHAIN)), (AWC, CHAIN), (AWC, known_to_both(CHAIN))):
         office = lied(lambda _me, word: iter([word]), protocol, team)
         assert judged(office) == (True, 0)
@@ -280,7 +280,7 @@ def test_what_both_ends_check_is_said_to_be_checked(lied: Callable[..., Office])
         assert not office.tally.doubts_about_verdict
 
 
-def test_how_many_are_checked_by_both_is_what_both_say(lied: Callable[..., Office]) -> None:
+def test_how_many_are_checked_by_both_is_what_both_say(lied: Callable[..., InMemoryNetwork]) -> None:
     """RB says that its one constraint with RA is a thousand, or that it knows a thousand of RC's."""
     many = [
         lambda one: changed(one, held=1000, shared=tuple(each._replace(constraints=1000) for each in one.shared)),
@@ -292,7 +292,7 @@ def test_how_many_are_checked_by_both_is_what_both_say(lied: Callable[..., Offic
         assert office.tally.thoroughness.by_both == 2
 
 
-def test_a_copy_of_what_nobody_holds(lied: Callable[..., Office]) -> None:
+def test_a_copy_of_what_nobody_holds(lied: Callable[..., InMemoryNetwork]) -> None:
     made_up = Judged("RC", ("A", "C"), 1, 0)
     office = lied(traitors.judging(lambda one: changed(one, copies=(made_up,))))
     judged(office)
@@ -318,7 +318,7 @@ def test_a_copy_of_what_nobody_holds(lied: Callable[..., Office]) -> None:
         {"copies": (Judged("RA", ("A", "B"), 0, 0),)},
     ],
 )
-def test_it_has_checked_what_cannot_be(lied: Callable[..., Office], change: dict[str, Any]) -> None:
+def test_it_has_checked_what_cannot_be(lied: Callable[..., InMemoryNetwork], change: dict[str, Any]) -> None:
     office = lied(traitors.judging(lambda one: changed(one, **change)))
     judged(office)
     assert set(office.tally.lost) == {"RB"}
@@ -361,13 +361,13 @@ def test_it_has_checked_what_cannot_be(lied: Callable[..., Office], change: dict
         (traitors.finding(Findings(trail=Trail([(0, -1)], 0))), "it tells of cycles that cannot be"),
     ],
 )
-def test_counts_that_cannot_be(lied: Callable[..., Office], lie: Lie, why: str) -> None:
+def test_counts_that_cannot_be(lied: Callable[..., InMemoryNetwork], lie: Lie, why: str) -> None:
     office = lied(lie)
     assert set(office.tally.lost) == {"RB"}
     assert why in office.tally.lost["RB"]
 
 
-def test_more_taken_in_than_was_sent(lied: Callable[..., Office]) -> None:
+def test_more_taken_in_than_was_sent(lied: Callable[..., InMemoryNetwork]) -> None:
     """The sums tell that somebody lies; the report, held against its own earlier words, who."""
     office = lied(traitors.counting(lambda sent: sent, lambda received: received + 3))
     assert set(office.tally.lost) == {"RB"}
@@ -396,7 +396,7 @@ def exchanging(change: Callable[[Exchanged], Exchanged], who: str = "RA") -> Lie
     ],
 )
 def test_messages_that_nobody_has_sent(
-    lied: Callable[..., Office], change: Callable[[Exchanged], Exchanged], why: str
+    lied: Callable[..., InMemoryNetwork], change: Callable[[Exchanged], Exchanged], why: str
 ) -> None:
     office = lied(exchanging(change))
     doubts = office.tally.doubts_about_counts

@@ -8,7 +8,7 @@ import pytest
 
 from robochoc.model.problem import Constraint, Team
 from tests.support import traitors
-from tests.support.machines import Program, Site, ended, written
+from tests.support.deployments import Deployment, Program, ended, written
 from tests.support.problems import PREDICATES, team_of
 
 SLOW = pytest.mark.slow
@@ -17,7 +17,9 @@ CHAIN = team_of(dict.fromkeys("ABC", (1, 2)), PAIRS)
 PAIR = team_of(dict.fromkeys("AB", (1, 2)), PAIRS[:1])
 
 
-def betrayed(site: Site, lie: str, *words: object, team: Team = CHAIN, copied: bool = False) -> tuple[Program, int]:
+def betrayed(
+    site: Deployment, lie: str, *words: object, team: Team = CHAIN, copied: bool = False
+) -> tuple[Program, int]:
     """The master, at its end, of a run in which RB lies, and its exit status."""
     files = written(team, site)
     if copied:
@@ -38,7 +40,7 @@ def betrayed(site: Site, lie: str, *words: object, team: Team = CHAIN, copied: b
     return master, status
 
 
-def test_it_claims_that_there_is_no_solution(site: Site) -> None:
+def test_it_claims_that_there_is_no_solution(site: Deployment) -> None:
     master, status = betrayed(site, "no-solution", "--json")
     assert status == 0, master.errors
     told = master.object
@@ -46,7 +48,7 @@ def test_it_claims_that_there_is_no_solution(site: Site) -> None:
 
 
 @SLOW
-def test_that_is_what_people_read(site: Site) -> None:
+def test_that_is_what_people_read(site: Deployment) -> None:
     master, status = betrayed(site, "no-solution")
     assert status == 0, master.errors
     assert master.output.startswith("files: no solution (RB claims it; nobody could check)\n")
@@ -64,7 +66,7 @@ def test_that_is_what_people_read(site: Site) -> None:
         ("costs", "RB was lost: it has reported 9,007,199,254,740,992 constraint checks in "),
     ],
 )
-def test_what_cannot_be_ends_the_run_and_names_it(site: Site, lie: str, why: str) -> None:
+def test_what_cannot_be_ends_the_run_and_names_it(site: Deployment, lie: str, why: str) -> None:
     master, status = betrayed(site, lie)
     assert status == 4, master.output
     assert why in master.errors
@@ -72,7 +74,7 @@ def test_what_cannot_be_ends_the_run_and_names_it(site: Site, lie: str, why: str
 
 
 @SLOW
-def test_others_go_on_without_it(site: Site) -> None:
+def test_others_go_on_without_it(site: Deployment) -> None:
     master, status = betrayed(site, "optimal", "--on-loss", "withdraw", "--json")
     assert status == 0, master.errors
     told = master.object
@@ -80,21 +82,21 @@ def test_others_go_on_without_it(site: Site) -> None:
 
 
 @SLOW
-def test_it_judges_its_own_constraint(site: Site) -> None:
+def test_it_judges_its_own_constraint(site: Deployment) -> None:
     master, status = betrayed(site, "a wrong value", team=PAIR)
     assert status == 0, master.errors
     assert master.output.startswith("files: solution, checked; on their owner's word alone: 1 of 1 constraint\n")
 
 
 @SLOW
-def test_its_parent_has_a_copy_of_the_constraint(site: Site) -> None:
+def test_its_parent_has_a_copy_of_the_constraint(site: Deployment) -> None:
     master, status = betrayed(site, "a wrong value", team=PAIR, copied=True)
     assert status == 4, master.output
     assert "RA says that the constraint over A B is broken, and RB, which holds it, says that it holds" in master.errors
 
 
 @SLOW
-def test_others_find_that_its_value_breaks_theirs(site: Site) -> None:
+def test_others_find_that_its_value_breaks_theirs(site: Deployment) -> None:
     master, status = betrayed(site, "a wrong value")
     assert status == 4, master.output
     assert "but RC finds its constraint over B C broken" in master.errors
@@ -108,7 +110,7 @@ def test_others_find_that_its_value_breaks_theirs(site: Site) -> None:
         ("silent", r"RB.* not answered the master"),
     ],
 )
-def test_it_keeps_the_run_awake_until_the_time_is_over(site: Site, lie: str, why: str) -> None:
+def test_it_keeps_the_run_awake_until_the_time_is_over(site: Deployment, lie: str, why: str) -> None:
     master, status = betrayed(site, lie, "--timeout", 10)
     assert status == 3, master.errors
     assert "unknown: the time was over (--timeout 10); " in master.output

@@ -23,7 +23,7 @@ from robochoc.communication.network.shared import (
 )
 from robochoc.formats import PREDEFINED
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.problem import INFINITE, Constraint, Model, Semantics, Team
+from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Semantics, Team
 from robochoc.solver.explanation import Known, held, held_below
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
@@ -42,7 +42,7 @@ TABLE = RelationRecord("t", 2, Semantics.SOFT, ((1, 2), (2, 1)), (3, INFINITE), 
 
 
 def shared(definition: PredicateRecord | RelationRecord = NE, **news: object) -> SharedRecord:
-    record = SharedRecord("R2<R1:C", "C", definition, ("A", "B"), ("A", "B"), Model.TKC, INFINITE)
+    record = SharedRecord("R2<R1:C", "C", definition, ("A", "B"), ("A", "B"), ConstraintModel.TKC, INFINITE)
     return msgspec.structs.replace(record, **news)
 
 

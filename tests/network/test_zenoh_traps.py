@@ -167,12 +167,8 @@ def test_what_was_sent_in_an_outage_arrives_without_a_heartbeat(
 
 
 def test_a_program_forks_after_a_network_run_runs_another_and_ends() -> None:
-    with subprocess.Popen(
-        [sys.executable, str(ROOT / "support" / "zenoh_program.py")],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as program:
+    command = [sys.executable, "-m", "tests.support.zenoh_program"]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as program:
         assert program.stdout
         said = [program.stdout.readline().strip() for _ in range(4)]
         with waiting(5):  # it takes some hundredths of a second; a machine may be busy

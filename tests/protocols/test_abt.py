@@ -11,21 +11,9 @@ from robochoc.protocols.abt import ABT, AddLink, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import told, value
+from tests.support.agents import replies, value
 from tests.support.problems import team_of
-
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
-
-
-def differ(left: str, right: str) -> Constraint:
-    return Constraint("C", DIFFERENT, (left, right), (left, right))
-
-
-def triangle(values: int = 2) -> Team:
-    """Three robots, each different from each; a fourth that only the third knows."""
-    domains = {name: range(1, values + 1) for name in ("A", "B", "C", "D")}
-    pairs = (("A", "B"), ("A", "C"), ("B", "C"), ("C", "D"))
-    return team_of(domains, [differ(*pair) for pair in pairs])
+from tests.support.small_teams import differ, triangle
 
 
 def agent(team: Team, name: str) -> ABT:
@@ -47,83 +35,83 @@ def test_start_takes_the_first_value_and_tells_it_to_lower_neighbours_only() -> 
 
 def test_process_info_changes_a_value_that_the_view_forbids() -> None:
     abt = agent(triangle(), "RB")
-    assert told(abt, ("RA", Ok((1,)))) == [("RC", Ok((2,)))]
+    assert replies(abt, ("RA", Ok((1,)))) == [("RC", Ok((2,)))]
 
 
 def test_process_info_keeps_a_value_that_the_view_allows() -> None:
     abt = agent(triangle(), "RB")
-    assert told(abt, ("RA", Ok((2,)))) == []
+    assert replies(abt, ("RA", Ok((2,)))) == []
     assert value(abt) == (1,)
 
 
 def test_the_view_is_checked_once_a_packet_has_been_read() -> None:
     abt = agent(triangle(3), "RC")
-    assert told(abt, ("RA", Ok((1,))), ("RB", Ok((2,)))) == [("RD", Ok((3,)))]
+    assert replies(abt, ("RA", Ok((1,))), ("RB", Ok((2,)))) == [("RD", Ok((3,)))]
 
 
 def test_backtrack_sends_the_nogood_to_the_lowest_robot_in_it_and_forgets_its_value() -> None:
     abt = agent(triangle(), "RC")
-    said = told(abt, ("RA", Ok((1,))), ("RB", Ok((2,))))
+    said = replies(abt, ("RA", Ok((1,))), ("RB", Ok((2,))))
     assert said == [("RB", Nogood({"RA": (1,)}, (2,))), ("RD", Ok((2,)))]
     assert "RB" not in abt.view
 
 
 def test_an_empty_nogood_ends_the_search_without_solution() -> None:
     abt = agent(triangle(1), "RA")
-    assert told(abt, ("RB", Nogood({}, (1,)))) == []
+    assert replies(abt, ("RB", Nogood({}, (1,)))) == []
     assert abt.verdict is Verdict.NO_SOLUTION
 
 
 def test_nothing_is_said_after_the_verdict() -> None:
     abt = agent(triangle(1), "RA")
-    told(abt, ("RB", Nogood({}, (1,))))
-    assert told(abt, ("RB", AddLink()), ("RB", Nogood({}, (1,)))) == []
+    replies(abt, ("RB", Nogood({}, (1,))))
+    assert replies(abt, ("RB", AddLink()), ("RB", Nogood({}, (1,)))) == []
 
 
 def test_resolve_conflict_accepts_a_coherent_nogood_and_takes_another_value() -> None:
     abt = agent(triangle(), "RA")
-    assert told(abt, ("RB", Nogood({}, (1,)))) == [("RB", Ok((2,))), ("RC", Ok((2,)))]
+    assert replies(abt, ("RB", Nogood({}, (1,)))) == [("RB", Ok((2,))), ("RC", Ok((2,)))]
 
 
 def test_resolve_conflict_answers_an_obsolete_nogood_about_the_present_value() -> None:
     abt = agent(triangle(), "RB")
-    told(abt, ("RA", Ok((2,))))
-    assert told(abt, ("RC", Nogood({"RA": (1,)}, (1,)))) == [("RC", Ok((1,)))]
+    replies(abt, ("RA", Ok((2,))))
+    assert replies(abt, ("RC", Nogood({"RA": (1,)}, (1,)))) == [("RC", Ok((1,)))]
     assert value(abt) == (1,)
 
 
 def test_resolve_conflict_ignores_a_nogood_about_another_value() -> None:
     abt = agent(triangle(), "RB")
-    told(abt, ("RA", Ok((1,))))
-    assert told(abt, ("RC", Nogood({"RA": (1,)}, (1,)))) == []
+    replies(abt, ("RA", Ok((1,))))
+    assert replies(abt, ("RC", Nogood({"RA": (1,)}, (1,)))) == []
 
 
 def test_check_add_link_asks_unknown_robots_of_the_left_side_and_believes_it() -> None:
     strangers = team_of(dict.fromkeys("ABC", (1, 2)), [differ("A", "C"), differ("B", "C")])
     abt = agent(strangers, "RB")
-    said = told(abt, ("RC", Nogood({"RA": (1,)}, (1,))))
+    said = replies(abt, ("RC", Nogood({"RA": (1,)}, (1,))))
     assert said == [("RA", AddLink()), ("RC", Ok((2,)))]
     assert abt.view == {"RA": (1,)}
 
 
 def test_set_link_tells_the_value_to_the_new_child_now_and_later() -> None:
     abt = agent(triangle(), "RA")
-    assert told(abt, ("RD", AddLink())) == [("RD", Ok((1,)))]
-    said = told(abt, ("RB", Nogood({}, (1,))))
+    assert replies(abt, ("RD", AddLink())) == [("RD", Ok((1,)))]
+    said = replies(abt, ("RB", Nogood({}, (1,))))
     assert ("RD", Ok((2,))) in said
 
 
 def test_set_link_twice_is_one_link() -> None:
     abt = agent(triangle(), "RA")
-    told(abt, ("RD", AddLink()), ("RD", AddLink()))
-    said = told(abt, ("RB", Nogood({}, (1,))))
+    replies(abt, ("RD", AddLink()), ("RD", AddLink()))
+    said = replies(abt, ("RB", Nogood({}, (1,))))
     assert [receiver for receiver, _ in said].count("RD") == 1
 
 
 def test_nogoods_go_when_their_left_side_no_longer_stands() -> None:
     abt = agent(triangle(), "RB")
-    told(abt, ("RA", Ok((2,))), ("RC", Nogood({"RA": (2,)}, (1,))))
-    told(abt, ("RA", Ok((1,))))
+    replies(abt, ("RA", Ok((2,))), ("RC", Nogood({"RA": (2,)}, (1,))))
+    replies(abt, ("RA", Ok((1,))))
     assert all(lhs == {"RA": (1,)} for lhs in abt.store)
 
 
@@ -131,16 +119,16 @@ def test_an_n_ary_constraint_is_checked_when_all_its_robots_are_known() -> None:
     odd = Relation("R", 3, Semantics.SUPPORTS, ((1, 1, 2), (1, 2, 1)))
     team = team_of(dict.fromkeys("ABC", range(1, 3)), [Constraint("C", odd, ("A", "B", "C"), ("A", "B", "C"))])
     abt = agent(team, "RC")
-    assert told(abt, ("RA", Ok((1,)))) == []
+    assert replies(abt, ("RA", Ok((1,)))) == []
     assert abt.problem.checks == 0
-    told(abt, ("RB", Ok((1,))))
+    replies(abt, ("RB", Ok((1,))))
     assert value(abt) == (2,)
     assert list(abt.store) == [{"RA": (1,), "RB": (1,)}]
 
 
 def test_of_two_conflicts_the_one_with_the_highest_lowest_robot_is_kept() -> None:
     abt = agent(triangle(3), "RC")
-    told(abt, ("RB", Ok((1,))), ("RA", Ok((1,))))
+    replies(abt, ("RB", Ok((1,))), ("RA", Ok((1,))))
     assert list(abt.store) == [{"RA": (1,)}]
 
 

@@ -17,14 +17,9 @@ from robochoc.protocols.abt_do import ABTDORetro, AddLink, Counters, CurrentOrde
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import told, value
+from tests.support.agents import replies, value
 from tests.support.problems import random_team, team_of
-
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
-
-
-def differ(left: str, right: str) -> Constraint:
-    return Constraint("C", DIFFERENT, (left, right), (left, right))
+from tests.support.small_teams import differ
 
 
 def clique(values: int = 3) -> Team:
@@ -35,7 +30,7 @@ def clique(values: int = 3) -> Team:
 
 def agent(team: Team, name: str) -> ABTDORetro:
     """The protocol object of one robot, started, with nothing left to say."""
-    abt = ABTDORetro(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
+    abt = ABTDORetro(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
     abt.start()
     abt.outbox.clear()
     return abt
@@ -58,24 +53,24 @@ def orders(said: Sequence[tuple[str, Message]]) -> list[tuple[str, Message]]:
 
 def test_start_takes_the_first_value_and_tells_it_to_lower_neighbours_only() -> None:
     team = clique()
-    abt = ABTDORetro(LocalProblem(agent_problems(team, everywhere=True)["RC"]), PriorityOrder(team.order))
+    abt = ABTDORetro(LocalProblem(agent_problems(team, shared_scopes=True)["RC"]), PriorityOrder(team.order))
     abt.start()
     assert abt.outbox == [("RD", Ok((1,), 3))]
 
 
 def test_ok_tells_how_many_values_are_left() -> None:
-    assert told(agent(clique(), "RB"), ("RA", Ok((1,), 3))) == [("RC", Ok((2,), 2)), ("RD", Ok((2,), 2))]
+    assert replies(agent(clique(), "RB"), ("RA", Ok((1,), 3))) == [("RC", Ok((2,), 2)), ("RD", Ok((2,), 2))]
 
 
 def test_a_value_that_the_view_allows_is_kept() -> None:
     abt = agent(clique(), "RB")
-    assert told(abt, ("RA", Ok((2,), 3))) == []
+    assert replies(abt, ("RA", Ok((2,), 3))) == []
     assert value(abt) == (1,)
 
 
 def test_backtrack_tells_the_lowest_robot_and_how_many_values_are_left_without_it() -> None:
     abt = agent(clique(), "RD")
-    said = told(abt, ("RA", Ok((1,), 3)), ("RB", Ok((2,), 2)), ("RC", Ok((3,), 1)))
+    said = replies(abt, ("RA", Ok((1,), 3)), ("RB", Ok((2,), 2)), ("RC", Ok((3,), 1)))
     assert said == [("RC", Nogood({"RA": (1,), "RB": (2,)}, (3,), 1))]
     assert "RC" not in abt.view
     assert value(abt) == (3,)
@@ -83,48 +78,48 @@ def test_backtrack_tells_the_lowest_robot_and_how_many_values_are_left_without_i
 
 def test_an_empty_nogood_ends_the_search_without_solution() -> None:
     abt = agent(clique(1), "RA")
-    assert orders(told(abt, ("RB", Nogood({}, (1,), 1)))) == []
+    assert orders(replies(abt, ("RB", Nogood({}, (1,), 1)))) == []
     assert abt.verdict is Verdict.NO_SOLUTION
-    assert told(abt, ("RB", AddLink()), ("RB", Nogood({}, (1,), 1))) == []
+    assert replies(abt, ("RB", AddLink()), ("RB", Nogood({}, (1,), 1))) == []
 
 
 def test_an_obsolete_nogood_about_the_present_value_is_answered() -> None:
     abt = agent(clique(), "RB")
-    told(abt, ("RA", Ok((2,), 3)))
-    assert told(abt, ("RD", Nogood({"RA": (3,)}, (1,), 1))) == [("RD", Ok((1,), 3))]
+    replies(abt, ("RA", Ok((2,), 3)))
+    assert replies(abt, ("RD", Nogood({"RA": (3,)}, (1,), 1))) == [("RD", Ok((1,), 3))]
 
 
 def test_a_nogood_about_another_value_is_ignored() -> None:
     abt = agent(clique(), "RB")
-    told(abt, ("RA", Ok((1,), 3)))
-    assert told(abt, ("RD", Nogood({"RA": (1,)}, (1,), 1))) == []
+    replies(abt, ("RA", Ok((1,), 3)))
+    assert replies(abt, ("RD", Nogood({"RA": (1,)}, (1,), 1))) == []
 
 
 def test_the_senders_of_nogoods_are_told_once_what_they_have_forgotten() -> None:
     abt = agent(clique(), "RB")
-    told(abt, ("RA", Ok((2,), 3)))
+    replies(abt, ("RA", Ok((2,), 3)))
     obsolete = Nogood({"RA": (3,)}, (1,), 1)
-    assert told(abt, ("RD", obsolete), ("RD", obsolete)) == [("RD", Ok((1,), 3))]
+    assert replies(abt, ("RD", obsolete), ("RD", obsolete)) == [("RD", Ok((1,), 3))]
 
 
 def test_unknown_robots_of_the_left_side_are_asked_and_meanwhile_believed() -> None:
     strangers = team_of(dict.fromkeys("ABC", (1, 2)), [differ("A", "C"), differ("B", "C")])
     abt = agent(strangers, "RB")
-    said = told(abt, ("RC", Nogood({"RA": (1,)}, (1,), 1)))
+    said = replies(abt, ("RC", Nogood({"RA": (1,)}, (1,), 1)))
     assert said == [("RA", AddLink()), ("RC", Ok((2,), 1))]
     assert abt.view == {"RA": (1,)}
 
 
 def test_who_asks_for_a_link_is_told_the_value_now_and_whenever_it_is_lower() -> None:
     abt = agent(clique(), "RA")
-    assert told(abt, ("RE", AddLink())) == [("RE", Ok((1,), 3))]
-    assert ("RE", Ok((2,), 2)) in told(abt, ("RB", Nogood({}, (1,), 0)))
-    assert told(abt, ("RB", order("EBCDA", (1, "RB")))) == []
-    assert ("RE", Ok((2,), 2)) in told(abt, ("RB", order("ABCDE", (2, "RB"))))
+    assert replies(abt, ("RE", AddLink())) == [("RE", Ok((1,), 3))]
+    assert ("RE", Ok((2,), 2)) in replies(abt, ("RB", Nogood({}, (1,), 0)))
+    assert replies(abt, ("RB", order("EBCDA", (1, "RB")))) == []
+    assert ("RE", Ok((2,), 2)) in replies(abt, ("RB", order("ABCDE", (2, "RB"))))
 
 
 def test_asking_for_a_link_twice_is_one_link() -> None:
-    assert told(agent(clique(), "RA"), ("RE", AddLink()), ("RE", AddLink())) == [("RE", Ok((1,), 3))]
+    assert replies(agent(clique(), "RA"), ("RE", AddLink()), ("RE", AddLink())) == [("RE", Ok((1,), 3))]
 
 
 # Dynamic ordering
@@ -142,52 +137,52 @@ def test_asking_for_a_link_twice_is_one_link() -> None:
 )
 def test_of_two_orders_the_one_with_the_larger_counters_holds(older: Counters, newer: Counters) -> None:
     abt = agent(clique(), "RB")
-    told(abt, ("RA", order("BACDE", *older)), ("RC", order("CBADE", *newer)), ("RA", order("BACDE", *older)))
+    replies(abt, ("RA", order("BACDE", *older)), ("RC", order("CBADE", *newer)), ("RA", order("BACDE", *older)))
     assert abt.order.names == names("CBADE")
     assert abt.order.counters == newer
 
 
 def test_an_accepted_nogood_moves_its_sender_right_below_the_receiver() -> None:
     abt = agent(clique(), "RA")
-    said = told(abt, ("RC", Nogood({}, (1,), 3)))
+    said = replies(abt, ("RC", Nogood({}, (1,), 3)))
     moved = order("ACBDE", (0, ""), (1, "RA"))
     assert orders(said) == [("RC", moved), ("RB", moved), ("RD", moved), ("RE", moved)]
     assert value(abt) == (2,)
 
 
 def test_a_sender_that_is_there_already_is_not_moved() -> None:
-    assert orders(told(agent(clique(), "RA"), ("RB", Nogood({}, (1,), 3)))) == []
+    assert orders(replies(agent(clique(), "RA"), ("RB", Nogood({}, (1,), 3)))) == []
 
 
 def test_a_sender_that_is_higher_already_is_not_moved() -> None:
-    assert orders(told(agent(clique(), "RB"), ("RA", Nogood({}, (1,), 0)))) == []
+    assert orders(replies(agent(clique(), "RB"), ("RA", Nogood({}, (1,), 0)))) == []
 
 
 def test_a_sender_with_fewer_values_left_is_moved_above_the_receiver() -> None:
     abt = agent(clique(), "RA")
-    assert orders(told(abt, ("RC", Nogood({}, (1,), 1))))[0] == ("RC", order("CABDE", (1, "RA")))
+    assert orders(replies(abt, ("RC", Nogood({}, (1,), 1))))[0] == ("RC", order("CABDE", (1, "RA")))
     assert abt.order.names == names("CABDE")
 
 
 @pytest.mark.parametrize(("left_a", "left_b", "expected"), [(3, 3, "DABCE"), (1, 3, "ADBCE"), (3, 1, "ABDCE")])
 def test_a_sender_passes_only_those_with_more_values_left(left_a: int, left_b: int, expected: str) -> None:
     abt = agent(clique(), "RC")
-    told(abt, ("RA", Ok((2,), left_a)), ("RB", Ok((3,), left_b)))
-    told(abt, ("RD", Nogood({}, (1,), 1)))
+    replies(abt, ("RA", Ok((2,), left_a)), ("RB", Ok((3,), left_b)))
+    replies(abt, ("RD", Nogood({}, (1,), 1)))
     assert abt.order.names == names(expected)
 
 
 def test_a_sender_does_not_pass_a_robot_of_which_nothing_is_known() -> None:
     abt = agent(clique(), "RC")
-    told(abt, ("RA", Ok((2,), 3)))
-    told(abt, ("RD", Nogood({}, (1,), 1)))
+    replies(abt, ("RA", Ok((2,), 3)))
+    replies(abt, ("RD", Nogood({}, (1,), 1)))
     assert abt.order.names == names("ABDCE")
 
 
 def test_a_sender_does_not_pass_the_second_last_robot_of_the_nogood() -> None:
     abt = agent(clique(), "RC")
-    told(abt, ("RA", Ok((2,), 3)), ("RB", Ok((3,), 3)))
-    said = told(abt, ("RD", Nogood({"RA": (2,)}, (1,), 0)))
+    replies(abt, ("RA", Ok((2,), 3)), ("RB", Ok((3,), 3)))
+    said = replies(abt, ("RD", Nogood({"RA": (2,)}, (1,), 0)))
     moved = order("ADBCE", (0, ""), (1, "RC"))
     assert orders(said) == [("RD", moved), ("RB", moved), ("RE", moved)], "not RA: for it nothing has changed"
 
@@ -201,65 +196,65 @@ def test_a_new_order_raises_the_counter_of_its_place_and_drops_those_below() -> 
 
 def test_who_adopts_an_order_tells_its_value_to_those_newly_lower() -> None:
     abt = agent(clique(), "RC")
-    assert told(abt, ("RA", order("CABDE", (1, "RA")))) == [("RA", Ok((1,), 3)), ("RB", Ok((1,), 3))]
+    assert replies(abt, ("RA", order("CABDE", (1, "RA")))) == [("RA", Ok((1,), 3)), ("RB", Ok((1,), 3))]
 
 
 def test_who_adopts_an_order_drops_nogoods_that_rest_on_lower_robots() -> None:
     abt = agent(clique(), "RC")
-    told(abt, ("RA", Ok((1,), 3)), ("RB", Ok((2,), 3)))
+    replies(abt, ("RA", Ok((1,), 3)), ("RB", Ok((2,), 3)))
     assert value(abt) == (3,)
     assert list(abt.store) == [{"RA": (1,)}, {"RB": (2,)}]
-    assert told(abt, ("RA", order("ACBDE", (0, ""), (1, "RA")))) == [("RB", Ok((3,), 2))]
+    assert replies(abt, ("RA", order("ACBDE", (0, ""), (1, "RA")))) == [("RB", Ok((3,), 2))]
     assert list(abt.store) == [{"RA": (1,)}]
 
 
 def test_only_robots_that_are_higher_at_present_are_looked_at() -> None:
     abt = agent(clique(), "RC")
-    told(abt, ("RA", order("BCADE", (1, "RA"))))
-    assert told(abt, ("RA", Ok((1,), 3))) == []
+    replies(abt, ("RA", order("BCADE", (1, "RA"))))
+    assert replies(abt, ("RA", Ok((1,), 3))) == []
     assert value(abt) == (1,)
-    assert ("RA", Ok((2,), 2)) in told(abt, ("RB", Ok((1,), 3)))
+    assert ("RA", Ok((2,), 2)) in replies(abt, ("RB", Ok((1,), 3)))
 
 
 def test_a_value_heard_under_another_order_counts_as_soon_as_its_robot_is_higher() -> None:
     abt = agent(clique(), "RB")
-    told(abt, ("RC", Ok((1,), 3)))
+    replies(abt, ("RC", Ok((1,), 3)))
     assert value(abt) == (1,)
-    told(abt, ("RA", order("CABDE", (1, "RA"))))
+    replies(abt, ("RA", order("CABDE", (1, "RA"))))
     assert value(abt) == (2,)
 
 
 def test_backtrack_picks_the_lowest_robot_of_the_present_order() -> None:
     abt = agent(clique(), "RD")
-    told(abt, ("RC", order("CBADE", (1, "RA"))))
-    said = told(abt, ("RA", Ok((1,), 3)), ("RB", Ok((2,), 2)), ("RC", Ok((3,), 1)))
+    replies(abt, ("RC", order("CBADE", (1, "RA"))))
+    said = replies(abt, ("RA", Ok((1,), 3)), ("RB", Ok((2,), 2)), ("RC", Ok((3,), 1)))
     assert said == [("RA", Nogood({"RB": (2,), "RC": (3,)}, (1,), 1))]
 
 
 def test_a_nogood_that_rests_on_a_robot_that_is_lower_at_present_is_answered() -> None:
     abt = agent(clique(), "RB")
-    told(abt, ("RA", Ok((2,), 3)))
-    told(abt, ("RC", order("BACDE", (1, "RC"))))
-    assert told(abt, ("RD", Nogood({"RA": (2,)}, (1,), 1))) == [("RD", Ok((1,), 3))]
+    replies(abt, ("RA", Ok((2,), 3)))
+    replies(abt, ("RC", order("BACDE", (1, "RC"))))
+    assert replies(abt, ("RD", Nogood({"RA": (2,)}, (1,), 1))) == [("RD", Ok((1,), 3))]
 
 
 def test_an_n_ary_constraint_is_checked_by_the_lowest_robot_at_present() -> None:
     odd = Relation("R", 3, Semantics.SUPPORTS, ((1, 1, 2), (1, 2, 1), (2, 1, 1)))
     team = team_of(dict.fromkeys("ABC", range(1, 3)), [Constraint("C", odd, ("A", "B", "C"), ("A", "B", "C"))])
     abt = agent(team, "RA")
-    told(abt, ("RB", Ok((1,), 2)), ("RC", Ok((1,), 2)), ("RB", order("BAC", (1, "RB"))))
+    replies(abt, ("RB", Ok((1,), 2)), ("RC", Ok((1,), 2)), ("RB", order("BAC", (1, "RB"))))
     assert abt.problem.checks == 0
-    told(abt, ("RB", order("CBA", (2, "RB"))))
+    replies(abt, ("RB", order("CBA", (2, "RB"))))
     assert value(abt) == (2,)
     assert list(abt.store) == [{"RB": (1,), "RC": (1,)}]
 
 
 def test_what_is_known_to_hold_is_not_checked_again() -> None:
     abt = agent(clique(), "RB")
-    told(abt, ("RA", Ok((2,), 3)))
+    replies(abt, ("RA", Ok((2,), 3)))
     checks = abt.problem.checks
     assert checks
-    told(abt, ("RA", Ok((2,), 3)), ("RC", Ok((1,), 3)))
+    replies(abt, ("RA", Ok((2,), 3)), ("RC", Ok((1,), 3)))
     assert abt.problem.checks == checks
 
 
@@ -274,7 +269,7 @@ def test_every_order_is_unique_and_robots_before_a_place_change_only_with_its_co
     for message in made(team, seed):
         assert seen.setdefault(message.counters, message.names) == message.names
         assert sorted(message.names) == sorted(team.order)
-    padded = {counters + ((0, ""),) * (len(team.order) - len(counters)): told for counters, told in seen.items()}
+    padded = {counters + ((0, ""),) * (len(team.order) - len(counters)): replies for counters, replies in seen.items()}
     for place in range(len(team.order)):
         before: dict[Counters, tuple[str, ...]] = {}
         for counters, told_names in padded.items():

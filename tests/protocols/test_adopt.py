@@ -9,8 +9,8 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.adopt import ADOPT, Cost, Threshold, Value
 from robochoc.protocols.bounding import Terminate
-from tests.support.agents import told, value
-from tests.support.trees import context, placed, priced, root, to
+from tests.support.agents import replies, value
+from tests.support.pseudo_trees import context, placed, priced, root, to
 
 TEAM = priced("ZABCD", {"ZA": [0] * 4, "ZB": [0, 1, 2, 0], "AB": [0, 3, 1, 0], "BC": [0] * 4, "BD": [0] * 4})
 """B stands below A and, further up, Z; C and D are its children."""
@@ -26,7 +26,7 @@ def middle() -> ADOPT:
 def informed(z: int = 1, a: int = 1) -> ADOPT:
     """B, when it knows the values above."""
     adopt = middle()
-    told(adopt, ("RZ", Value((z,), 1)), ("RA", Value((a,), 1)))
+    replies(adopt, ("RZ", Value((z,), 1)), ("RA", Value((a,), 1)))
     return adopt
 
 
@@ -43,7 +43,7 @@ def test_initialize_takes_the_value_with_the_least_lower_bound_and_tells_all_aro
 
 def test_a_value_is_added_to_the_context_and_what_it_costs_to_the_bounds() -> None:
     adopt = middle()
-    said = told(adopt, ("RA", Value((2,), 1)))
+    said = replies(adopt, ("RA", Value((2,), 1)))
     assert adopt.context == context(A=2)
     assert list(adopt.lower) == [1, 0]
     assert to("RA", said) == [Cost(context(A=2), 0, INFINITE)]
@@ -51,29 +51,29 @@ def test_a_value_is_added_to_the_context_and_what_it_costs_to_the_bounds() -> No
 
 def test_a_cost_bounds_the_child_s_subtree_for_the_value_in_its_context() -> None:
     adopt = informed()
-    told(adopt, ("RC", Cost(context(B=2, A=1), 4, 7)))
+    replies(adopt, ("RC", Cost(context(B=2, A=1), 4, 7)))
     assert (adopt.bounds["RC"].lb, adopt.bounds["RC"].ub) == ([0, 4], [INFINITE, 7])
     assert list(adopt.lower) == [0, 8]
 
 
 def test_a_cost_in_an_obsolete_context_is_no_bound() -> None:
     adopt = informed()
-    told(adopt, ("RA", Value((2,), 2)), ("RC", Cost(context(B=1, A=1), 4, 7)))
+    replies(adopt, ("RA", Value((2,), 2)), ("RC", Cost(context(B=1, A=1), 4, 7)))
     assert (adopt.bounds["RC"].lb, adopt.bounds["RC"].ub) == ([0, 0], [INFINITE, INFINITE])
     assert adopt.context == context(A=(2, 2), Z=1)
 
 
 def test_a_cost_tells_values_of_robots_further_up_and_newer_ones_of_neighbours() -> None:
     adopt = informed()
-    told(adopt, ("RC", Cost(context(B=1, X=1, A=(2, 2)), 4, 7)))
+    replies(adopt, ("RC", Cost(context(B=1, X=1, A=(2, 2)), 4, 7)))
     assert adopt.context == context(A=(2, 2), Z=1, X=1)
     assert list(adopt.lower) == [5, 1]
 
 
 def test_an_older_value_does_not_come_back() -> None:
     adopt = informed()
-    told(adopt, ("RC", Cost(context(B=1, X=(1, 2)), 4, 7)))
-    told(adopt, ("RD", Cost(context(B=1, X=(2, 1)), 5, 7)))
+    replies(adopt, ("RC", Cost(context(B=1, X=(1, 2)), 4, 7)))
+    replies(adopt, ("RD", Cost(context(B=1, X=(2, 1)), 5, 7)))
     assert adopt.context["RX"] == ((1,), 2)
     assert adopt.bounds["RC"].lb == [4, 0]
     assert adopt.bounds["RD"].lb == [0, 0]
@@ -81,26 +81,26 @@ def test_an_older_value_does_not_come_back() -> None:
 
 def test_a_changed_value_voids_the_bounds_that_rest_on_it_and_no_others() -> None:
     adopt = informed()
-    told(adopt, ("RC", Cost(context(B=1, A=1), 4, 7)), ("RD", Cost(context(B=1, Z=1), 3, 3)))
-    told(adopt, ("RA", Value((2,), 2)))
+    replies(adopt, ("RC", Cost(context(B=1, A=1), 4, 7)), ("RD", Cost(context(B=1, Z=1), 3, 3)))
+    replies(adopt, ("RA", Value((2,), 2)))
     assert (adopt.bounds["RC"].lb, adopt.bounds["RC"].ub, adopt.t["RC"]) == ([0, 0], [INFINITE, INFINITE], [0, 0])
     assert (adopt.bounds["RD"].lb, adopt.bounds["RD"].ub) == ([3, 0], [3, INFINITE])
 
 
 def test_the_same_value_again_voids_nothing_but_is_told_with_its_new_counter() -> None:
     adopt = informed()
-    told(adopt, ("RC", Cost(context(B=1, A=1), 4, 7)))
-    said = told(adopt, ("RA", Value((2,), 2)), ("RA", Value((1,), 3)), ("RC", Cost(context(B=1, A=1), 4, 7)))
+    replies(adopt, ("RC", Cost(context(B=1, A=1), 4, 7)))
+    said = replies(adopt, ("RA", Value((2,), 2)), ("RA", Value((1,), 3)), ("RC", Cost(context(B=1, A=1), 4, 7)))
     assert adopt.bounds["RC"].lb == [4, 0]
     assert to("RA", said) == [Cost(context(A=(1, 3), Z=1), 4, INFINITE)]
 
 
 def test_a_value_is_left_once_its_lower_bound_is_above_the_threshold() -> None:
     adopt = informed()
-    told(adopt, ("RA", Threshold(4, {})))
-    told(adopt, ("RC", Cost(context(B=1), 4, 9)))
+    replies(adopt, ("RA", Threshold(4, {})))
+    replies(adopt, ("RC", Cost(context(B=1), 4, 9)))
     assert value(adopt) == (1,)
-    said = told(adopt, ("RC", Cost(context(B=1), 5, 9)))
+    said = replies(adopt, ("RC", Cost(context(B=1), 5, 9)))
     assert value(adopt) == (2,)
     assert to("RC", said)[0] == Value((2,), 2)
 
@@ -108,92 +108,94 @@ def test_a_value_is_left_once_its_lower_bound_is_above_the_threshold() -> None:
 def test_a_threshold_that_is_ub_makes_the_robot_take_the_value_with_the_least_upper_bound() -> None:
     adopt = informed()
     packet = [(child, Cost(context(B=2), 0, 1)) for child in ("RC", "RD")]
-    told(adopt, ("RA", Threshold(9, {})), *packet)
+    replies(adopt, ("RA", Threshold(9, {})), *packet)
     assert adopt.threshold == adopt.ub == 6
     assert value(adopt) == (2,)
 
 
 def test_the_threshold_stays_between_lb_and_ub() -> None:
     adopt = informed()
-    told(adopt, ("RA", Threshold(2, {})))
+    replies(adopt, ("RA", Threshold(2, {})))
     assert adopt.threshold == 2
-    told(adopt, ("RC", Cost(context(B=1), 5, 9)))
+    replies(adopt, ("RC", Cost(context(B=1), 5, 9)))
     assert adopt.threshold == adopt.lb == 4
-    told(adopt, *((child, Cost(context(B=1), 0, 1)) for child in ("RC", "RD")), ("RA", Threshold(99, {})))
+    replies(adopt, *((child, Cost(context(B=1), 0, 1)) for child in ("RC", "RD")), ("RA", Threshold(99, {})))
     assert adopt.threshold == adopt.ub == 2
 
 
 def test_a_threshold_in_another_context_waits_until_it_fits() -> None:
     adopt = informed()
-    told(adopt, ("RA", Threshold(7, {"RZ": (2,)})))
+    replies(adopt, ("RA", Threshold(7, {"RZ": (2,)})))
     assert adopt.threshold == 0
-    told(adopt, ("RZ", Value((2,), 2)))
+    replies(adopt, ("RZ", Value((2,), 2)))
     assert adopt.threshold == 7
-    told(adopt, ("RZ", Value((1,), 3)), ("RA", Threshold(3, {"RZ": (2,)})))
+    replies(adopt, ("RZ", Value((1,), 3)), ("RA", Threshold(3, {"RZ": (2,)})))
     assert adopt.threshold == 7
 
 
 def test_the_threshold_is_split_among_the_children_within_their_bounds() -> None:
     adopt = informed()
-    told(adopt, ("RC", Cost(context(B=1), 1, 3)), ("RD", Cost(context(B=1, A=1), 2, 9)))
-    said = told(adopt, ("RA", Threshold(8, {})))
+    replies(adopt, ("RC", Cost(context(B=1), 1, 3)), ("RD", Cost(context(B=1, A=1), 2, 9)))
+    said = replies(adopt, ("RA", Threshold(8, {})))
     assert said == [("RC", Threshold(3, {})), ("RD", Threshold(5, {"RA": (1,)}))]
-    said = told(adopt, ("RA", Threshold(4, {})))
+    said = replies(adopt, ("RA", Threshold(4, {})))
     assert said == [("RC", Threshold(1, {})), ("RD", Threshold(3, {"RA": (1,)}))]
 
 
 def test_a_child_s_threshold_is_never_below_what_it_costs_at_least() -> None:
     adopt = root(ADOPT)
-    said = told(adopt, ("RD", Cost(context(B=1), 1, 9)))
+    said = replies(adopt, ("RD", Cost(context(B=1), 1, 9)))
     assert said == [("RD", Threshold(1, {}))]
     assert adopt.t == {"RC": [0, 0], "RD": [1, 0]}
 
 
 def test_nothing_is_told_twice() -> None:
     adopt = informed()
-    assert told(adopt, ("RA", Value((1,), 1)), ("RC", Cost(context(B=1), 0, INFINITE)), ("RA", Threshold(0, {}))) == []
+    assert (
+        replies(adopt, ("RA", Value((1,), 1)), ("RC", Cost(context(B=1), 0, INFINITE)), ("RA", Threshold(0, {}))) == []
+    )
 
 
 def test_another_robot_ends_only_after_its_parent_with_the_last_values_above() -> None:
     adopt = informed()
-    told(adopt, *((child, Cost(context(B=1), 1, 1)) for child in ("RC", "RD")), ("RA", Threshold(2, {})))
+    replies(adopt, *((child, Cost(context(B=1), 1, 1)) for child in ("RC", "RD")), ("RA", Threshold(2, {})))
     assert adopt.threshold == adopt.ub == 2
     assert not adopt.terminated
-    said = told(adopt, ("RA", Terminate(context(Z=1, A=1, X=2))))
+    said = replies(adopt, ("RA", Terminate(context(Z=1, A=1, X=2))))
     assert said == [(child, Terminate(context(Z=1, A=1, X=2, B=1))) for child in ("RC", "RD")]
-    assert told(adopt, ("RA", Value((2,), 2))) == []
+    assert replies(adopt, ("RA", Value((2,), 2))) == []
 
 
 def test_a_robot_goes_on_after_its_parent_s_end_until_its_bounds_meet_and_tells_it_nothing() -> None:
     adopt = informed()
-    said = told(adopt, ("RA", Threshold(1, {})), ("RA", Terminate(context(Z=1, A=(2, 2)))))
+    said = replies(adopt, ("RA", Threshold(1, {})), ("RA", Terminate(context(Z=1, A=(2, 2)))))
     assert to("RA", said) == []
     assert list(adopt.lower) == [1, 1]
-    said = told(adopt, *((child, Cost(context(B=1, A=(2, 2)), 0, 0)) for child in ("RC", "RD")))
+    said = replies(adopt, *((child, Cost(context(B=1, A=(2, 2)), 0, 0)) for child in ("RC", "RD")))
     assert said[-2:] == [(child, Terminate(context(Z=1, A=(2, 2), B=1))) for child in ("RC", "RD")]
     assert to("RA", said) == []
 
 
 def test_a_root_that_finds_all_values_infinite_ends_the_search_of_all() -> None:
     adopt = root(ADOPT)
-    told(adopt, ("RC", Cost(context(B=1), INFINITE, INFINITE)))
+    replies(adopt, ("RC", Cost(context(B=1), INFINITE, INFINITE)))
     assert value(adopt) == (2,)
-    assert told(adopt, ("RC", Cost(context(B=(2, 2)), INFINITE, INFINITE))) == []
+    assert replies(adopt, ("RC", Cost(context(B=(2, 2)), INFINITE, INFINITE))) == []
     assert adopt.verdict is Verdict.NO_SOLUTION
 
 
 def test_another_robot_that_finds_all_values_infinite_says_so() -> None:
     adopt = informed()
     packet = [("RC", Cost(context(B=number), INFINITE, INFINITE)) for number in (1, 2)]
-    assert told(adopt, *packet) == [("RA", Cost(context(A=1, Z=1), INFINITE, INFINITE))]
-    said = told(adopt, ("RA", Value((2,), 2)), ("RC", Cost(context(B=1, A=(2, 2)), INFINITE, INFINITE)))
+    assert replies(adopt, *packet) == [("RA", Cost(context(A=1, Z=1), INFINITE, INFINITE))]
+    said = replies(adopt, ("RA", Value((2,), 2)), ("RC", Cost(context(B=1, A=(2, 2)), INFINITE, INFINITE)))
     assert to("RA", said) == [Cost(context(A=(2, 2), Z=1), INFINITE, INFINITE)]
 
 
 def test_what_is_paid_is_looked_up_only_when_a_neighbour_above_has_another_value() -> None:
     adopt = informed()
     checks = adopt.problem.checks
-    told(adopt, ("RC", Cost(context(B=1, X=1), 4, 7)), ("RA", Value((1,), 2)), ("RA", Threshold(3, {})))
+    replies(adopt, ("RC", Cost(context(B=1, X=1), 4, 7)), ("RA", Value((1,), 2)), ("RA", Threshold(3, {})))
     assert adopt.problem.checks == checks
 
 

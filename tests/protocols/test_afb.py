@@ -10,13 +10,14 @@ import robochoc.protocols.afb
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
-from robochoc.protocols.afb import AFB, CPA, FBCPA, FBEstimate, NewSolution, Terminate
+from robochoc.protocols.afb import AFB
 from robochoc.protocols.afb_bounds import Cost
+from robochoc.protocols.afb_messages import CPA, FBCPA, FBEstimate, NewSolution, Terminate
 from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import NO_BRIEF, RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import told, value
+from tests.support.agents import replies, value
 from tests.support.problems import team_of
 
 
@@ -39,7 +40,7 @@ def chain() -> Team:
 
 def agent(team: Team, name: str, brief: RunParameters = NO_BRIEF) -> AFB:
     """The protocol object of one robot, started, with nothing left to say."""
-    robot = AFB(LocalProblem(agent_problems(team, brief=brief, everywhere=True)[name]), PriorityOrder(team.order))
+    robot = AFB(LocalProblem(agent_problems(team, brief=brief, shared_scopes=True)[name]), PriorityOrder(team.order))
     robot.start()
     robot.outbox.clear()
     return robot
@@ -73,7 +74,7 @@ def solution(cost: Cost, *values: int) -> NewSolution:
 
 
 def test_the_first_robot_generates_the_cpa_and_asks_all_others_for_estimates() -> None:
-    robot = AFB(LocalProblem(agent_problems(team := chain(), everywhere=True)["RA"]), PriorityOrder(team.order))
+    robot = AFB(LocalProblem(agent_problems(team := chain(), shared_scopes=True)["RA"]), PriorityOrder(team.order))
     robot.start()
     first = cpa((1, 1), least=[0, 0])
     assert robot.outbox == [("RB", first), ("RC", asks((1, 1))), ("RD", asks((1, 1)))]
@@ -81,36 +82,38 @@ def test_the_first_robot_generates_the_cpa_and_asks_all_others_for_estimates() -
 
 
 def test_the_next_robot_adds_a_value_and_answers_to_the_cpa_itself() -> None:
-    said = told(agent(chain(), "RB"), ("RA", cpa((1, 1), least=[0, 0])))
+    said = replies(agent(chain(), "RB"), ("RA", cpa((1, 1), least=[0, 0])))
     on = cpa((1, 1), (1, 1), least=[0, 0, 0])
     assert said == [("RC", on), ("RD", asks((1, 1), (1, 1))), ("RA", FBEstimate([1], [0]))]
 
 
 def test_values_are_tried_the_cheapest_first() -> None:
     robot = agent(chain(), "RC")
-    said = told(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
+    said = replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
     assert value(robot) == (2,)  # 2, and not 4
     assert said[0] == ("RD", cpa((1, 1), (2, 1), (2, 1), least=[0, 0, 2, 2]))
 
 
 def test_each_assignment_raises_the_own_counter() -> None:
     robot = agent(chain(), "RB")
-    told(robot, ("RA", cpa((1, 1), least=[0, 0])))
-    said = told(robot, ("RC", back((1, 1), (1, 1))))
+    replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
+    said = replies(robot, ("RC", back((1, 1), (1, 1))))
     assert said[0] == ("RC", cpa((1, 1), (2, 2), least=[0, 0, 0]))
 
 
 def test_a_value_with_which_the_cpa_costs_as_much_as_b_is_not_assigned() -> None:
     robot = agent(chain(), "RC")
-    assert told(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0], bound=2))) == [("RB", back((1, 1), (2, 1), bound=2))]
+    assert replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0], bound=2))) == [
+        ("RB", back((1, 1), (2, 1), bound=2))
+    ]
     assert value(robot) is None
 
 
 def test_a_cpa_that_costs_as_much_as_b_goes_back_without_a_look_at_any_value() -> None:
     robot = agent(chain(), "RD")
-    told(robot, ("RC", solution(3, 1, 1, 1, 1)))
+    replies(robot, ("RC", solution(3, 1, 1, 1, 1)))
     before = robot.problem.checks
-    assert told(robot, ("RC", cpa((1, 1), (2, 1), (2, 1), least=[0, 0, 2, 3]))) == [
+    assert replies(robot, ("RC", cpa((1, 1), (2, 1), (2, 1), least=[0, 0, 2, 3]))) == [
         ("RC", back((1, 1), (2, 1), (2, 1), bound=3))
     ]
     assert robot.problem.checks == before
@@ -121,7 +124,7 @@ def test_a_cpa_that_costs_as_much_as_b_goes_back_without_a_look_at_any_value() -
 
 def test_an_estimate_is_what_the_cheapest_value_costs_with_each_beginning_of_the_cpa() -> None:
     robot = agent(chain(), "RC")
-    assert told(robot, ("RB", asks((1, 1), (2, 1)))) == [("RB", FBEstimate([1, 1], [0, 0, 2]))]
+    assert replies(robot, ("RB", asks((1, 1), (2, 1)))) == [("RB", FBEstimate([1, 1], [0, 0, 2]))]
     assert value(robot) is None
 
 
@@ -130,7 +133,7 @@ def test_what_lower_robots_cost_at_least_is_in_the_estimate() -> None:
     constraints = [priced("BC", {(1, 1): 4, (1, 2): 3, (2, 1): 1, (2, 2): 2}), priced("AB", {(1, 2): 7})]
     team = team_of(dict.fromkeys("ABC", (1, 2)), constraints)
     robot = agent(team, "RB")
-    assert told(robot, ("RA", cpa((1, 1), least=[0, 0]))) == [
+    assert replies(robot, ("RA", cpa((1, 1), least=[0, 0]))) == [
         ("RC", cpa((1, 1), (1, 1), least=[1, 3, 0])),
         ("RA", FBEstimate([1], [1, 3])),
     ]
@@ -141,11 +144,11 @@ def test_an_n_ary_constraint_is_in_one_estimate_only() -> None:
     """The highest robot of the scope looks ahead, the lowest pays."""
     team = team_of(dict.fromkeys("ABC", (1, 2)), [priced("ABC", {}, 5)])
     assert [agent(team, name).prices.estimates for name in ("RA", "RB", "RC")] == [[5], [0], [0]]
-    assert told(agent(team, "RB"), ("RA", cpa((1, 1), least=[5, 0])))[0] == (
+    assert replies(agent(team, "RB"), ("RA", cpa((1, 1), least=[5, 0])))[0] == (
         "RC",
         cpa((1, 1), (1, 1), least=[5, 0, 0]),
     )
-    assert told(agent(team, "RC"), ("RB", asks((1, 1), (1, 1)))) == [("RB", FBEstimate([1, 1], [0, 0, 5]))]
+    assert replies(agent(team, "RC"), ("RB", asks((1, 1), (1, 1)))) == [("RB", FBEstimate([1, 1], [0, 0, 5]))]
 
 
 def test_of_a_robot_that_may_step_aside_nothing_is_expected() -> None:
@@ -155,50 +158,50 @@ def test_of_a_robot_that_may_step_aside_nothing_is_expected() -> None:
 
 def test_what_a_cpa_has_in_common_with_the_last_one_is_not_priced_again() -> None:
     robot = agent(chain(), "RC")
-    told(robot, ("RA", asks((1, 1))))
+    replies(robot, ("RA", asks((1, 1))))
     before = robot.problem.checks
-    told(robot, ("RB", asks((1, 1), (2, 1))))
+    replies(robot, ("RB", asks((1, 1), (2, 1))))
     assert robot.problem.checks == before + 2
-    told(robot, ("RB", asks((1, 1), (2, 1))), ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
+    replies(robot, ("RB", asks((1, 1), (2, 1))), ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
     assert robot.problem.checks == before + 2
 
 
 def test_who_has_nothing_new_to_say_is_silent() -> None:
     robot = agent(chain(), "RD")
-    assert told(robot, ("RB", asks((1, 1), (1, 1)))) == [("RB", FBEstimate([1, 1], [0, 0]))]
-    assert told(robot, ("RB", asks((2, 2), (1, 2)))) == []
+    assert replies(robot, ("RB", asks((1, 1), (1, 1)))) == [("RB", FBEstimate([1, 1], [0, 0]))]
+    assert replies(robot, ("RB", asks((2, 2), (1, 2)))) == []
 
 
 def test_a_robot_is_asked_only_when_its_estimate_may_have_changed() -> None:
     """D has no constraint with B, and has told so by the length of its answer."""
     robot = agent(chain(), "RB")
-    told(robot, ("RA", cpa((1, 1), least=[0, 0])))
-    told(robot, ("RD", FBEstimate([1, 1], [0, 0])))
-    assert [receiver for receiver, _ in told(robot, ("RC", back((1, 1), (1, 1))))] == ["RC"]
-    assert [receiver for receiver, _ in told(robot, ("RA", cpa((2, 2), least=[0, 1])))] == ["RC", "RD"]
+    replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
+    replies(robot, ("RD", FBEstimate([1, 1], [0, 0])))
+    assert [receiver for receiver, _ in replies(robot, ("RC", back((1, 1), (1, 1))))] == ["RC"]
+    assert [receiver for receiver, _ in replies(robot, ("RA", cpa((2, 2), least=[0, 1])))] == ["RC", "RD"]
 
 
 def test_the_cpa_and_estimates_that_cost_as_much_as_b_make_the_next_value_be_taken_wherever_the_cpa_is() -> None:
     robot = agent(chain(), "RB")
-    told(robot, ("RD", solution(6, 2, 2, 1, 2)), ("RA", cpa((1, 1), least=[0, 0])))
-    assert told(robot, ("RC", FBEstimate([1, 1], [0, 0, 3]))) == []
-    said = told(robot, ("RD", FBEstimate([1, 1], [0, 3])))
+    replies(robot, ("RD", solution(6, 2, 2, 1, 2)), ("RA", cpa((1, 1), least=[0, 0])))
+    assert replies(robot, ("RC", FBEstimate([1, 1], [0, 0, 3]))) == []
+    said = replies(robot, ("RD", FBEstimate([1, 1], [0, 3])))
     assert said[0] == ("RC", cpa((1, 1), (2, 2), least=[0, 0, 0], bound=6))
 
 
 def test_an_estimate_for_another_cpa_says_what_stands_of_it() -> None:
     """So far as the CPA is still the same; the own value is another one."""
     robot = agent(chain(), "RB")
-    told(robot, ("RD", solution(6, 2, 2, 1, 2)), ("RA", cpa((1, 1), least=[0, 0])))
-    told(robot, ("RC", back((1, 1), (1, 1))))
-    assert told(robot, ("RC", FBEstimate([1, 1], [0, 0, 9]))) == []
-    assert told(robot, ("RD", FBEstimate([1, 1], [0, 6]))) == [("RA", back((1, 1), bound=6))]
+    replies(robot, ("RD", solution(6, 2, 2, 1, 2)), ("RA", cpa((1, 1), least=[0, 0])))
+    replies(robot, ("RC", back((1, 1), (1, 1))))
+    assert replies(robot, ("RC", FBEstimate([1, 1], [0, 0, 9]))) == []
+    assert replies(robot, ("RD", FBEstimate([1, 1], [0, 6]))) == [("RA", back((1, 1), bound=6))]
 
 
 def test_b_that_falls_makes_the_next_value_be_taken_too() -> None:
     robot = agent(chain(), "RC")
-    told(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
-    assert told(robot, ("RD", solution(2, 1, 2, 2, 1))) == [("RB", back((1, 1), (2, 1), bound=2))]
+    replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
+    assert replies(robot, ("RD", solution(2, 1, 2, 2, 1))) == [("RB", back((1, 1), (2, 1), bound=2))]
 
 
 # Back
@@ -206,31 +209,31 @@ def test_b_that_falls_makes_the_next_value_be_taken_too() -> None:
 
 def test_without_a_value_left_the_cpa_goes_back_to_the_robot_before() -> None:
     robot = agent(chain(), "RB")
-    told(robot, ("RA", cpa((1, 1), least=[0, 0])))
-    told(robot, ("RC", back((1, 1), (1, 1))))
-    assert told(robot, ("RC", back((1, 1), (2, 2)))) == [("RA", back((1, 1)))]
+    replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
+    replies(robot, ("RC", back((1, 1), (1, 1))))
+    assert replies(robot, ("RC", back((1, 1), (2, 2)))) == [("RA", back((1, 1)))]
 
 
 def test_the_cpa_jumps_back_to_the_last_robot_of_the_shortest_beginning_that_costs_too_much() -> None:
     """Each value of C costs 4 with A = 1 already; so B is passed over."""
     constraints = [priced("AC", {(1, 1): 4, (1, 2): 4}), same("BC", 1)]
     robot = agent(team_of(dict.fromkeys("ABC", (1, 2)), constraints), "RC")
-    told(robot, ("RA", solution(4, 2, 1, 1)))
-    assert told(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0]))) == [("RA", back((1, 1), bound=4))]
+    replies(robot, ("RA", solution(4, 2, 1, 1)))
+    assert replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0]))) == [("RA", back((1, 1), bound=4))]
 
 
 def test_what_robots_in_between_and_below_cost_counts_for_the_jump_as_well() -> None:
     """With A = 1, robots between cost 2 at least, C costs 1 and D 3: that is B."""
     robot = agent(team_of(dict.fromkeys("ABCD", (1, 2)), [priced("AC", {}, 1), same("BC", 1), same("AD", 1)]), "RC")
-    told(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 2, 2])), ("RD", solution(6, 2, 1, 1, 2)))
-    assert told(robot, ("RD", FBEstimate([1, 1, 1], [0, 3]))) == [("RA", back((1, 1), bound=6))]
+    replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 2, 2])), ("RD", solution(6, 2, 1, 1, 2)))
+    assert replies(robot, ("RD", FBEstimate([1, 1, 1], [0, 3]))) == [("RA", back((1, 1), bound=6))]
 
 
 def test_a_cpa_comes_back_in_vain_when_another_value_has_been_taken_since() -> None:
     robot = agent(chain(), "RB")
-    told(robot, ("RA", cpa((1, 1), least=[0, 0])))
-    told(robot, ("RC", back((1, 1), (1, 1))))
-    assert told(robot, ("RD", back((1, 1), (1, 1)))) == []
+    replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
+    replies(robot, ("RC", back((1, 1), (1, 1))))
+    assert replies(robot, ("RD", back((1, 1), (1, 1)))) == []
     assert value(robot) == (2,)
 
 
@@ -239,28 +242,28 @@ def test_a_cpa_comes_back_in_vain_when_another_value_has_been_taken_since() -> N
 
 def test_an_obsolete_cpa_is_ignored() -> None:
     robot = agent(chain(), "RC")
-    told(robot, ("RA", asks((2, 2))))
-    assert told(robot, ("RB", cpa((1, 1), (1, 7), least=[0, 0, 0]))) == []
+    replies(robot, ("RA", asks((2, 2))))
+    assert replies(robot, ("RB", cpa((1, 1), (1, 7), least=[0, 0, 0]))) == []
 
 
 def test_an_obsolete_question_is_not_answered() -> None:
     robot = agent(chain(), "RD")
-    told(robot, ("RA", asks((2, 2))))
-    assert told(robot, ("RB", asks((1, 1), (1, 7)))) == []
+    replies(robot, ("RA", asks((2, 2))))
+    assert replies(robot, ("RB", asks((1, 1), (1, 7)))) == []
 
 
 def test_a_stronger_cpa_makes_the_own_value_void() -> None:
     robot = agent(chain(), "RC")
-    told(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
-    told(robot, ("RA", asks((2, 2))))
+    replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
+    replies(robot, ("RA", asks((2, 2))))
     assert robot.value is None
-    assert told(robot, ("RD", back((1, 1), (2, 1), (2, 1)))) == []
+    assert replies(robot, ("RD", back((1, 1), (2, 1), (2, 1)))) == []
 
 
 def test_a_late_question_for_the_present_cpa_is_answered() -> None:
     robot = agent(chain(), "RC")
-    told(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
-    assert told(robot, ("RA", asks((1, 1)))) == [("RA", FBEstimate([1], [0, 0]))]
+    replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
+    assert replies(robot, ("RA", asks((1, 1)))) == [("RA", FBEstimate([1], [0, 0]))]
     assert value(robot) == (2,)
 
 
@@ -269,7 +272,7 @@ def test_a_late_question_for_the_present_cpa_is_answered() -> None:
 
 def test_a_complete_cpa_is_a_new_solution_and_all_are_told() -> None:
     robot = agent(chain(), "RD")
-    said = told(robot, ("RC", cpa((1, 1), (2, 1), (2, 1), least=[0, 0, 0, 2])))
+    said = replies(robot, ("RC", cpa((1, 1), (2, 1), (2, 1), least=[0, 0, 0, 2])))
     found = solution(5, 1, 2, 2, 1)
     assert said == [*((name, found) for name in ("RA", "RB", "RC")), ("RC", back((1, 1), (2, 1), (2, 1), bound=5))]
 
@@ -278,45 +281,45 @@ def test_every_cpa_tells_b() -> None:
     """The first robot does not take it that there is no solution while the news of one is under way."""
     team = team_of(dict.fromkeys("AB", (1,)), [priced("AB", {(1, 1): 3})])
     robot = agent(team, "RA")
-    assert told(robot, ("RB", back((1, 1), bound=3))) == [("RB", Terminate())]
+    assert replies(robot, ("RB", back((1, 1), bound=3))) == [("RB", Terminate())]
     assert robot.verdict is None
-    told(robot, ("RB", solution(3, 1, 1)))
+    replies(robot, ("RB", solution(3, 1, 1)))
     assert value(robot) == (1,)
 
 
 def test_the_first_robot_ends_the_search_when_it_has_no_value_left() -> None:
     robot = agent(chain(), "RA")
-    told(robot, ("RD", solution(5, 1, 2, 2, 1)), ("RB", back((1, 1), bound=5)))
-    said = told(robot, ("RB", back((2, 2), bound=5)))
+    replies(robot, ("RD", solution(5, 1, 2, 2, 1)), ("RB", back((1, 1), bound=5)))
+    said = replies(robot, ("RB", back((2, 2), bound=5)))
     assert said == [("RB", Terminate()), ("RC", Terminate()), ("RD", Terminate())]
     assert value(robot) == (1,)
 
 
 def test_there_is_no_solution_when_nobody_has_told_b() -> None:
     robot = agent(team_of(dict.fromkeys("AB", (1,)), [priced("AB", {(1, 1): INFINITE})]), "RA")
-    assert told(robot, ("RB", back((1, 1)))) == []
+    assert replies(robot, ("RB", back((1, 1)))) == []
     assert robot.verdict is Verdict.NO_SOLUTION
 
 
 def test_whoever_knows_that_nothing_is_better_with_any_beginning_ends_the_search() -> None:
     robot = agent(chain(), "RC")
-    told(robot, ("RD", solution(1, 1, 2, 2, 1)))
-    said = told(robot, ("RB", cpa((1, 1), (2, 1), least=[1, 1, 1])))
+    replies(robot, ("RD", solution(1, 1, 2, 2, 1)))
+    said = replies(robot, ("RB", cpa((1, 1), (2, 1), least=[1, 1, 1])))
     assert said == [("RA", Terminate()), ("RB", Terminate()), ("RD", Terminate())]
 
 
 def test_who_is_told_the_end_takes_its_value_in_the_best_solution_and_is_silent() -> None:
     robot = agent(chain(), "RB")
-    told(robot, ("RA", cpa((1, 1), least=[0, 0])), ("RD", solution(5, 1, 2, 2, 1)))
-    assert told(robot, ("RA", Terminate()), ("RA", cpa((2, 2), least=[0, 0])), ("RC", back((1, 1), (1, 1)))) == []
+    replies(robot, ("RA", cpa((1, 1), least=[0, 0])), ("RD", solution(5, 1, 2, 2, 1)))
+    assert replies(robot, ("RA", Terminate()), ("RA", cpa((2, 2), least=[0, 0])), ("RC", back((1, 1), (1, 1)))) == []
     assert value(robot) == (2,)
 
 
 def test_the_news_of_the_best_solution_may_come_after_the_end() -> None:
     robot = agent(chain(), "RB")
-    told(robot, ("RA", Terminate()))
+    replies(robot, ("RA", Terminate()))
     assert robot.value is None
-    assert told(robot, ("RD", solution(5, 1, 2, 2, 1))) == []
+    assert replies(robot, ("RD", solution(5, 1, 2, 2, 1))) == []
     assert value(robot) == (2,)
 
 
@@ -335,7 +338,7 @@ def test_the_best_solution_and_a_bound_are_found_before_the_end() -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [priced("A", {(1,): 2, (2,): 3}), priced("AB", {(1, 1): 4, (1, 2): 6})])
     robot = agent(team, "RA")
     assert robot.findings == Findings(bound=3)
-    told(robot, ("RB", FBEstimate([1], [0, 0])), ("RB", solution(9, 1, 2)))
+    replies(robot, ("RB", FBEstimate([1], [0, 0])), ("RB", solution(9, 1, 2)))
     assert robot.findings == Findings(best=Best(9, {"RA": (1,), "RB": (2,)}), bound=3)
     assert agent(team, "RB").findings == Findings()
 

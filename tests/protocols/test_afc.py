@@ -17,12 +17,7 @@ from robochoc.protocols.sbt import SBT
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.problems import random_team, solutions, team_of
-
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
-
-
-def differ(left: str, right: str) -> Constraint:
-    return Constraint("C", DIFFERENT, (left, right), (left, right))
+from tests.support.small_teams import differ
 
 
 def square(values: int = 3) -> Team:

@@ -17,17 +17,10 @@ from robochoc.protocols.afc_ng import CPA, AFCng, Nogood, Solved
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import told, value
+from tests.support.agents import replies, value
 from tests.support.complex_problems import complex_team
 from tests.support.problems import random_team, team_of
-
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
-
-
-def different(names: str, pairs: str, values: int) -> Team:
-    """A robot for each letter; each of `pairs` takes different ones of `values` values."""
-    constraints = [Constraint("C", DIFFERENT, (pair[0], pair[1]), (pair[0], pair[1])) for pair in pairs.split()]
-    return team_of({name: range(1, values + 1) for name in names}, constraints)
+from tests.support.small_teams import DIFFERENT, different
 
 
 def triangle(values: int = 2) -> Team:
@@ -61,13 +54,13 @@ def test_the_first_robot_begins() -> None:
 
 
 def test_the_predecessor_s_cpa_lets_a_robot_assign() -> None:
-    said = told(agent(triangle(3), "RB"), ("RA", cpa((1, 1))))
+    said = replies(agent(triangle(3), "RB"), ("RA", cpa((1, 1))))
     assert said == [("RC", cpa((1, 1), (2, 1)))]
 
 
 def test_another_robot_s_cpa_only_checks_forward() -> None:
     afc = agent(triangle(3), "RC")
-    assert told(afc, ("RA", cpa((1, 1)))) == []
+    assert replies(afc, ("RA", cpa((1, 1)))) == []
     assert value(afc) is None
     assert list(afc.store) == [{"RA": (1,)}]
 
@@ -82,30 +75,30 @@ def test_a_cpa_goes_to_the_next_robot_and_to_those_that_share_a_constraint() -> 
 
 def test_each_assignment_raises_the_own_counter() -> None:
     afc = agent(triangle(3), "RB")
-    told(afc, ("RA", cpa((1, 1))))
-    assert told(afc, ("RA", cpa((2, 2)))) == [("RC", cpa((2, 2), (1, 2)))]
+    replies(afc, ("RA", cpa((1, 1))))
+    assert replies(afc, ("RA", cpa((2, 2)))) == [("RC", cpa((2, 2), (1, 2)))]
 
 
 def test_the_first_counter_that_differs_decides_which_cpa_is_stronger() -> None:
     afc = agent(triangle(3), "RC")
-    told(afc, ("RB", cpa((1, 2), (2, 1))))
-    assert told(afc, ("RB", cpa((2, 1), (1, 9)))) == []
+    replies(afc, ("RB", cpa((1, 2), (2, 1))))
+    assert replies(afc, ("RB", cpa((2, 1), (1, 9)))) == []
     assert afc.view == {"RA": (1,), "RB": (2,)}
-    assert told(afc, ("RB", cpa((2, 3), (1, 1)))) == [("RD", cpa((2, 3), (1, 1), (3, 2)))]
+    assert replies(afc, ("RB", cpa((2, 3), (1, 1)))) == [("RD", cpa((2, 3), (1, 1), (3, 2)))]
 
 
 def test_a_cpa_with_the_counters_of_the_view_does_not_erase_what_came_later() -> None:
     afc = agent(triangle(3), "RC")
-    told(afc, ("RB", cpa((1, 1), (2, 1))))
-    assert told(afc, ("RA", cpa((1, 1)))) == []
+    replies(afc, ("RB", cpa((1, 1), (2, 1))))
+    assert replies(afc, ("RA", cpa((1, 1)))) == []
     assert afc.view == {"RA": (1,), "RB": (2,)}
     assert value(afc) == (3,)
 
 
 def test_a_stronger_cpa_takes_the_value_and_what_was_known_of_robots_below_its_sender() -> None:
     afc = agent(triangle(3), "RC")
-    told(afc, ("RB", cpa((1, 1), (2, 1))))
-    assert told(afc, ("RA", cpa((3, 2)))) == []
+    replies(afc, ("RB", cpa((1, 1), (2, 1))))
+    assert replies(afc, ("RA", cpa((3, 2)))) == []
     assert afc.view == {"RA": (3,)}
     assert value(afc) is None
     assert list(afc.store) == [{"RA": (3,)}]
@@ -113,15 +106,15 @@ def test_a_stronger_cpa_takes_the_value_and_what_was_known_of_robots_below_its_s
 
 def test_counters_of_robots_below_the_sender_are_kept() -> None:
     afc = agent(triangle(3), "RC")
-    told(afc, ("RB", cpa((1, 1), (2, 4))), ("RA", cpa((2, 2))))
+    replies(afc, ("RB", cpa((1, 1), (2, 4))), ("RA", cpa((2, 2))))
     assert afc.counters == [2, 4]
 
 
 def test_nogoods_that_agree_with_the_new_view_stay_and_are_not_checked_again() -> None:
     afc = agent(triangle(3), "RC")
-    told(afc, ("RB", cpa((1, 1), (2, 1))))
+    replies(afc, ("RB", cpa((1, 1), (2, 1))))
     checks = afc.problem.checks
-    told(afc, ("RB", cpa((1, 1), (3, 2))))
+    replies(afc, ("RB", cpa((1, 1), (3, 2))))
     assert list(afc.store) == [{"RA": (1,)}, {"RB": (3,)}]
     assert afc.problem.checks == checks + 2  # two values are left, and only RB's value is new
 
@@ -130,9 +123,9 @@ def test_nogoods_stay_when_only_a_variable_that_does_not_matter_to_them_has_chan
     owned = {"R1": ("A", "B"), "R2": ("C",), "R3": ("D",)}
     constraints = [Constraint("C", DIFFERENT, pair, pair) for pair in (("A", "D"), ("B", "C"))]
     afc = agent(complex_team(owned, dict.fromkeys("ABCD", (1, 2)), constraints), "R3")
-    told(afc, ("R1", CPA([((1, 1), 1)])))
+    replies(afc, ("R1", CPA([((1, 1), 1)])))
     checks = afc.problem.checks
-    told(afc, ("R1", CPA([((1, 2), 2)])))
+    replies(afc, ("R1", CPA([((1, 2), 2)])))
     assert list(afc.store) == [{"R1": (1, None)}]
     assert afc.problem.checks == checks + 1
 
@@ -140,13 +133,13 @@ def test_nogoods_stay_when_only_a_variable_that_does_not_matter_to_them_has_chan
 def test_a_packet_is_revised_by_its_strongest_cpa_alone() -> None:
     afc = agent(triangle(3), "RC")
     packet = (("RA", cpa((1, 1))), ("RB", cpa((1, 1), (2, 1))), ("RA", cpa((2, 2))))
-    assert told(afc, *packet) == []
+    assert replies(afc, *packet) == []
     assert afc.problem.checks == 3
 
 
 def test_of_two_conflicts_the_one_with_the_highest_lowest_robot_is_kept() -> None:
     afc = agent(different("ABC", "AC BC", 3), "RC")
-    told(afc, ("RB", cpa((1, 1), (1, 1))))
+    replies(afc, ("RB", cpa((1, 1), (1, 1))))
     assert list(afc.store) == [{"RA": (1,)}]
 
 
@@ -154,37 +147,37 @@ def test_an_n_ary_constraint_is_checked_when_all_its_robots_are_known() -> None:
     odd = Relation("R", 3, Semantics.SUPPORTS, ((1, 1, 2), (1, 2, 1)))
     team = team_of(dict.fromkeys("ABC", range(1, 3)), [Constraint("C", odd, ("A", "B", "C"), ("A", "B", "C"))])
     afc = agent(team, "RC")
-    told(afc, ("RA", cpa((1, 1))))
+    replies(afc, ("RA", cpa((1, 1))))
     assert afc.problem.checks == 0
-    told(afc, ("RB", cpa((1, 1), (1, 1))))
+    replies(afc, ("RB", cpa((1, 1), (1, 1))))
     assert value(afc) == (2,)
     assert list(afc.store) == [{"RA": (1,), "RB": (1,)}]
 
 
 def test_backtrack_tells_the_lowest_cause_before_the_cpa_has_come() -> None:
     afc = agent(different("ABCD", "AD BD CD", 2), "RD")
-    assert told(afc, ("RB", cpa((1, 1), (2, 1)))) == [("RB", Nogood({"RA": (1,)}, (2,)))]
+    assert replies(afc, ("RB", cpa((1, 1), (2, 1)))) == [("RB", Nogood({"RA": (1,)}, (2,)))]
 
 
 def test_backtrack_forgets_the_cause_and_all_below_it_but_not_their_counters() -> None:
     afc = agent(different("ABCD", "AD BD CD", 2), "RD")
-    told(afc, ("RC", cpa((1, 1), (2, 1), (1, 3))))
+    replies(afc, ("RC", cpa((1, 1), (2, 1), (1, 3))))
     assert afc.view == {"RA": (1,)}
     assert afc.counters == [1, 1, 3]
     assert list(afc.store) == [{"RA": (1,)}]
-    assert told(afc, ("RC", cpa((1, 1), (2, 1), (1, 3)))) == []
+    assert replies(afc, ("RC", cpa((1, 1), (2, 1), (1, 3)))) == []
 
 
 def test_a_compatible_nogood_about_the_value_makes_the_robot_take_another() -> None:
     afc = agent(triangle(3), "RB")
-    told(afc, ("RA", cpa((1, 1))))
-    assert told(afc, ("RC", Nogood({"RA": (1,)}, (2,)))) == [("RC", cpa((1, 1), (3, 2)))]
+    replies(afc, ("RA", cpa((1, 1))))
+    assert replies(afc, ("RC", Nogood({"RA": (1,)}, (2,)))) == [("RC", cpa((1, 1), (3, 2)))]
 
 
 def test_a_compatible_nogood_about_another_value_is_stored() -> None:
     afc = agent(triangle(3), "RB")
-    told(afc, ("RA", cpa((1, 1))))
-    assert told(afc, ("RC", Nogood({"RA": (1,)}, (3,)))) == []
+    replies(afc, ("RA", cpa((1, 1))))
+    assert replies(afc, ("RC", Nogood({"RA": (1,)}, (3,)))) == []
     assert list(afc.store) == [{"RA": (1,)}] * 2
 
 
@@ -192,22 +185,22 @@ def test_a_compatible_nogood_about_another_value_is_stored() -> None:
 def test_a_nogood_that_does_not_agree_with_the_view_is_ignored(known: CPA | None) -> None:
     afc = agent(triangle(3), "RB")
     if known:
-        told(afc, ("RA", known))
+        replies(afc, ("RA", known))
     before = list(afc.store)
-    assert told(afc, ("RC", Nogood({"RA": (1,)}, (1,)))) == []
+    assert replies(afc, ("RC", Nogood({"RA": (1,)}, (1,)))) == []
     assert list(afc.store) == before
 
 
 def test_the_better_of_two_nogoods_for_a_value_is_kept() -> None:
     afc = agent(different("ABCD", "AD BD CD", 3), "RC")
-    told(afc, ("RB", cpa((1, 1), (2, 1))))
-    told(afc, ("RD", Nogood({"RA": (1,)}, (3,))), ("RD", Nogood({"RA": (1,), "RB": (2,)}, (3,))))
+    replies(afc, ("RB", cpa((1, 1), (2, 1))))
+    replies(afc, ("RD", Nogood({"RA": (1,)}, (3,))), ("RD", Nogood({"RA": (1,), "RB": (2,)}, (3,))))
     assert list(afc.store) == [{"RA": (1,)}]
 
 
 def test_an_empty_nogood_ends_the_search_without_solution() -> None:
     afc = agent(triangle(1), "RA")
-    assert told(afc, ("RB", Nogood({}, (1,)))) == []
+    assert replies(afc, ("RB", Nogood({}, (1,)))) == []
     assert afc.verdict is Verdict.NO_SOLUTION
 
 
@@ -220,15 +213,15 @@ def test_a_robot_without_values_ends_the_search_at_the_start() -> None:
 def test_the_last_robot_s_value_makes_a_solution_and_all_are_told() -> None:
     afc = agent(triangle(3), "RD")
     solution: dict[str, Value] = {"RA": (1,), "RB": (2,), "RC": (3,), "RD": (1,)}
-    said = told(afc, ("RC", cpa((1, 1), (2, 1), (3, 1))))
+    said = replies(afc, ("RC", cpa((1, 1), (2, 1), (3, 1))))
     assert said == [(name, Solved(solution)) for name in ("RA", "RB", "RC")]
 
 
 def test_who_is_told_a_solution_takes_its_value_and_is_silent() -> None:
     afc = agent(triangle(3), "RB")
-    told(afc, ("RA", cpa((1, 1))))
+    replies(afc, ("RA", cpa((1, 1))))
     packet = (("RD", Solved({"RA": (1,), "RB": (3,), "RC": (2,), "RD": (1,)})), ("RA", cpa((2, 2))))
-    assert told(afc, *packet, ("RC", Nogood({}, (3,)))) == []
+    assert replies(afc, *packet, ("RC", Nogood({}, (3,)))) == []
     assert value(afc) == (3,)
 
 

@@ -12,23 +12,16 @@ from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.model.problem import Team
 from robochoc.protocols.afc_ng import CPA, AFCng, Nogood, Solved
 from robochoc.protocols.afc_tree import Accept, AFCTree
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from robochoc.verification.checker import objections
-from tests.support.agents import told, value
-from tests.support.problems import random_team, team_of
-
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
-
-
-def different(names: str, pairs: str, values: int) -> Team:
-    """A robot for each letter; each of `pairs` takes different ones of `values` values."""
-    constraints = [Constraint("C", DIFFERENT, (pair[0], pair[1]), (pair[0], pair[1])) for pair in pairs.split()]
-    return team_of({name: range(1, values + 1) for name in names}, constraints)
+from robochoc.verification.checker import violations
+from tests.support.agents import replies, value
+from tests.support.problems import random_team
+from tests.support.small_teams import different
 
 
 def fork(values: int = 3) -> Team:
@@ -78,15 +71,15 @@ def test_a_tree_child_without_a_constraint_with_the_sender_gets_its_cpa() -> Non
 
 def test_a_cpa_holds_the_values_of_one_branch_only() -> None:
     assert agent(fork(), "RD").above == ["RA", "RC"]
-    said = told(agent(fork(), "RD"), ("RC", cpa((1, 1), (2, 1))))
+    said = replies(agent(fork(), "RD"), ("RC", cpa((1, 1), (2, 1))))
     assert said == [("RC", Accept([1, 1], {"RD": (1,)}))]
 
 
 def test_only_the_tree_parent_s_cpa_lets_a_robot_assign() -> None:
     afc = agent(fork(), "RE")
-    assert told(afc, ("RA", cpa((1, 1)))) == []
+    assert replies(afc, ("RA", cpa((1, 1)))) == []
     assert list(afc.store) == [{"RA": (1,)}]
-    told(afc, ("RC", cpa((1, 1), (2, 1))))
+    replies(afc, ("RC", cpa((1, 1), (2, 1))))
     assert value(afc) == (3,)
 
 
@@ -94,69 +87,69 @@ def test_all_children_of_a_robot_assign_at_once() -> None:
     team = fork()
     for name in ("RB", "RC"):
         afc = agent(team, name)
-        assert told(afc, ("RA", cpa((1, 1))))
+        assert replies(afc, ("RA", cpa((1, 1))))
         assert value(afc) == (2,)
 
 
 def test_backtrack_goes_to_the_lowest_ancestor_among_the_causes() -> None:
     afc = agent(fork(2), "RE")
-    assert told(afc, ("RC", cpa((1, 1), (2, 1)))) == [("RC", Nogood({"RA": (1,)}, (2,)))]
+    assert replies(afc, ("RC", cpa((1, 1), (2, 1)))) == [("RC", Nogood({"RA": (1,)}, (2,)))]
     assert afc.view == {"RA": (1,)}
 
 
 def test_constraints_with_ancestors_that_have_not_moved_are_not_checked_again() -> None:
     afc = agent(fork(), "RE")
-    told(afc, ("RC", cpa((1, 1), (2, 1))))
+    replies(afc, ("RC", cpa((1, 1), (2, 1))))
     checks = afc.problem.checks
-    told(afc, ("RC", cpa((1, 1), (3, 2))))
+    replies(afc, ("RC", cpa((1, 1), (3, 2))))
     assert afc.problem.checks == checks + 2
 
 
 def test_a_leaf_accepts_the_cpa_that_it_has_a_value_for() -> None:
-    said = told(agent(fork(), "RB"), ("RA", cpa((1, 4))))
+    said = replies(agent(fork(), "RB"), ("RA", cpa((1, 4))))
     assert said == [("RA", Accept([4], {"RB": (2,)}))]
 
 
 def test_a_robot_accepts_once_all_its_children_have() -> None:
     afc = agent(fork(), "RC")
-    told(afc, ("RA", cpa((1, 1))))
-    assert told(afc, ("RD", Accept([1, 1], {"RD": (1,)}))) == []
-    said = told(afc, ("RE", Accept([1, 1], {"RE": (3,)})))
+    replies(afc, ("RA", cpa((1, 1))))
+    assert replies(afc, ("RD", Accept([1, 1], {"RD": (1,)}))) == []
+    said = replies(afc, ("RE", Accept([1, 1], {"RE": (3,)})))
     assert said == [("RA", Accept([1], {"RC": (2,), "RD": (1,), "RE": (3,)}))]
 
 
 @pytest.mark.parametrize("counters", [[1, 1], [2, 2]])
 def test_an_accept_of_another_cpa_is_ignored(counters: list[int]) -> None:
     afc = agent(fork(), "RC")
-    told(afc, ("RA", cpa((1, 1))), ("RD", Accept([1, 1], {"RD": (1,)})))
-    told(afc, ("RA", cpa((2, 2))))
-    told(afc, ("RD", Accept([2, 1], {"RD": (2,)})))
-    assert told(afc, ("RE", Accept(counters, {"RE": (3,)}))) == []
+    replies(afc, ("RA", cpa((1, 1))), ("RD", Accept([1, 1], {"RD": (1,)})))
+    replies(afc, ("RA", cpa((2, 2))))
+    replies(afc, ("RD", Accept([2, 1], {"RD": (2,)})))
+    assert replies(afc, ("RE", Accept(counters, {"RE": (3,)}))) == []
 
 
 def test_a_new_value_needs_new_accepts() -> None:
     afc = agent(fork(), "RC")
-    told(afc, ("RA", cpa((1, 1))))
-    told(afc, ("RD", Accept([1, 1], {"RD": (1,)})), ("RE", Nogood({"RA": (1,)}, (2,))))
+    replies(afc, ("RA", cpa((1, 1))))
+    replies(afc, ("RD", Accept([1, 1], {"RD": (1,)})), ("RE", Nogood({"RA": (1,)}, (2,))))
     assert value(afc) == (3,)
-    assert told(afc, ("RE", Accept([1, 2], {"RE": (2,)}))) == []
-    assert told(afc, ("RD", Accept([1, 2], {"RD": (1,)}))) != []
+    assert replies(afc, ("RE", Accept([1, 2], {"RE": (2,)}))) == []
+    assert replies(afc, ("RD", Accept([1, 2], {"RD": (1,)}))) != []
 
 
 def test_a_root_with_all_accepts_tells_its_part_the_solution() -> None:
     afc = agent(fork(), "RA")
-    told(afc, ("RB", Accept([1], {"RB": (2,)})))
-    said = told(afc, ("RC", Accept([1], {"RC": (2,), "RD": (1,), "RE": (3,)})))
+    replies(afc, ("RB", Accept([1], {"RB": (2,)})))
+    said = replies(afc, ("RC", Accept([1], {"RC": (2,), "RD": (1,), "RE": (3,)})))
     solution: dict[str, Value] = {"RA": (1,), "RB": (2,), "RC": (2,), "RD": (1,), "RE": (3,)}
     assert said == [(name, Solved(solution)) for name in ("RB", "RC", "RD", "RE")]
 
 
 def test_who_is_told_a_solution_takes_its_value_and_is_silent() -> None:
     afc = agent(fork(), "RC")
-    told(afc, ("RA", cpa((1, 1))))
+    replies(afc, ("RA", cpa((1, 1))))
     solution: dict[str, Value] = {"RA": (1,), "RB": (2,), "RC": (3,), "RD": (1,), "RE": (2,)}
     packet = (("RA", Solved(solution)), ("RD", Accept([1, 1], {"RD": (1,)})), ("RE", Accept([1, 1], {"RE": (3,)})))
-    assert told(afc, *packet, ("RA", cpa((2, 2)))) == []
+    assert replies(afc, *packet, ("RA", cpa((2, 2)))) == []
     assert value(afc) == (3,)
 
 
@@ -194,7 +187,7 @@ def test_the_values_form_a_solution_when_nobody_speaks_even_without_accepts() ->
         result = Simulation(team, Undetected, RandomChannels(seed)).run(60)
         if result.verdict is Verdict.SOLUTION:
             solved += 1
-            assert not list(objections(team, {n: v for own in result.assignments.values() for n, v in own.items()}))
+            assert not list(violations(team, {n: v for own in result.assignments.values() for n, v in own.items()}))
     assert solved > 50
 
 

@@ -21,26 +21,14 @@ from robochoc.protocols.agile_order import UNKNOWN, Explanation, Proposal, compa
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import told, value
+from tests.support.agents import replies, value
 from tests.support.problems import random_team, team_of
-
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
-
-
-def differ(left: str, right: str) -> Constraint:
-    return Constraint("C", DIFFERENT, (left, right), (left, right))
-
-
-def triangle(values: int = 2) -> Team:
-    """Three robots, each different from each; a fourth that only the third knows."""
-    domains = {name: range(1, values + 1) for name in ("A", "B", "C", "D")}
-    pairs = (("A", "B"), ("A", "C"), ("B", "C"), ("C", "D"))
-    return team_of(domains, [differ(*pair) for pair in pairs])
+from tests.support.small_teams import differ, triangle
 
 
 def begun(team: Team, name: str) -> AgileABT:
     """The protocol object of one robot, started; what it has said is in its outbox."""
-    agile = AgileABT(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
+    agile = AgileABT(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
     agile.start()
     return agile
 
@@ -50,7 +38,7 @@ def agent(team: Team, name: str, *packet: tuple[str, Message]) -> AgileABT:
     agile = begun(team, name)
     agile.outbox.clear()
     if packet:
-        told(agile, *packet)
+        replies(agile, *packet)
     return agile
 
 
@@ -176,18 +164,18 @@ def test_start_takes_the_first_value_and_tells_it_with_its_explanation_to_those_
 
 
 def test_an_ok_says_on_whom_the_nogoods_rest_and_how_many_values_are_left() -> None:
-    assert told(agent(triangle(3), "RB"), ("RA", ok(1, 3, 3))) == [("RC", ok(2, 2, 3, RA=1))]
+    assert replies(agent(triangle(3), "RB"), ("RA", ok(1, 3, 3))) == [("RC", ok(2, 2, 3, RA=1))]
 
 
 def test_process_info_keeps_a_value_that_those_above_allow() -> None:
     agile = agent(triangle(), "RB")
-    assert told(agile, ("RA", ok(2))) == []
+    assert replies(agile, ("RA", ok(2))) == []
     assert value(agile) == (1,)
 
 
 def test_those_below_are_not_heeded() -> None:
     agile = agent(triangle(), "RB")
-    assert told(agile, ("RC", ok(1))) == []
+    assert replies(agile, ("RC", ok(1))) == []
     assert value(agile) == (1,)
 
 
@@ -196,7 +184,7 @@ def test_the_lowest_robot_at_present_checks_an_n_ary_constraint() -> None:
     team = team_of(dict.fromkeys("ABC", (1, 2)), [Constraint("C", odd, tuple("ABC"), tuple("ABC"))])
     agile = agent(team, "RA", ("RB", ok(1)), ("RC", ok(1)))
     assert agile.problem.checks == 0
-    told(agile, ("RB", Order((1, 2, 0), (1, 1, 1))))
+    replies(agile, ("RB", Order((1, 2, 0), (1, 1, 1))))
     assert value(agile) == (2,)
     assert list(agile.store) == [{"RB": (1,), "RC": (1,)}]
 
@@ -207,9 +195,9 @@ def test_the_lowest_robot_at_present_checks_an_n_ary_constraint() -> None:
 def test_process_order_adopts_a_smaller_termination_vector_only() -> None:
     agile = agent(triangle(), "RA", ("RD", order("DCBA", 1, 2, 1, 2)))
     assert agile.present.names == ("RD", "RC", "RB", "RA")
-    told(agile, ("RC", order("CDBA", 1, 2, 2, 1)))
+    replies(agile, ("RC", order("CDBA", 1, 2, 2, 1)))
     assert agile.present.names == ("RD", "RC", "RB", "RA")
-    told(agile, ("RC", order("CDBA", 1, 1, 9, 9)))
+    replies(agile, ("RC", order("CDBA", 1, 1, 9, 9)))
     assert agile.present.names == ("RC", "RD", "RB", "RA")
 
 
@@ -221,22 +209,22 @@ def test_of_equal_vectors_the_order_whose_names_come_first_is_stronger() -> None
 
 def test_an_order_tells_the_value_to_those_that_are_below_now_and_have_not_heard_it() -> None:
     agile = agent(triangle(3), "RB")
-    assert told(agile, ("RA", order("BACD", 1, 1, 1, 1))) == [("RA", ok(1, 3, 3))]
-    assert told(agile, ("RA", order("ABCD", 0, 1, 1, 1))) == []
-    assert told(agile, ("RA", order("BACD", 0, 0, 1, 1))) == []
+    assert replies(agile, ("RA", order("BACD", 1, 1, 1, 1))) == [("RA", ok(1, 3, 3))]
+    assert replies(agile, ("RA", order("ABCD", 0, 1, 1, 1))) == []
+    assert replies(agile, ("RA", order("BACD", 0, 0, 1, 1))) == []
 
 
 def test_those_that_missed_a_value_while_they_were_above_are_told_it() -> None:
     agile = agent(triangle(3), "RB", ("RA", order("BACD", 1, 1, 1, 1)), ("RA", ok(1, 3, 3)))
-    assert told(agile, ("RA", order("ABCD", 0, 1, 1, 1))) == [("RC", ok(2, 2, 3, RA=1))]
-    assert told(agile, ("RA", order("BACD", 0, 0, 1, 1))) == [("RA", ok(2, 3, 3))]
+    assert replies(agile, ("RA", order("ABCD", 0, 1, 1, 1))) == [("RC", ok(2, 2, 3, RA=1))]
+    assert replies(agile, ("RA", order("BACD", 0, 0, 1, 1))) == [("RA", ok(2, 3, 3))]
 
 
 def test_an_order_drops_nogoods_that_rest_on_robots_that_are_not_above() -> None:
     agile = agent(triangle(3), "RB", ("RA", ok(1, 3, 3)))
-    told(agile, ("RC", Nogood({}, (2,))))
+    replies(agile, ("RC", Nogood({}, (2,))))
     assert list(agile.store) == [{"RA": (1,)}, {}]
-    told(agile, ("RD", order("DBAC", 1, 1, 1, 1)))
+    replies(agile, ("RD", order("DBAC", 1, 1, 1, 1)))
     assert list(agile.store) == [{}]
 
 
@@ -245,7 +233,7 @@ def test_an_order_drops_nogoods_that_rest_on_robots_that_are_not_above() -> None
 
 def test_a_dead_end_tells_all_a_smaller_order_before_it_sends_the_nogood() -> None:
     agile = agent(triangle(), "RC")
-    said = told(agile, ("RA", ok(1)), ("RB", ok(2, left=1)))
+    said = replies(agile, ("RA", ok(1)), ("RB", ok(2, left=1)))
     smaller = order("BACD", 1, 1, 1, UNKNOWN)
     assert said[:3] == [("RA", smaller), ("RB", smaller), ("RD", smaller)]
     assert said[3:] == [("RA", Nogood({"RB": (2,)}, (1,)))]
@@ -256,7 +244,7 @@ def test_a_dead_end_tells_all_a_smaller_order_before_it_sends_the_nogood() -> No
 
 def test_of_all_robots_in_the_conflict_the_one_with_the_smallest_vector_is_blamed() -> None:
     agile = agent(triangle(), "RC")
-    said = told(agile, ("RA", ok(1)), ("RB", ok(2, 1, RA=1)))
+    said = replies(agile, ("RA", ok(1)), ("RB", ok(2, 1, RA=1)))
     # RB's explanation keeps it below RA, whose blame would set it free: (2, 1, 1, ..) against (2, 0, 1, ..).
     assert said[0] == ("RA", order("ABCD", 2, 0, 1, UNKNOWN))
     assert said[3] == ("RB", Nogood({"RA": (1,)}, (2,)))
@@ -264,14 +252,14 @@ def test_of_all_robots_in_the_conflict_the_one_with_the_smallest_vector_is_blame
 
 def test_a_robot_whose_explanation_falls_has_its_whole_domain_left() -> None:
     agile = agent(triangle(), "RC")
-    said = told(agile, ("RA", ok(1, 3, 3)), ("RB", ok(2, 1, RA=1)))
+    said = replies(agile, ("RA", ok(1, 3, 3)), ("RB", ok(2, 1, RA=1)))
     assert said[0] == ("RA", order("BCAD", 2, 1, 2, UNKNOWN))
     assert said[3] == ("RA", Nogood({"RB": (2,)}, (1,)))
 
 
 def test_without_a_smaller_vector_the_lowest_robot_is_blamed_in_the_present_order() -> None:
     agile = agent(triangle(), "RC", ("RD", order("BACD", 1, 1, 1, 1)))
-    said = told(agile, ("RA", ok(1)), ("RB", ok(2, left=1)))
+    said = replies(agile, ("RA", ok(1)), ("RB", ok(2, left=1)))
     assert said == [("RA", Nogood({"RB": (2,)}, (1,)))]
     assert "RA" not in agile.view
 
@@ -292,19 +280,19 @@ def test_explanations_count_while_order_view_and_own_value_go_with_them() -> Non
 
 def test_an_empty_nogood_ends_the_search_without_solution() -> None:
     agile = agent(triangle(1), "RA")
-    assert told(agile, ("RB", Nogood({}, (1,)))) == []
+    assert replies(agile, ("RB", Nogood({}, (1,)))) == []
     assert agile.verdict is Verdict.NO_SOLUTION
 
 
 def test_nothing_is_said_after_the_verdict() -> None:
     agile = agent(triangle(1), "RA", ("RB", Nogood({}, (1,))))
-    assert told(agile, ("RB", AddLink()), ("RB", order("BACD", 1, 1, 1, 1))) == []
+    assert replies(agile, ("RB", AddLink()), ("RB", order("BACD", 1, 1, 1, 1))) == []
 
 
 def test_a_value_that_is_taken_again_is_not_told_again() -> None:
     agile = agent(triangle(), "RC", ("RA", ok(1)), ("RB", ok(2, left=1)))
     assert value(agile) == (1,)  # it has forgotten RA; RD was told at the start
-    assert told(agile, ("RB", ok(1))) == [("RD", ok(2, 1, RB=1))]
+    assert replies(agile, ("RB", ok(1))) == [("RD", ok(2, 1, RB=1))]
 
 
 # Nogoods that arrive
@@ -312,31 +300,31 @@ def test_a_value_that_is_taken_again_is_not_told_again() -> None:
 
 def test_resolve_conflict_accepts_a_coherent_nogood_and_takes_another_value() -> None:
     agile = agent(triangle(3), "RB", ("RA", ok(2, 3, 3)))
-    assert told(agile, ("RC", Nogood({"RA": (2,)}, (1,)))) == [("RC", ok(3, 1, 3, RA=2))]
+    assert replies(agile, ("RC", Nogood({"RA": (2,)}, (1,)))) == [("RC", ok(3, 1, 3, RA=2))]
 
 
 def test_resolve_conflict_answers_an_obsolete_nogood_about_the_value_it_has_told() -> None:
     agile = agent(triangle(), "RB", ("RA", ok(2)))
-    assert told(agile, ("RC", Nogood({"RA": (1,)}, (1,)))) == [("RC", ok(1))]
+    assert replies(agile, ("RC", Nogood({"RA": (1,)}, (1,)))) == [("RC", ok(1))]
 
 
 def test_resolve_conflict_ignores_a_nogood_about_a_value_that_it_has_replaced() -> None:
     agile = agent(triangle(), "RB", ("RA", ok(1)))
-    assert told(agile, ("RC", Nogood({}, (1,)))) == []
+    assert replies(agile, ("RC", Nogood({}, (1,)))) == []
     assert value(agile) == (2,)
     assert list(agile.store) == [{"RA": (1,)}]
 
 
 def test_a_nogood_that_rests_on_robots_below_is_obsolete() -> None:
     agile = agent(triangle(), "RB", ("RA", ok(2)), ("RD", order("BACD", 1, 1, 1, 1)))
-    assert told(agile, ("RC", Nogood({"RA": (2,)}, (1,)))) == [("RC", ok(1))]
+    assert replies(agile, ("RC", Nogood({"RA": (2,)}, (1,)))) == [("RC", ok(1))]
     assert list(agile.store) == []
 
 
 def test_a_robot_above_that_has_forgotten_the_value_is_told_once_it_is_below() -> None:
     agile = agent(triangle(), "RB", ("RD", order("CBAD", 2, 2, 2, 2)))
-    assert told(agile, ("RC", Nogood({"RA": (1,)}, (1,)))) == []
-    assert told(agile, ("RD", order("BCAD", 1, 2, 2, 2))) == [("RC", ok(1))]
+    assert replies(agile, ("RC", Nogood({"RA": (1,)}, (1,)))) == []
+    assert replies(agile, ("RD", order("BCAD", 1, 2, 2, 2))) == [("RC", ok(1))]
 
 
 # Links
@@ -345,23 +333,23 @@ def test_a_robot_above_that_has_forgotten_the_value_is_told_once_it_is_below() -
 def test_check_add_link_asks_unknown_robots_of_the_left_side_and_believes_it() -> None:
     strangers = team_of(dict.fromkeys("ABC", (1, 2)), [differ("A", "C"), differ("B", "C")])
     agile = agent(strangers, "RB")
-    assert told(agile, ("RC", Nogood({"RA": (1,)}, (1,)))) == [("RA", AddLink()), ("RC", ok(2, 1, RA=1))]
+    assert replies(agile, ("RC", Nogood({"RA": (1,)}, (1,)))) == [("RA", AddLink()), ("RC", ok(2, 1, RA=1))]
     assert agile.view == {"RA": (1,)}
-    assert told(agile, ("RC", Nogood({"RA": (2,)}, (2,)))) == [("RC", ok(2, 1, RA=1))]
+    assert replies(agile, ("RC", Nogood({"RA": (2,)}, (2,)))) == [("RC", ok(2, 1, RA=1))]
 
 
 def test_set_link_tells_the_value_to_the_new_listener_now_and_later() -> None:
     agile = agent(triangle(), "RA")
-    assert told(agile, ("RD", AddLink())) == [("RD", ok(1))]
-    assert told(agile, ("RD", AddLink())) == [("RD", ok(1))]
-    said = told(agile, ("RB", Nogood({}, (1,))))
+    assert replies(agile, ("RD", AddLink())) == [("RD", ok(1))]
+    assert replies(agile, ("RD", AddLink())) == [("RD", ok(1))]
+    said = replies(agile, ("RB", Nogood({}, (1,))))
     assert said == [("RB", ok(2, 1)), ("RC", ok(2, 1)), ("RD", ok(2, 1))]
 
 
 def test_set_link_waits_until_the_listener_is_below() -> None:
     agile = agent(triangle(), "RB", ("RD", order("ADBC", 2, 2, 2, 2)))
-    assert told(agile, ("RD", AddLink())) == []
-    assert told(agile, ("RC", order("ABCD", 1, 2, 2, 2))) == [("RD", ok(1))]
+    assert replies(agile, ("RD", AddLink())) == []
+    assert replies(agile, ("RC", order("ABCD", 1, 2, 2, 2))) == [("RD", ok(1))]
 
 
 def test_the_docstrings_show_what_happens() -> None:

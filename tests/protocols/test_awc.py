@@ -13,27 +13,15 @@ from robochoc.protocols.awc import AWC, AddLink, Kept, Nogood, NogoodList, Ok
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import told, value
+from tests.support.agents import replies, value
 from tests.support.complex_problems import complex_team
 from tests.support.problems import team_of
-
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
-
-
-def differ(left: str, right: str) -> Constraint:
-    return Constraint("C", DIFFERENT, (left, right), (left, right))
-
-
-def triangle(values: int = 2) -> Team:
-    """Three robots, each different from each; a fourth that only the third knows."""
-    domains = {name: range(1, values + 1) for name in ("A", "B", "C", "D")}
-    pairs = (("A", "B"), ("A", "C"), ("B", "C"), ("C", "D"))
-    return team_of(domains, [differ(*pair) for pair in pairs])
+from tests.support.small_teams import differ, triangle
 
 
 def agent(team: Team, name: str) -> AWC:
     """The protocol object of one robot, started, with nothing left to say."""
-    awc = AWC(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
+    awc = AWC(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
     awc.start()
     awc.outbox.clear()
     return awc
@@ -45,49 +33,49 @@ def nogood(assignments: Mapping[str, Value]) -> Nogood:
 
 def test_start_takes_the_first_value_and_tells_it_with_priority_0_to_all_neighbours() -> None:
     team = triangle()
-    awc = AWC(LocalProblem(agent_problems(team, everywhere=True)["RB"]), PriorityOrder(team.order))
+    awc = AWC(LocalProblem(agent_problems(team, shared_scopes=True)["RB"]), PriorityOrder(team.order))
     awc.start()
     assert awc.outbox == [("RA", Ok((1,), 0)), ("RC", Ok((1,), 0))]
 
 
 def test_of_equal_priorities_the_first_in_the_order_is_the_higher() -> None:
-    assert told(agent(triangle(), "RB"), ("RC", Ok((1,), 0))) == []
-    assert told(agent(triangle(), "RB"), ("RA", Ok((1,), 0))) == [("RA", Ok((2,), 0)), ("RC", Ok((2,), 0))]
+    assert replies(agent(triangle(), "RB"), ("RC", Ok((1,), 0))) == []
+    assert replies(agent(triangle(), "RB"), ("RA", Ok((1,), 0))) == [("RA", Ok((2,), 0)), ("RC", Ok((2,), 0))]
 
 
 def test_a_larger_priority_is_higher_whatever_the_order() -> None:
     awc = agent(triangle(), "RB")
-    assert told(awc, ("RC", Ok((1,), 1))) == [("RA", Ok((2,), 0)), ("RC", Ok((2,), 0))]
+    assert replies(awc, ("RC", Ok((1,), 1))) == [("RA", Ok((2,), 0)), ("RC", Ok((2,), 0))]
 
 
 def test_a_value_that_higher_robots_allow_is_kept_whatever_lower_ones_say() -> None:
     awc = agent(triangle(3), "RB")
-    assert told(awc, ("RA", Ok((2,), 0)), ("RC", Ok((1,), 0))) == []
+    assert replies(awc, ("RA", Ok((2,), 0)), ("RC", Ok((1,), 0))) == []
     assert value(awc) == (1,)
 
 
 def test_the_view_is_checked_once_a_packet_has_been_read() -> None:
     awc = agent(triangle(3), "RC")
-    said = told(awc, ("RA", Ok((1,), 0)), ("RB", Ok((2,), 0)))
+    said = replies(awc, ("RA", Ok((1,), 0)), ("RB", Ok((2,), 0)))
     assert said == [(name, Ok((3,), 0)) for name in ("RA", "RB", "RD")]
 
 
 def test_of_the_allowed_values_the_one_with_fewest_conflicts_with_lower_robots_is_taken() -> None:
     awc = agent(triangle(3), "RB")
-    told(awc, ("RC", Ok((2,), 0)), ("RA", Ok((1,), 0)))
+    replies(awc, ("RC", Ok((2,), 0)), ("RA", Ok((1,), 0)))
     assert value(awc) == (3,)
 
 
 def test_a_nogood_with_lower_robots_counts_as_a_conflict() -> None:
     awc = agent(triangle(3), "RB")
-    told(awc, ("RC", Ok((1,), 0)), ("RC", nogood({"RB": (2,), "RC": (1,)})))
-    told(awc, ("RA", Ok((1,), 0)))
+    replies(awc, ("RC", Ok((1,), 0)), ("RC", nogood({"RB": (2,), "RC": (1,)})))
+    replies(awc, ("RA", Ok((1,), 0)))
     assert value(awc) == (3,)
 
 
 def test_backtrack_tells_the_nogood_to_all_robots_in_it_and_goes_above_all_neighbours() -> None:
     awc = agent(triangle(), "RC")
-    said = told(awc, ("RA", Ok((1,), 3)), ("RB", Ok((2,), 5)), ("RD", Ok((1,), 7)))
+    said = replies(awc, ("RA", Ok((1,), 3)), ("RB", Ok((2,), 5)), ("RD", Ok((1,), 7)))
     learnt = Nogood({"RA": ((1,), 3), "RB": ((2,), 5)})
     assert said[:2] == [("RA", learnt), ("RB", learnt)]
     assert awc.priority == 8
@@ -95,23 +83,23 @@ def test_backtrack_tells_the_nogood_to_all_robots_in_it_and_goes_above_all_neigh
 
 def test_backtrack_takes_the_value_with_fewest_conflicts_with_all_neighbours() -> None:
     awc = agent(triangle(), "RC")
-    said = told(awc, ("RA", Ok((1,), 0)), ("RB", Ok((2,), 0)), ("RD", Ok((1,), 0)))
+    said = replies(awc, ("RA", Ok((1,), 0)), ("RB", Ok((2,), 0)), ("RD", Ok((1,), 0)))
     assert value(awc) == (2,)
     assert said[2:] == [(name, Ok((2,), 1)) for name in ("RA", "RB", "RD")]
 
 
 def test_a_nogood_that_has_been_sent_before_is_not_sent_again_and_changes_nothing() -> None:
     awc = agent(triangle(), "RC")
-    told(awc, ("RA", Ok((1,), 0)), ("RB", Ok((2,), 0)))
-    assert told(awc, ("RA", Ok((1,), 2)), ("RB", Ok((2,), 2))) == []
+    replies(awc, ("RA", Ok((1,), 0)), ("RB", Ok((2,), 0)))
+    assert replies(awc, ("RA", Ok((1,), 2)), ("RB", Ok((2,), 2))) == []
     assert awc.priority == 1
-    assert told(awc, ("RA", Ok((2,), 2)), ("RB", Ok((1,), 2)))
+    assert replies(awc, ("RA", Ok((2,), 2)), ("RB", Ok((1,), 2)))
     assert awc.priority == 3
 
 
 def test_an_empty_nogood_ends_the_search_without_solution() -> None:
     awc = agent(triangle(1), "RA")
-    assert told(awc, ("RB", nogood({"RA": (1,)}))) == []
+    assert replies(awc, ("RB", nogood({"RA": (1,)}))) == []
     assert awc.verdict is Verdict.NO_SOLUTION
 
 
@@ -124,35 +112,35 @@ def test_an_empty_domain_is_an_empty_nogood() -> None:
 
 def test_nothing_is_said_after_the_verdict() -> None:
     awc = agent(triangle(1), "RA")
-    told(awc, ("RB", nogood({"RA": (1,)})))
-    assert told(awc, ("RB", AddLink()), ("RB", Ok((1,), 9))) == []
+    replies(awc, ("RB", nogood({"RA": (1,)})))
+    assert replies(awc, ("RB", AddLink()), ("RB", Ok((1,), 9))) == []
 
 
 def test_the_lowest_robot_of_a_nogood_keeps_to_it() -> None:
     awc = agent(triangle(3), "RB")
-    assert told(awc, ("RA", Ok((2,), 0)), ("RA", nogood({"RA": (2,), "RB": (1,)}))) != []
+    assert replies(awc, ("RA", Ok((2,), 0)), ("RA", nogood({"RA": (2,), "RB": (1,)}))) != []
     assert value(awc) == (3,)
 
 
 def test_a_robot_that_is_not_the_lowest_of_a_nogood_keeps_to_it_only_once_it_is() -> None:
     awc = agent(triangle(3), "RA")
-    assert told(awc, ("RB", Ok((2,), 0)), ("RB", nogood({"RA": (1,), "RB": (2,)}))) == []
-    assert told(awc, ("RB", Ok((2,), 1))) == [("RB", Ok((3,), 0)), ("RC", Ok((3,), 0))]
+    assert replies(awc, ("RB", Ok((2,), 0)), ("RB", nogood({"RA": (1,), "RB": (2,)}))) == []
+    assert replies(awc, ("RB", Ok((2,), 1))) == [("RB", Ok((3,), 0)), ("RC", Ok((3,), 0))]
 
 
 def test_nogoods_are_kept_for_good() -> None:
     awc = agent(triangle(3), "RB")
-    told(awc, ("RA", Ok((2,), 0)), ("RA", nogood({"RA": (2,), "RB": (1,)})))
+    replies(awc, ("RA", Ok((2,), 0)), ("RA", nogood({"RA": (2,), "RB": (1,)})))
     assert value(awc) == (3,)
-    told(awc, ("RA", Ok((3,), 0)))
+    replies(awc, ("RA", Ok((3,), 0)))
     assert value(awc) == (1,)
-    told(awc, ("RA", Ok((2,), 0)))
+    replies(awc, ("RA", Ok((2,), 0)))
     assert value(awc) == (3,)
 
 
 def test_a_nogood_with_a_robot_that_is_no_neighbour_makes_it_one_and_is_believed() -> None:
     awc = agent(triangle(), "RA")
-    said = told(awc, ("RC", Nogood({"RA": ((1,), 0), "RD": ((2,), 4)})))
+    said = replies(awc, ("RC", Nogood({"RA": ((1,), 0), "RD": ((2,), 4)})))
     assert said[:2] == [("RD", AddLink()), ("RD", Ok((1,), 0))]
     assert said[2:] == [(name, Ok((2,), 0)) for name in ("RB", "RC", "RD")]
     assert (awc.view["RD"], awc.priorities["RD"]) == ((2,), 4)
@@ -160,20 +148,20 @@ def test_a_nogood_with_a_robot_that_is_no_neighbour_makes_it_one_and_is_believed
 
 def test_what_a_nogood_says_of_a_neighbour_is_not_believed() -> None:
     awc = agent(triangle(), "RA")
-    told(awc, ("RC", Nogood({"RA": ((1,), 0), "RB": ((2,), 4)})))
+    replies(awc, ("RC", Nogood({"RA": ((1,), 0), "RB": ((2,), 4)})))
     assert awc.view == {}
 
 
 def test_add_link_tells_the_value_to_the_new_neighbour_now_and_later() -> None:
     awc = agent(triangle(), "RA")
-    assert told(awc, ("RD", AddLink())) == [("RD", Ok((1,), 0))]
-    assert ("RD", Ok((2,), 0)) in told(awc, ("RB", nogood({"RA": (1,)})))
+    assert replies(awc, ("RD", AddLink())) == [("RD", Ok((1,), 0))]
+    assert ("RD", Ok((2,), 0)) in replies(awc, ("RB", nogood({"RA": (1,)})))
 
 
 def test_add_link_twice_is_one_link() -> None:
     awc = agent(triangle(), "RA")
-    told(awc, ("RD", AddLink()), ("RD", AddLink()))
-    said = told(awc, ("RB", nogood({"RA": (1,)})))
+    replies(awc, ("RD", AddLink()), ("RD", AddLink()))
+    said = replies(awc, ("RB", nogood({"RA": (1,)})))
     assert [receiver for receiver, _ in said].count("RD") == 1
 
 
@@ -181,17 +169,17 @@ def test_an_n_ary_constraint_is_checked_by_the_lowest_robot_at_present() -> None
     odd = Relation("R", 3, Semantics.SUPPORTS, ((1, 1, 2), (1, 2, 1), (2, 1, 1)))
     team = team_of(dict.fromkeys("ABC", range(1, 3)), [Constraint("C", odd, ("A", "B", "C"), ("A", "B", "C"))])
     awc = agent(team, "RA")
-    assert told(awc, ("RB", Ok((1,), 0)), ("RC", Ok((1,), 1))) == []
+    assert replies(awc, ("RB", Ok((1,), 0)), ("RC", Ok((1,), 1))) == []
     assert awc.problem.checks == 0
-    assert told(awc, ("RB", Ok((1,), 1))) == [("RB", Ok((2,), 0)), ("RC", Ok((2,), 0))]
+    assert replies(awc, ("RB", Ok((1,), 1))) == [("RB", Ok((2,), 0)), ("RC", Ok((2,), 0))]
 
 
 def test_what_is_known_to_hold_is_not_checked_again() -> None:
     awc = agent(triangle(3), "RB")
-    told(awc, ("RA", Ok((2,), 0)))
+    replies(awc, ("RA", Ok((2,), 0)))
     checks = awc.problem.checks
     assert checks
-    told(awc, ("RC", Ok((1,), 0)), ("RA", Ok((2,), 0)))
+    replies(awc, ("RC", Ok((1,), 0)), ("RA", Ok((2,), 0)))
     assert awc.problem.checks == checks
 
 
@@ -200,9 +188,9 @@ def test_a_nogood_that_names_a_part_of_a_value_rules_out_all_that_look_alike() -
     domains = {"A1": (1, 2), "A2": (1, 2), "B": (1, 2)}
     awc = agent(complex_team(owned, domains, [differ("A1", "B"), differ("A2", "B")]), "RA")
     assert value(awc) == (1, 1)
-    told(awc, ("RB", nogood({"RA": (1, None)})))
+    replies(awc, ("RB", nogood({"RA": (1, None)})))
     assert value(awc) == (2, 1)
-    told(awc, ("RB", nogood({"RA": (None, 1)})))
+    replies(awc, ("RB", nogood({"RA": (None, 1)})))
     assert value(awc) == (2, 2)
 
 

@@ -10,8 +10,8 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.bnb_adopt import BnBADOPT, Cost, Value
 from robochoc.protocols.bounding import Terminate
-from tests.support.agents import told, value
-from tests.support.trees import context, placed, priced, root, to
+from tests.support.agents import replies, value
+from tests.support.pseudo_trees import context, placed, priced, root, to
 
 TEAM = priced(
     "ZABCDE", {"ZA": [0] * 4, "ZB": [0, 1, 2, 0], "AB": [0, 3, 1, 0], "BC": [0] * 4, "BD": [0] * 4, "BE": [0] * 4}
@@ -29,7 +29,7 @@ def middle() -> BnBADOPT:
 def informed(threshold: float = INFINITE) -> BnBADOPT:
     """B, when it knows the values above, both 1."""
     adopt = middle()
-    told(adopt, ("RZ", Value((1,), 1)), ("RA", Value((1,), 1, threshold)))
+    replies(adopt, ("RZ", Value((1,), 1)), ("RA", Value((1,), 1, threshold)))
     return adopt
 
 
@@ -46,8 +46,8 @@ def test_start_takes_the_value_with_the_least_lower_bound_and_tells_all_around()
 
 def test_priority_merge_keeps_the_larger_id_whoever_tells() -> None:
     adopt = informed()
-    told(adopt, ("RC", Cost(context(B=1, X=(1, 2), A=(2, 2)), 4, 7)))
-    told(adopt, ("RD", Cost(context(B=1, X=(2, 1)), 5, 7)), ("RA", Value((1,), 1)))
+    replies(adopt, ("RC", Cost(context(B=1, X=(1, 2), A=(2, 2)), 4, 7)))
+    replies(adopt, ("RD", Cost(context(B=1, X=(2, 1)), 5, 7)), ("RA", Value((1,), 1)))
     assert adopt.context == context(A=(2, 2), Z=1, X=(1, 2))
     assert adopt.bounds["RC"].lb == [4, 0]
     assert adopt.bounds["RD"].lb == [0, 0]
@@ -55,8 +55,8 @@ def test_priority_merge_keeps_the_larger_id_whoever_tells() -> None:
 
 def test_a_changed_value_voids_the_bounds_of_children_that_depend_on_it_and_the_threshold() -> None:
     adopt = informed(threshold=9)
-    told(adopt, ("RC", Cost(context(B=1, Z=1), 4, 7)), ("RD", Cost(context(B=1, A=1), 3, 3)))
-    told(adopt, ("RZ", Value((2,), 2)))
+    replies(adopt, ("RC", Cost(context(B=1, Z=1), 4, 7)), ("RD", Cost(context(B=1, A=1), 3, 3)))
+    replies(adopt, ("RZ", Value((2,), 2)))
     assert (adopt.bounds["RC"].lb, adopt.bounds["RC"].ub) == ([0, 0], [INFINITE, INFINITE])
     assert (adopt.bounds["RD"].lb, adopt.bounds["RD"].ub) == ([3, 0], [3, INFINITE])
     assert adopt.threshold == INFINITE
@@ -64,7 +64,7 @@ def test_a_changed_value_voids_the_bounds_of_children_that_depend_on_it_and_the_
 
 def test_a_value_that_was_not_known_voids_no_threshold_but_the_own_value_is_chosen_anew() -> None:
     adopt = middle()
-    told(adopt, ("RA", Value((2,), 1, 9)), ("RZ", Value((2,), 1)))
+    replies(adopt, ("RA", Value((2,), 1, 9)), ("RZ", Value((2,), 1)))
     assert adopt.threshold == 9
     assert value(adopt) == (2,)
 
@@ -72,34 +72,34 @@ def test_a_value_that_was_not_known_voids_no_threshold_but_the_own_value_is_chos
 def test_init_self_takes_the_value_with_the_least_lower_bound() -> None:
     adopt = informed()
     assert value(adopt) == (1,)
-    said = told(adopt, ("RZ", Value((2,), 2)), ("RA", Value((2,), 2)))
+    said = replies(adopt, ("RZ", Value((2,), 2)), ("RA", Value((2,), 2)))
     assert value(adopt) == (2,)
     assert to("RE", said) == [Value((2,), 2)]
 
 
 def test_a_value_is_kept_until_it_is_no_better_than_the_best_known() -> None:
     adopt = informed()
-    told(adopt, *both(Cost(context(B=1), 0, 5)))
+    replies(adopt, *both(Cost(context(B=1), 0, 5)))
     assert adopt.ub == 10
-    told(adopt, *both(Cost(context(B=1), 3, 5)))
+    replies(adopt, *both(Cost(context(B=1), 3, 5)))
     assert list(adopt.lower) == [6, 4]
     assert value(adopt) == (1,)
-    told(adopt, *both(Cost(context(B=1), 5, 5)))
+    replies(adopt, *both(Cost(context(B=1), 5, 5)))
     assert value(adopt) == (2,)
 
 
 def test_a_value_is_kept_until_it_is_dearer_than_the_threshold() -> None:
     adopt = informed(threshold=6)
-    told(adopt, *both(Cost(context(B=1), 2, 5)))
+    replies(adopt, *both(Cost(context(B=1), 2, 5)))
     assert value(adopt) == (1,)
-    told(adopt, *both(Cost(context(B=1), 3, 5)))
+    replies(adopt, *both(Cost(context(B=1), 3, 5)))
     assert value(adopt) == (2,)
 
 
 def test_when_the_bounds_meet_the_value_is_the_one_that_is_known_to_cost_that() -> None:
     adopt = root(BnBADOPT)
-    told(adopt, *both(Cost(context(B=1), 1, INFINITE)))
-    said = told(adopt, *both(Cost(context(B=2), 0, 0)))
+    replies(adopt, *both(Cost(context(B=1), 1, INFINITE)))
+    said = replies(adopt, *both(Cost(context(B=2), 0, 0)))
     assert list(adopt.lower) == [2, 2]
     assert value(adopt) == (2,)
     assert to("RC", said) == [Value((2,), 2, 0), Terminate(context(B=(2, 2)))]
@@ -107,56 +107,56 @@ def test_when_the_bounds_meet_the_value_is_the_one_that_is_known_to_cost_that() 
 
 def test_a_child_s_threshold_is_what_is_left_when_the_others_cost_the_least() -> None:
     adopt = root(BnBADOPT)
-    said = told(adopt, ("RC", Cost(context(B=1), 4, 7)), ("RD", Cost(context(B=1), 1, 2)))
+    said = replies(adopt, ("RC", Cost(context(B=1), 4, 7)), ("RD", Cost(context(B=1), 1, 2)))
     assert adopt.ub == 9
     assert said == []  # lower thresholds alone are not worth a message
-    said = told(adopt, ("RC", Cost(context(B=1), 4, 7, True)), ("RD", Cost(context(B=1), 1, 2, True)))
+    said = replies(adopt, ("RC", Cost(context(B=1), 4, 7, True)), ("RD", Cost(context(B=1), 1, 2, True)))
     assert said == [("RC", Value((1,), 1, 8)), ("RD", Value((1,), 1, 5))]
 
 
 def test_pseudo_children_get_no_threshold() -> None:
     adopt = informed(threshold=6)
-    said = told(adopt, ("RZ", Value((2,), 2)), ("RA", Value((2,), 2, 6)))
+    said = replies(adopt, ("RZ", Value((2,), 2)), ("RA", Value((2,), 2, 6)))
     assert [message.threshold for message in to("RE", said) if isinstance(message, Value)] == [INFINITE]
     assert [message.threshold for message in to("RC", said) if isinstance(message, Value)] == [6]
 
 
 def test_a_threshold_is_asked_for_once_after_it_was_dropped() -> None:
     adopt = informed(threshold=9)
-    said = told(adopt, ("RZ", Value((2,), 2)))
+    said = replies(adopt, ("RZ", Value((2,), 2)))
     assert to("RA", said) == [Cost(context(A=1, Z=(2, 2)), 2, INFINITE, True)]
-    assert told(adopt, ("RZ", Value((2,), 2))) == []
+    assert replies(adopt, ("RZ", Value((2,), 2))) == []
 
 
 def test_a_threshold_that_comes_with_the_change_is_not_asked_for() -> None:
     adopt = informed(threshold=9)
-    said = told(adopt, ("RA", Value((2,), 2, 7)))
+    said = replies(adopt, ("RA", Value((2,), 2, 7)))
     assert adopt.threshold == 7
     assert to("RA", said) == [Cost(context(A=(2, 2), Z=1), 1, INFINITE)]
 
 
 def test_a_child_that_asks_for_its_threshold_is_told_the_same_again() -> None:
     adopt = informed(threshold=9)
-    said = told(adopt, ("RC", Cost(context(B=1), 0, INFINITE, True)))
+    said = replies(adopt, ("RC", Cost(context(B=1), 0, INFINITE, True)))
     assert said == [("RC", Value((1,), 1, 9))]
 
 
 def test_a_higher_threshold_is_told_though_the_value_is_the_same() -> None:
     adopt = informed()
-    told(adopt, ("RA", Value((1,), 1, 5)), ("RC", Cost(context(B=1), 0, INFINITE, True)))
-    said = told(adopt, ("RA", Value((1,), 1, 6)))
+    replies(adopt, ("RA", Value((1,), 1, 5)), ("RC", Cost(context(B=1), 0, INFINITE, True)))
+    said = replies(adopt, ("RA", Value((1,), 1, 6)))
     assert said == [("RC", Value((1,), 1, 6))]
 
 
 def test_nothing_else_is_told_twice() -> None:
     adopt = informed()
-    assert told(adopt, ("RA", Value((1,), 1, 8)), ("RC", Cost(context(B=1), 0, INFINITE))) == []
+    assert replies(adopt, ("RA", Value((1,), 1, 8)), ("RC", Cost(context(B=1), 0, INFINITE))) == []
 
 
 def test_the_same_value_with_a_new_id_voids_nothing_and_the_cost_is_told_again() -> None:
     adopt = informed()
-    told(adopt, ("RC", Cost(context(B=1, A=1), 4, 7)))
-    said = told(adopt, ("RA", Value((1,), 3)))
+    replies(adopt, ("RC", Cost(context(B=1, A=1), 4, 7)))
+    said = replies(adopt, ("RA", Value((1,), 3)))
     assert adopt.bounds["RC"].lb == [4, 0]
     assert said == [("RA", Cost(context(A=(1, 3), Z=1), 4, INFINITE))]
 
@@ -164,41 +164,41 @@ def test_the_same_value_with_a_new_id_voids_nothing_and_the_cost_is_told_again()
 def test_the_last_value_goes_to_all_neighbours_below() -> None:
     team = priced("BCD", {"B": [0, 2], "BC": [0] * 4, "BD": [0] * 4})
     adopt = placed(BnBADOPT, team, "RB", children=["RC"], pseudo_children=["RD"])
-    said = told(adopt, ("RC", Cost(context(B=1), 5, 5)), ("RC", Cost(context(B=2), 2, 2)))
+    said = replies(adopt, ("RC", Cost(context(B=1), 5, 5)), ("RC", Cost(context(B=2), 2, 2)))
     assert to("RD", said) == [Value((1,), 1), Value((2,), 2)]
     assert to("RC", said)[-1] == Terminate(context(B=(2, 2)))
 
 
 def test_another_robot_ends_only_after_its_parent() -> None:
     adopt = informed()
-    told(adopt, *both(Cost(context(B=1), 1, 1)))
+    replies(adopt, *both(Cost(context(B=1), 1, 1)))
     assert adopt.lb == adopt.ub == 2
     assert not adopt.terminated
-    said = told(adopt, ("RA", Terminate(context(Z=1, A=1, X=2))))
+    said = replies(adopt, ("RA", Terminate(context(Z=1, A=1, X=2))))
     assert said == [(child, Terminate(context(Z=1, A=1, X=2, B=1))) for child in ("RC", "RD")]
-    assert told(adopt, ("RA", Value((2,), 2))) == []
+    assert replies(adopt, ("RA", Value((2,), 2))) == []
 
 
 def test_a_robot_goes_on_after_its_parent_s_end_until_its_bounds_meet_and_tells_it_nothing() -> None:
     adopt = informed(threshold=1)
-    said = told(adopt, ("RA", Terminate(context(Z=1, A=(2, 2)))))
+    said = replies(adopt, ("RA", Terminate(context(Z=1, A=(2, 2)))))
     assert adopt.threshold == INFINITE
     assert not adopt.terminated
-    said += told(adopt, *both(Cost(context(B=1, A=(2, 2)), 0, 0)))
+    said += replies(adopt, *both(Cost(context(B=1, A=(2, 2)), 0, 0)))
     assert to("RA", said) == []
     assert said[-2:] == [(child, Terminate(context(Z=1, A=(2, 2), B=1))) for child in ("RC", "RD")]
 
 
 def test_a_root_that_finds_all_values_infinite_ends_the_search_of_all() -> None:
     adopt = root(BnBADOPT)
-    told(adopt, ("RC", Cost(context(B=2), INFINITE, INFINITE)))
-    assert told(adopt, ("RC", Cost(context(B=1), INFINITE, INFINITE))) == []
+    replies(adopt, ("RC", Cost(context(B=2), INFINITE, INFINITE)))
+    assert replies(adopt, ("RC", Cost(context(B=1), INFINITE, INFINITE))) == []
     assert adopt.verdict is Verdict.NO_SOLUTION
 
 
 def test_another_robot_that_finds_all_values_infinite_says_so() -> None:
     adopt = informed(threshold=5)
-    said = told(adopt, *both(*(Cost(context(B=number), INFINITE, INFINITE, True) for number in (1, 2))))
+    said = replies(adopt, *both(*(Cost(context(B=number), INFINITE, INFINITE, True) for number in (1, 2))))
     assert to("RA", said) == [Cost(context(A=1, Z=1), INFINITE, INFINITE)]
     assert to("RC", said) == [Value((1,), 1, 0)]
 

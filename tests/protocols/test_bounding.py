@@ -14,9 +14,9 @@ from robochoc.model.problem import INFINITE
 from robochoc.protocols import adopt, bnb_adopt
 from robochoc.protocols.bounding import BoundingProtocol, Terminate
 from robochoc.run.incumbent import bound_of
-from tests.support.agents import told
+from tests.support.agents import replies
 from tests.support.cost_problems import least_cost, random_cost_team
-from tests.support.trees import context, placed, priced, root, to, unplaced
+from tests.support.pseudo_trees import context, placed, priced, root, to, unplaced
 
 
 class Family(NamedTuple):
@@ -37,7 +37,7 @@ class Family(NamedTuple):
     def informed(self) -> BoundingProtocol:
         """B, when it knows the values above, both 1."""
         robot = self.middle()
-        told(robot, ("RZ", self.value((1,), 1)), ("RA", self.value((1,), 1)))
+        replies(robot, ("RZ", self.value((1,), 1)), ("RA", self.value((1,), 1)))
         return robot
 
 
@@ -53,22 +53,22 @@ def test_nothing_is_known_of_ub_before_all_neighbours_above_have_told_their_valu
     protocol, value, cost = family
     team = priced("ZAB", {"ZB": [0, 1, 2, 0], "AB": [0, 3, 1, 0]})
     robot = placed(protocol, team, "RB", "RA", pseudo_parents=["RZ"])
-    said = told(robot, ("RA", value((2,), 1)))
+    said = replies(robot, ("RA", value((2,), 1)))
     assert said == [("RA", cost({}, 0, INFINITE)), ("RA", cost(context(A=2), 0, INFINITE))]
-    assert told(robot, ("RZ", value((1,), 1))) == [("RA", cost(context(A=2, Z=1), 1, 1))]
+    assert replies(robot, ("RZ", value((1,), 1))) == [("RA", cost(context(A=2, Z=1), 1, 1))]
 
 
 @both
 def test_one_decision_is_taken_for_all_that_has_come(family: Family) -> None:
     _, value, cost = family
-    said = told(family.middle(), ("RA", value((2,), 1)), ("RA", value((1,), 2)), ("RZ", value((2,), 1)))
+    said = replies(family.middle(), ("RA", value((2,), 1)), ("RA", value((1,), 2)), ("RZ", value((2,), 1)))
     assert to("RA", said) == [cost(context(A=(1, 2), Z=2), 2, INFINITE)]
 
 
 @both
 def test_a_cost_that_does_not_know_the_own_value_only_tells_of_others(family: Family) -> None:
     robot = family.informed()
-    told(robot, ("RC", family.cost(context(X=2), 4, 7)))
+    replies(robot, ("RC", family.cost(context(X=2), 4, 7)))
     assert robot.bounds["RC"].lb == [0, 0]
     assert robot.context == context(A=1, Z=1, X=2)
 
@@ -76,7 +76,7 @@ def test_a_cost_that_does_not_know_the_own_value_only_tells_of_others(family: Fa
 @both
 def test_of_two_bounds_in_one_context_the_better_one_is_kept(family: Family) -> None:
     robot = family.informed()
-    told(robot, ("RC", family.cost(context(B=1), 4, 6)), ("RC", family.cost(context(B=1), 3, 7)))
+    replies(robot, ("RC", family.cost(context(B=1), 4, 6)), ("RC", family.cost(context(B=1), 3, 7)))
     assert (robot.bounds["RC"].lb, robot.bounds["RC"].ub) == ([4, 0], [6, INFINITE])
 
 
@@ -87,21 +87,21 @@ def test_an_n_ary_constraint_is_paid_by_its_lowest_robot_once_it_knows_the_other
     top = placed(protocol, team, "RA", children=["RB"], pseudo_children=["RC"])
     assert list(top.lower) == [0, 0]
     robot = placed(protocol, team, "RC", "RB", pseudo_parents=["RA"])
-    told(robot, ("RB", value((2,), 1)))
+    replies(robot, ("RB", value((2,), 1)))
     assert list(robot.lower) == [0, 0]
     assert robot.problem.checks == 0
-    assert told(robot, ("RA", value((2,), 1))) == [("RB", cost(context(A=2, B=2), 6, 6))]
+    assert replies(robot, ("RA", value((2,), 1))) == [("RB", cost(context(A=2, B=2), 6, 6))]
 
 
 @both
 def test_a_root_whose_bounds_meet_ends_and_says_so(family: Family) -> None:
     robot = root(family.protocol)
-    told(robot, ("RC", family.cost(context(B=1), 1, 1)))
+    replies(robot, ("RC", family.cost(context(B=1), 1, 1)))
     assert robot.findings.bound == 1
     assert not robot.terminated
-    said = told(robot, ("RD", family.cost(context(B=1), 0, 0)))
+    said = replies(robot, ("RD", family.cost(context(B=1), 0, 0)))
     assert said == [("RC", Terminate(context(B=1))), ("RD", Terminate(context(B=1)))]
-    assert told(robot, ("RC", family.cost(context(B=1), 7, 7))) == []
+    assert replies(robot, ("RC", family.cost(context(B=1), 7, 7))) == []
 
 
 def alone(family: Family, costs: list[float]) -> BoundingProtocol:

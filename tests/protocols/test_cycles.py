@@ -23,15 +23,15 @@ from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 from robochoc.verification.objective import withdrawal_cost
-from tests.support.agents import told
+from tests.support.agents import replies
 from tests.support.cost_problems import random_cost_team, random_hard_team
-from tests.support.courses import any_schedule, course_of, domains_of, played, robot_of, started
+from tests.support.local_search_runs import any_schedule, assignments_by_cycle, domains_of, played, robot_of, started
 from tests.support.problems import team_of
+from tests.support.small_teams import DIFFERENT
 
 ALL = pytest.mark.parametrize("protocol", [DSA, MGM, MGM2, MaxSum])
-DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2), (3, 3)))
 
 
 def chain(*, names: str = "ABC", values: int = 3) -> Team:
@@ -43,24 +43,24 @@ def chain(*, names: str = "ABC", values: int = 3) -> Team:
 def test_a_phase_is_over_when_all_neighbours_have_been_heard() -> None:
     robot = robot_of(DSA, chain(), "RB")
     assert started(robot) == [("RA", Value((1,))), ("RC", Value((1,)))]
-    assert told(robot, ("RA", Value((1,)))) == []
+    assert replies(robot, ("RA", Value((1,)))) == []
     assert robot.cycle == 0
-    assert told(robot, ("RC", Value((1,)))) == [("RA", Value((2,))), ("RC", Value((2,)))]
+    assert replies(robot, ("RC", Value((1,)))) == [("RA", Value((2,))), ("RC", Value((2,)))]
     assert robot.cycle == 1
 
 
 def test_what_a_neighbour_says_ahead_is_kept_for_its_phase() -> None:
     robot = robot_of(DSA, chain(), "RB")
     started(robot)
-    assert told(robot, ("RA", Value((2,))), ("RA", Value((1,)))) == []
-    assert told(robot, ("RC", Value((2,)))) == [("RA", Value((1,))), ("RC", Value((1,)))]
-    assert told(robot, ("RC", Value((2,)))) == [("RA", Value((3,))), ("RC", Value((3,)))]
+    assert replies(robot, ("RA", Value((2,))), ("RA", Value((1,)))) == []
+    assert replies(robot, ("RC", Value((2,)))) == [("RA", Value((1,))), ("RC", Value((1,)))]
+    assert replies(robot, ("RC", Value((2,)))) == [("RA", Value((3,))), ("RC", Value((3,)))]
 
 
 def test_a_packet_may_end_two_phases() -> None:
     robot = robot_of(DSA, chain(), "RB")
     started(robot)
-    told(robot, ("RA", Value((1,))), ("RA", Value((1,))), ("RC", Value((1,))), ("RC", Value((1,))))
+    replies(robot, ("RA", Value((1,))), ("RA", Value((1,))), ("RC", Value((1,))), ("RC", Value((1,))))
     assert robot.cycle == 2
 
 
@@ -68,7 +68,7 @@ def test_the_trail_has_an_entry_for_each_change() -> None:
     robot = robot_of(DSA, chain(names="AB"), "RB")
     started(robot)
     for value in (1, 1, 3, 2):
-        told(robot, ("RA", Value((value,))))
+        replies(robot, ("RA", Value((value,))))
     assert robot.findings.trail == Trail([(0, 0), (1, 1), (4, 0)], 4)
 
 
@@ -76,8 +76,8 @@ def test_after_so_many_cycles_a_robot_is_silent() -> None:
     robot = robot_of(DSA, chain(names="AB"), "RB")
     robot.settings = settings_of(DSA, {"cycles": "2"})  # type: ignore[assignment]
     started(robot)
-    assert told(robot, ("RA", Value((1,))))
-    assert told(robot, ("RA", Value((2,)))) == []
+    assert replies(robot, ("RA", Value((1,))))
+    assert replies(robot, ("RA", Value((2,)))) == []
     assert robot.cycle == 2
 
 
@@ -133,7 +133,7 @@ def test_the_answer_is_the_cheapest_cycle(protocol: type[CycleProtocol]) -> None
             result = played(team, protocol, Concurrent(seed), seed, cycles=12)
             if result.verdict is Verdict.NO_SOLUTION:
                 continue
-            costs = [sum(c.price(values) for c in team.constraints()) for values in course_of(team, result)]
+            costs = [sum(c.price(values) for c in team.constraints()) for values in assignments_by_cycle(team, result)]
             options = Options(protocol=name, runtime=Runtime.SIMULATOR, seed=seed, settings={"cycles": "12"})
             outcome = solve(team, options)
             assert outcome.cost == (None if min(costs) == float("inf") else min(costs))
@@ -151,7 +151,7 @@ def test_who_may_step_aside_does_so_rather_than_break_anything(protocol: type[Cy
         assert result.verdict is Verdict.SOLUTION
         found = best_of(CompiledTeam(team), result, price)
         assert found
-        assert not list(objections(team, found.assignment, _absent(team, found.assignment)))
+        assert not list(violations(team, found.assignment, _absent(team, found.assignment)))
         aside += len(_absent(team, found.assignment)) > 0
     assert aside > 10
 

@@ -24,7 +24,7 @@ from robochoc.protocols.traits import Traits
 from robochoc.run.orchestrator import Options, Runtime, solve
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import told
+from tests.support.agents import replies
 from tests.support.problems import team_of
 
 
@@ -36,7 +36,7 @@ class Greeter(TreeProtocol):
     """Greets all neighbours when it begins; `made` are all that there are, by name."""
 
     messages = TreeMessage | Hello
-    traits = Traits(costs=True, everywhere=True)
+    traits = Traits(costs=True, shared_scopes=True)
     made: ClassVar[dict[str, Greeter]] = {}
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -220,7 +220,7 @@ TEAM = graph("ABCDE", "AB BC BD CD DE")
 
 
 def robot(name: str, team: Team = TEAM) -> Greeter:
-    return Greeter(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
+    return Greeter(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
 
 
 def started(name: str) -> Greeter:
@@ -251,41 +251,41 @@ def test_a_robot_without_values_ends_the_search() -> None:
     greeter = robot("RA", team)
     greeter.start()
     assert greeter.verdict is Verdict.NO_SOLUTION
-    assert told(greeter, ("RB", Wave(1, "RB"))) == []
+    assert replies(greeter, ("RB", Wave(1, "RB"))) == []
     assert greeter.begun == 0
 
 
 def test_a_stronger_candidate_s_wave_goes_on() -> None:
-    assert told(started("RC"), ("RB", Wave(3, "RB"))) == [("RD", Wave(3, "RB"))]
+    assert replies(started("RC"), ("RB", Wave(3, "RB"))) == [("RD", Wave(3, "RB"))]
 
 
 @pytest.mark.parametrize("weaker", [Wave(1, "RA"), Wave(3, "RD")])
 def test_a_weaker_candidate_s_wave_ends(weaker: Wave) -> None:
     """Of equals, the one that is lower in the order is weaker."""
     greeter = started("RC")
-    told(greeter, ("RB", Wave(3, "RB")))
-    assert told(greeter, ("RD", weaker)) == []
+    replies(greeter, ("RB", Wave(3, "RB")))
+    assert replies(greeter, ("RD", weaker)) == []
 
 
 def test_back_from_all_neighbours_a_wave_goes_back_to_who_told_it_first() -> None:
     greeter = started("RC")
-    said = told(greeter, ("RB", Wave(3, "RB")), ("RD", Wave(3, "RD")), ("RD", Wave(3, "RB")))
+    said = replies(greeter, ("RB", Wave(3, "RB")), ("RD", Wave(3, "RD")), ("RD", Wave(3, "RB")))
     assert said == [("RD", Wave(3, "RB")), ("RB", Wave(3, "RB"))]
 
 
 def test_who_gets_the_own_wave_back_from_all_neighbours_is_the_root_and_sends_the_token() -> None:
     greeter = started("RB")
     others = (("RA", Wave(1, "RA")), ("RC", Wave(2, "RC")), ("RD", Wave(3, "RD")))
-    assert told(greeter, *others) == []
+    assert replies(greeter, *others) == []
     own = Wave(3, "RB")
-    assert told(greeter, ("RA", own), ("RC", own)) == []
-    assert told(greeter, ("RD", own)) == [("RD", Token(["RB"]))]
+    assert replies(greeter, ("RA", own), ("RC", own)) == []
+    assert replies(greeter, ("RD", own)) == [("RD", Token(["RB"]))]
 
 
 def test_the_token_comes_back_when_all_neighbours_are_in_the_tree() -> None:
     greeter = started("RC")
-    told(greeter, ("RB", Wave(3, "RB")), ("RD", Wave(3, "RD")))
-    said = told(greeter, ("RD", Token(["RB", "RD"])))
+    replies(greeter, ("RB", Wave(3, "RB")), ("RD", Wave(3, "RD")))
+    said = replies(greeter, ("RD", Token(["RB", "RD"])))
     assert said[0] == ("RD", Back(["RB", "RD", "RC"]))
     assert greeter.findings.place == PseudoTreeNode("RD", ("RB",))
 
@@ -293,12 +293,12 @@ def test_the_token_comes_back_when_all_neighbours_are_in_the_tree() -> None:
 def test_a_robot_begins_when_all_below_it_have_their_places() -> None:
     greeter = started("RD")
     waves = (("RB", Wave(3, "RB")), ("RC", Wave(2, "RC")), ("RE", Wave(1, "RE")))
-    told(greeter, *waves)
-    assert told(greeter, ("RB", Token(["RB"])), ("RC", Hello())) == [("RC", Token(["RB", "RD"]))]
-    assert told(greeter, ("RC", Back(["RB", "RD", "RC"]))) == [("RE", Token(["RB", "RD", "RC"]))]
+    replies(greeter, *waves)
+    assert replies(greeter, ("RB", Token(["RB"])), ("RC", Hello())) == [("RC", Token(["RB", "RD"]))]
+    assert replies(greeter, ("RC", Back(["RB", "RD", "RC"]))) == [("RE", Token(["RB", "RD", "RC"]))]
     assert not greeter.placed
     assert greeter.decided == 0
-    said = told(greeter, ("RE", Back(["RB", "RD", "RC", "RE"])))
+    said = replies(greeter, ("RE", Back(["RB", "RD", "RC", "RE"])))
     assert said[0] == ("RB", Back(["RB", "RD", "RC", "RE"]))
     assert [receiver for receiver, message in said if message == Hello()] == ["RB", "RC", "RE"]
     assert greeter.greeted == ["RC"]

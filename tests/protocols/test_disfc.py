@@ -18,7 +18,7 @@ from robochoc.formats.team import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Model, Team
+from robochoc.model.problem import Constraint, ConstraintModel, Team
 from robochoc.protocols.disfc import AddLink, DisFC, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver import filters
@@ -26,11 +26,17 @@ from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.filters import allows
-from tests.protocols.test_pkc import SECRETS, agrees, pair_team, part
-from tests.support.agents import told
+from tests.support.agents import replies
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.pkc_bytes import changed_where_nobody_was, nothing_hidden, renamed, restated, run
-from tests.support.pkc_problems import random_pkc_team, with_private_parts
+from tests.support.pkc_problems import (
+    SECRETS,
+    check_against_brute_force,
+    pkc_pair,
+    pkc_part,
+    random_pkc_team,
+    with_private_parts,
+)
 from tests.support.problems import random_team, team_of
 
 EVERYTHING = b"\x07"
@@ -38,7 +44,7 @@ EVERYTHING = b"\x07"
 
 
 def tkc(pair: str, *forbidden: tuple[int, int]) -> Constraint:
-    return replace(part(pair, *forbidden), model=Model.TKC)
+    return replace(pkc_part(pair, *forbidden), model=ConstraintModel.TKC)
 
 
 def differ(pair: str) -> Constraint:
@@ -51,7 +57,7 @@ def triangle() -> Team:
 
 
 def unstarted(team: Team, name: str) -> DisFC:
-    return DisFC(LocalProblem(agent_problems(team, everywhere=True)[name]), PriorityOrder(team.order))
+    return DisFC(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
 
 
 def agent(team: Team, name: str) -> DisFC:
@@ -79,25 +85,25 @@ def test_every_pair_of_a_filter_is_a_check() -> None:
 
 def test_a_value_that_a_filter_takes_away_is_left() -> None:
     robot = agent(triangle(), "RB")
-    assert told(robot, ("RA", Ok(5, b"\x06"))) == [("RC", Ok(2, b"\x05"))]
+    assert replies(robot, ("RA", Ok(5, b"\x06"))) == [("RC", Ok(2, b"\x05"))]
     assert robot.store[0] == {"RA": (5,)}
 
 
 def test_of_two_filters_that_take_a_value_away_the_highest_robots_is_to_blame() -> None:
     robot = agent(triangle(), "RC")
-    told(robot, ("RB", Ok(1, b"\x06")), ("RA", Ok(1, b"\x06")))
+    replies(robot, ("RB", Ok(1, b"\x06")), ("RA", Ok(1, b"\x06")))
     assert robot.store[0] == {"RA": (1,)}
 
 
 def test_a_value_that_all_filters_allow_is_kept_with_its_counter() -> None:
     robot = agent(triangle(), "RC")
-    assert told(robot, ("RA", Ok(1, b"\x03")), ("RB", Ok(1, b"\x05"))) == []
+    assert replies(robot, ("RA", Ok(1, b"\x03")), ("RB", Ok(1, b"\x05"))) == []
     assert robot.counter == 1
 
 
 def test_backtrack_tells_counters_to_the_lowest_robot_and_forgets_its_assignment() -> None:
     robot = agent(triangle(), "RC")
-    said = told(robot, ("RA", Ok(4, b"\x06")), ("RB", Ok(7, b"\x01")))
+    said = replies(robot, ("RA", Ok(4, b"\x06")), ("RB", Ok(7, b"\x01")))
     assert said == [("RB", Nogood({"RA": 4}, 7)), ("RD", Ok(2, b"\x05"))]
     assert robot.view == {"RA": 4}
     assert set(robot.filters) == {"RA"}
@@ -105,58 +111,58 @@ def test_backtrack_tells_counters_to_the_lowest_robot_and_forgets_its_assignment
 
 def test_a_coherent_nogood_about_the_present_counter_is_accepted() -> None:
     robot = agent(triangle(), "RB")
-    told(robot, ("RA", Ok(1, EVERYTHING)))
-    assert told(robot, ("RC", Nogood({"RA": 1}, 1))) == [("RC", Ok(2, b"\x05"))]
+    replies(robot, ("RA", Ok(1, EVERYTHING)))
+    assert replies(robot, ("RC", Nogood({"RA": 1}, 1))) == [("RC", Ok(2, b"\x05"))]
 
 
 def test_a_nogood_about_another_counter_is_ignored() -> None:
     robot = agent(triangle(), "RB")
-    assert told(robot, ("RC", Nogood({}, 2))) == []
+    assert replies(robot, ("RC", Nogood({}, 2))) == []
     assert robot.counter == 1
 
 
 def test_an_obsolete_nogood_about_the_present_counter_is_answered() -> None:
     robot = agent(triangle(), "RB")
-    told(robot, ("RA", Ok(2, EVERYTHING)))
-    assert told(robot, ("RC", Nogood({"RA": 1}, 1))) == [("RC", Ok(1, b"\x06"))]
+    replies(robot, ("RA", Ok(2, EVERYTHING)))
+    assert replies(robot, ("RC", Nogood({"RA": 1}, 1))) == [("RC", Ok(1, b"\x06"))]
 
 
 def test_nogoods_go_with_the_assignments_they_rest_on() -> None:
     robot = agent(triangle(), "RB")
-    told(robot, ("RA", Ok(1, b"\x06")))
-    told(robot, ("RA", Ok(2, EVERYTHING)))
+    replies(robot, ("RA", Ok(1, b"\x06")))
+    replies(robot, ("RA", Ok(2, EVERYTHING)))
     assert list(robot.store) == []
 
 
 def test_the_empty_nogood_ends_the_search() -> None:
     robot = agent(team_of({"A": (1,), "B": (1,)}, [differ("AB")]), "RA")
-    assert told(robot, ("RB", Nogood({}, 1))) == []
+    assert replies(robot, ("RB", Nogood({}, 1))) == []
     assert robot.verdict is Verdict.NO_SOLUTION
-    assert told(robot, ("RB", AddLink())) == []
+    assert replies(robot, ("RB", AddLink())) == []
 
 
 def test_a_value_that_comes_back_has_a_new_counter() -> None:
     robot = agent(triangle(), "RB")
-    told(robot, ("RA", Ok(1, b"\x06")))
-    told(robot, ("RA", Ok(2, b"\x01")))
+    replies(robot, ("RA", Ok(1, b"\x06")))
+    replies(robot, ("RA", Ok(2, b"\x01")))
     assert (robot.value, robot.counter) == (0, 3)
 
 
 def test_strangers_in_a_nogood_are_asked_for_a_link() -> None:
     team = team_of(dict.fromkeys("ABC", (1, 2)), [differ("AC"), differ("BC")])
     robot = agent(team, "RB")
-    assert told(robot, ("RC", Nogood({"RA": 3}, 1))) == [("RA", AddLink()), ("RC", Ok(2, b"\x01"))]
+    assert replies(robot, ("RC", Nogood({"RA": 3}, 1))) == [("RA", AddLink()), ("RC", Ok(2, b"\x01"))]
     assert robot.view == {"RA": 3}
 
 
 def test_who_asked_for_a_link_gets_a_filter_that_allows_everything_now_and_later() -> None:
     robot = agent(triangle(), "RA")
-    assert told(robot, ("RD", AddLink())) == [("RD", Ok(1, EVERYTHING))]
-    assert ("RD", Ok(2, EVERYTHING)) in told(robot, ("RB", Nogood({}, 1)), ("RD", AddLink()))
+    assert replies(robot, ("RD", AddLink())) == [("RD", Ok(1, EVERYTHING))]
+    assert ("RD", Ok(2, EVERYTHING)) in replies(robot, ("RB", Nogood({}, 1)), ("RD", AddLink()))
 
 
 def test_parts_go_down_and_up() -> None:
-    team = pair_team(part("AB", (1, 2)), part("AB", (1, 1)))
+    team = pkc_pair(pkc_part("AB", (1, 2)), pkc_part("AB", (1, 1)))
     higher, lower = unstarted(team, "RA"), unstarted(team, "RB")
     higher.start()
     lower.start()
@@ -165,21 +171,24 @@ def test_parts_go_down_and_up() -> None:
 
 
 def test_a_higher_robot_outside_a_filter_from_below_says_so() -> None:
-    robot = agent(pair_team(part("AB"), part("AB")), "RA")
-    assert told(robot, ("RB", Ok(1, b"\x03"))) == []
-    assert told(robot, ("RB", Ok(2, b"\x02"))) == [("RB", Nogood({"RA": 1}, 2))]
-    assert told(robot) == []
+    robot = agent(pkc_pair(pkc_part("AB"), pkc_part("AB")), "RA")
+    assert replies(robot, ("RB", Ok(1, b"\x03"))) == []
+    assert replies(robot, ("RB", Ok(2, b"\x02"))) == [("RB", Nogood({"RA": 1}, 2))]
+    assert replies(robot) == []
 
 
 def test_a_new_assignment_is_held_against_the_filters_from_below() -> None:
-    robot = agent(pair_team(part("AB"), part("AB")), "RA")
-    told(robot, ("RB", Ok(4, b"\x01")))
-    assert told(robot, ("RB", Nogood({}, 1))) == [("RB", Ok(2, b"\x03")), ("RB", Nogood({"RA": 2}, 4))]
+    robot = agent(pkc_pair(pkc_part("AB"), pkc_part("AB")), "RA")
+    replies(robot, ("RB", Ok(4, b"\x01")))
+    assert replies(robot, ("RB", Nogood({}, 1))) == [("RB", Ok(2, b"\x03")), ("RB", Nogood({"RA": 2}, 4))]
 
 
 def test_filters_are_over_the_declared_domain_of_all_that_the_receiver_shows() -> None:
     domains = dict.fromkeys(("A", "b", "B"), (1, 2))
-    constraints = [replace(part("Ab", (1, 1)), model=Model.TKC), replace(part("AB", (1, 2)), model=Model.TKC)]
+    constraints = [
+        replace(pkc_part("Ab", (1, 1)), model=ConstraintModel.TKC),
+        replace(pkc_part("AB", (1, 2)), model=ConstraintModel.TKC),
+    ]
     team = complex_team({"RA": ["A"], "RB": ["b", "B"]}, domains, constraints)
     (_, ok), *_ = [*unsaid(team, "RA")]
     assert isinstance(ok, Ok)
@@ -196,7 +205,7 @@ def unsaid(team: Team, name: str) -> list[tuple[str, Message]]:
 
 def test_a_domain_too_large_for_a_filter_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(filters, "LARGEST", 2)
-    Simulation(pair_team(part("AB"), None), DisFC, Concurrent(0))
+    Simulation(pkc_pair(pkc_part("AB"), None), DisFC, Concurrent(0))
     with pytest.raises(UnsupportedError, match="RA shows its neighbours 3 combinations of values"):
         Simulation(triangle(), DisFC, Concurrent(0))
 
@@ -214,7 +223,7 @@ def test_the_docstring_shows_what_happens() -> None:
 
 def test_disfc_agrees_with_brute_force() -> None:
     chance = Random("pkc disfc")
-    seen = Counter(agrees(random_pkc_team(chance), DisFC, chance) for _ in range(500))
+    seen = Counter(check_against_brute_force(random_pkc_team(chance), DisFC, chance) for _ in range(500))
     assert min(seen.values()) > 125, seen
 
 
@@ -222,8 +231,8 @@ def test_disfc_agrees_where_all_is_known_and_where_all_is_split() -> None:
     chance = Random("disfc split")
     for _ in range(40):
         team = random_team(chance, n_ary=False)
-        agrees(team, DisFC, chance)
-        agrees(with_private_parts(team, chance), DisFC, chance)
+        check_against_brute_force(team, DisFC, chance)
+        check_against_brute_force(with_private_parts(team, chance), DisFC, chance)
 
 
 def test_disfc_agrees_on_complex_robots() -> None:
@@ -234,7 +243,7 @@ def test_disfc_agrees_on_complex_robots() -> None:
         if all(len({team.owner[name] for name in c.variables}) < 3 for robot in team.robots for c in robot.shared):
             split = seen.total() % 2 == 1
             team = with_private_parts(team, chance) if split else team
-            agrees(team, DisFC, chance)
+            check_against_brute_force(team, DisFC, chance)
             seen[split] += 1
 
 

@@ -13,13 +13,14 @@ from robochoc.model.expression import Type, parse
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics
-from robochoc.protocols.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
+from robochoc.protocols.dpop import DPOP
+from robochoc.protocols.dpop_messages import UTIL, VALUE, Dimensions, Need, Proceed
 from robochoc.run.orchestrator import Options, Runtime, solve
-from tests.support.agents import told, value
+from tests.support.agents import replies, value
 from tests.support.cost_problems import with_costs
 from tests.support.dpop_robots import begun, dimensions, domain, leaf, products
 from tests.support.problems import team_of
-from tests.support.trees import placed
+from tests.support.pseudo_trees import placed
 
 
 def kinds(said: Sequence[tuple[str, Message]]) -> list[tuple[str, str]]:
@@ -33,8 +34,8 @@ def test_those_below_are_told_the_own_values() -> None:
 
 def test_a_leaf_tells_its_separator_once_all_above_have_told_their_values() -> None:
     robot = begun(products("ABC", "AB BC AC"), "RC", "BA")
-    assert told(robot, ("RB", domain())) == []
-    ((receiver, said),) = told(robot, ("RA", domain()))
+    assert replies(robot, ("RB", domain())) == []
+    ((receiver, said),) = replies(robot, ("RA", domain()))
     assert receiver == "RB"
     assert isinstance(said, Dimensions)
     assert (said.separator, said.dearest, said.induced_width, said.most.robot) == ({"RA": 3, "RB": 3}, 18, 2, "RC")
@@ -42,7 +43,7 @@ def test_a_leaf_tells_its_separator_once_all_above_have_told_their_values() -> N
 
 def test_a_separator_is_the_children_s_and_the_own_robots_above_without_the_robot_itself() -> None:
     robot = begun(products("ABCD", "AB BC CD AD"), "RC", "B", "D")
-    ((_, said),) = told(robot, ("RB", domain()), ("RD", dimensions({"RC": 3, "RA": 3}, 5, 2, Need(1 << 40, "RD"))))
+    ((_, said),) = replies(robot, ("RB", domain()), ("RD", dimensions({"RC": 3, "RA": 3}, 5, 2, Need(1 << 40, "RD"))))
     assert said == Dimensions({"RB": 3, "RA": 3}, 14, 2, Need(1 << 40, "RD"))
 
 
@@ -52,7 +53,9 @@ def test_a_neighbour_above_without_a_constraint_takes_no_axis() -> None:
     scope = ("A", "B", "C", "D")
     team = with_costs(team_of(dict.fromkeys("ABCD", (1, 2)), [Constraint("C", quarrel, scope, scope)]))
     robot = begun(team, "RC", "BA", "D")
-    ((_, said),) = told(robot, ("RB", domain((1, 2))), ("RA", domain((1, 2))), ("RD", dimensions({"RC": 2, "RA": 2})))
+    ((_, said),) = replies(
+        robot, ("RB", domain((1, 2))), ("RA", domain((1, 2))), ("RD", dimensions({"RC": 2, "RA": 2}))
+    )
     assert isinstance(said, Dimensions)
     assert said.separator == {"RA": 2}
 
@@ -62,11 +65,11 @@ def test_a_robot_with_one_value_takes_no_axis() -> None:
         team_of({"A": (1, 2), "B": (3,), "C": (2, 3)}, [*products("ABC", "AC BC").constraints()]),
     )
     robot = begun(team, "RC", "BA")
-    told(robot, ("RB", domain((3,))), ("RA", domain((1, 2))))
-    assert [said.costs for _, said in told(robot, ("RB", Proceed(["RA"]))) if isinstance(said, UTIL)] == [
+    replies(robot, ("RB", domain((3,))), ("RA", domain((1, 2))))
+    assert [said.costs for _, said in replies(robot, ("RB", Proceed(["RA"]))) if isinstance(said, UTIL)] == [
         bytes([8, 10])
     ]
-    told(robot, ("RB", VALUE([1])))
+    replies(robot, ("RB", VALUE([1])))
     assert value(robot) == (2,)
 
 
@@ -83,61 +86,61 @@ def test_a_pseudo_tree_may_be_wider_than_arrays_can_be_if_robots_have_one_value(
 
 def test_the_root_lets_all_proceed_once_all_fits() -> None:
     robot = begun(products("ABC", "AB BC AC"), "RA", below="B", further="C")
-    said = told(robot, ("RB", dimensions({"RA": 3})))
+    said = replies(robot, ("RB", dimensions({"RA": 3})))
     assert said[-1] == ("RB", Proceed(["RA"]))
 
 
 def test_axes_are_told_down_the_nearest_robot_first() -> None:
     team = products("ABCD", "AB BC CD AD BD")
     robot = begun(team, "RC", "B", "D")
-    told(robot, ("RB", domain()), ("RD", dimensions({"RA": 3, "RB": 3, "RC": 3})))
-    assert told(robot, ("RB", Proceed(["RB", "RA"]))) == [("RD", Proceed(["RC", "RB", "RA"]))]
+    replies(robot, ("RB", domain()), ("RD", dimensions({"RA": 3, "RB": 3, "RC": 3})))
+    assert replies(robot, ("RB", Proceed(["RB", "RA"]))) == [("RD", Proceed(["RC", "RB", "RA"]))]
 
 
 def test_no_constraint_is_checked_before_all_may_proceed() -> None:
     robot = leaf(products("ABC", "AB BC AC"))
     assert robot.problem.checks == 0
-    told(robot, ("RB", Proceed(["RB", "RA"])))
+    replies(robot, ("RB", Proceed(["RB", "RA"])))
     assert robot.problem.checks == 2 * 3 * 3
 
 
 def test_a_leaf_computes_and_sends_its_table() -> None:
     """For each combination of values above, what the cheapest own value costs."""
     robot = leaf(products("ABC", "AB BC AC"))
-    assert told(robot, ("RB", Proceed(["RB", "RA"]))) == [("RB", UTIL(1, bytes([2, 3, 4, 3, 4, 5, 4, 5, 6])))]
+    assert replies(robot, ("RB", Proceed(["RB", "RA"]))) == [("RB", UTIL(1, bytes([2, 3, 4, 3, 4, 5, 4, 5, 6])))]
 
 
 def test_a_table_waits_for_all_children_and_adds_up_what_they_say() -> None:
     robot = begun(products("ABCD", "AB BC BD"), "RB", "A", "CD")
-    told(robot, ("RA", domain()), ("RC", dimensions({"RB": 3})), ("RD", dimensions({"RB": 3})))
-    told(robot, ("RA", Proceed(["RA"])))
-    assert told(robot, ("RC", UTIL(1, bytes([9, 5, 1])))) == []
+    replies(robot, ("RA", domain()), ("RC", dimensions({"RB": 3})), ("RD", dimensions({"RB": 3})))
+    replies(robot, ("RA", Proceed(["RA"])))
+    assert replies(robot, ("RC", UTIL(1, bytes([9, 5, 1])))) == []
     # A's value times 1, 2, 3, and what C and D say of these.
-    assert told(robot, ("RD", UTIL(1, bytes([9, 0, 1])))) == [("RA", UTIL(1, bytes([5, 8, 11])))]
+    assert replies(robot, ("RD", UTIL(1, bytes([9, 0, 1])))) == [("RA", UTIL(1, bytes([5, 8, 11])))]
 
 
 def test_a_table_may_come_in_pieces() -> None:
     robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
-    told(robot, ("RA", domain()), ("RC", dimensions({"RB": 3})))
-    told(robot, ("RA", Proceed(["RA"])), ("RC", UTIL(1, bytes([9, 5]))))
-    assert kinds(told(robot, ("RC", UTIL(1, bytes([1]))))) == [("RA", "UTIL")]
+    replies(robot, ("RA", domain()), ("RC", dimensions({"RB": 3})))
+    replies(robot, ("RA", Proceed(["RA"])), ("RC", UTIL(1, bytes([9, 5]))))
+    assert kinds(replies(robot, ("RC", UTIL(1, bytes([1]))))) == [("RA", "UTIL")]
 
 
 def test_the_root_chooses_what_is_cheapest_and_knows_the_bound() -> None:
     robot = begun(products("AB", "AB"), "RA", below="B")
-    told(robot, ("RB", dimensions({"RA": 3})))
+    replies(robot, ("RB", dimensions({"RA": 3})))
     assert robot.findings.bound is None
-    assert told(robot, ("RB", UTIL(1, bytes([7, 4, 4])))) == [("RB", VALUE([1]))]
+    assert replies(robot, ("RB", UTIL(1, bytes([7, 4, 4])))) == [("RB", VALUE([1]))]
     assert value(robot) == (2,)
     assert robot.findings.bound == 4
 
 
 def test_a_value_message_lets_a_robot_choose_and_tell_its_children() -> None:
     robot = begun(products("ABCD", "AB BC CD AD"), "RC", "B", "D")
-    told(robot, ("RB", domain()), ("RD", dimensions({"RC": 3, "RA": 3})))
-    told(robot, ("RB", Proceed(["RB", "RA"])), ("RD", UTIL(1, bytes([9, 9, 9, 9, 9, 0, 9, 9, 9]))))
+    replies(robot, ("RB", domain()), ("RD", dimensions({"RC": 3, "RA": 3})))
+    replies(robot, ("RB", Proceed(["RB", "RA"])), ("RD", UTIL(1, bytes([9, 9, 9, 9, 9, 0, 9, 9, 9]))))
     assert value(robot) is None
-    assert told(robot, ("RB", VALUE([0, 2]))) == [("RD", VALUE([1, 2]))]
+    assert replies(robot, ("RB", VALUE([0, 2]))) == [("RD", VALUE([1, 2]))]
     assert value(robot) == (2,)
 
 
@@ -149,10 +152,10 @@ def test_a_table_of_broken_constraints_ends_the_search() -> None:
     never = Relation("R", 2, Semantics.SUPPORTS, ())
     team = with_costs(team_of(dict.fromkeys("AB", (1, 2)), [Constraint("C", never, ("A", "B"), ("A", "B"))]))
     robot = begun(team, "RB", "A")
-    told(robot, ("RA", domain((1, 2))))
-    assert told(robot, ("RA", Proceed(["RA"]))) == []
+    replies(robot, ("RA", domain((1, 2))))
+    assert replies(robot, ("RA", Proceed(["RA"]))) == []
     assert robot.verdict is Verdict.NO_SOLUTION
-    assert told(robot, ("RA", VALUE([0]))) == []
+    assert replies(robot, ("RA", VALUE([0]))) == []
 
 
 def test_a_robot_alone_takes_its_cheapest_value() -> None:

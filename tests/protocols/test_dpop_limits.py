@@ -13,12 +13,13 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message, encode
 from robochoc.model.problem import Constraint, Relation, Semantics
-from robochoc.protocols.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
+from robochoc.protocols.dpop import DPOP
+from robochoc.protocols.dpop_messages import UTIL, VALUE, Dimensions, Need, Proceed
 from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.solver.exact import EXACT
-from tests.support.agents import told
+from tests.support.agents import replies
 from tests.support.cost_problems import with_costs
 from tests.support.dpop_robots import PRODUCT, begun, dimensions, domain, leaf, products
 from tests.support.problems import ON_ONE_MACHINE, team_of
@@ -28,7 +29,7 @@ def test_over_the_limit_the_root_says_who_needs_how_much_before_any_table_is_mad
     robot = begun(products("ABC", "AB BC AC"), "RA", below="B", further="C")
     says = "RC needs 5,000,000,000 bytes for its tables, more than 1,073,741,824: the robots' pseudo-tree has induced"
     with pytest.raises(TooLargeError, match=re.escape(f"{says} width 7 (--set memory=BYTES raises the limit)")):
-        told(robot, ("RB", dimensions({"RA": 3}, width=7, most=Need(5_000_000_000, "RC"))))
+        replies(robot, ("RB", dimensions({"RA": 3}, width=7, most=Need(5_000_000_000, "RC"))))
     assert robot.problem.checks == 0
 
 
@@ -38,7 +39,7 @@ def test_a_robot_s_arrays_never_take_more_than_it_has_told() -> None:
     team = products(names, "AD BD CD DE", range(size))
     robot = begun(team, "RD", "CBA", "E")
     robot.problem.tables({f"R{name}": domain(range(size)).values for name in "ABC"})  # prices are remembered
-    ((_, said),) = told(
+    ((_, said),) = replies(
         robot,
         *((f"R{name}", domain(range(size))) for name in "ABC"),
         ("RE", dimensions({f"R{name}": size for name in "DCBA"}, dearest=200)),
@@ -47,8 +48,8 @@ def test_a_robot_s_arrays_never_take_more_than_it_has_told() -> None:
     table = UTIL(1, bytes(size**4))
     tracemalloc.start()
     try:
-        told(robot, ("RC", Proceed(["RC", "RB", "RA"])))
-        ((_, sent),) = told(robot, ("RE", table))
+        replies(robot, ("RC", Proceed(["RC", "RB", "RA"])))
+        ((_, sent),) = replies(robot, ("RE", table))
         left, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
@@ -61,10 +62,10 @@ def test_a_robot_s_arrays_never_take_more_than_it_has_told() -> None:
 def test_sizes_do_not_overflow() -> None:
     robot = begun(products("AB", "AB"), "RA", below="B")
     with pytest.raises(TooLargeError, match=r"RA needs more than 10\^308 bytes"):
-        told(robot, ("RB", dimensions({f"R{number}": 10**9 for number in range(99)})))
+        replies(robot, ("RB", dimensions({f"R{number}": 10**9 for number in range(99)})))
     robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
     sizes = {f"R{number}": 10**9 for number in range(9)}
-    ((_, said),) = told(robot, ("RA", domain()), ("RC", dimensions({"RB": 3, **sizes})))
+    ((_, said),) = replies(robot, ("RA", domain()), ("RC", dimensions({"RB": 3, **sizes})))
     assert isinstance(said, Dimensions)
     assert said.most.bytes == pytest.approx(3e81 * 3)  # a byte for a cell's cost, one for the choice, one on its way
     assert msgspec.msgpack.decode(encode(said), type=Dimensions) == said
@@ -73,7 +74,7 @@ def test_sizes_do_not_overflow() -> None:
 def test_costs_that_may_not_be_exact_end_the_run() -> None:
     robot = begun(products("AB", "AB"), "RA", below="B")
     with pytest.raises(TooLargeError, match=r"costs could add up to 2\^53 or more"):
-        told(robot, ("RB", dimensions({"RA": 3}, dearest=EXACT)))
+        replies(robot, ("RB", dimensions({"RA": 3}, dearest=EXACT)))
 
 
 @pytest.mark.parametrize("factor", [1, 60, 5000, 10**8, 10**14])
@@ -87,7 +88,7 @@ def test_costs_are_exact_up_to_there(factor: int) -> None:
     assert solve(team, Options(protocol="dpop", runtime=Runtime.SIMULATOR)).cost == 3 * (5 * factor + 4)
 
 
-@pytest.mark.parametrize("withdraw", [None, Withdrawal.FEWEST])
+@pytest.mark.parametrize("withdraw", [None, Withdrawal.MINIMUM])
 def test_a_run_over_the_limit_says_the_same_in_every_runtime(withdraw: Withdrawal | None) -> None:
     team = products("ABCDE", "AB BC AC AD BD CD AE")
     said = []
@@ -112,23 +113,23 @@ def test_what_is_no_number_of_bytes_is_refused(memory: str) -> None:
 
 def test_a_table_that_was_not_asked_for_is_refused() -> None:
     robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
-    told(robot, ("RA", domain()), ("RC", dimensions({"RB": 3})))
+    replies(robot, ("RA", domain()), ("RC", dimensions({"RB": 3})))
     with pytest.raises(ValueError, match="RC was not asked for a table"):
-        told(robot, ("RC", UTIL(1, bytes(3))))
+        replies(robot, ("RC", UTIL(1, bytes(3))))
 
 
 @pytest.mark.parametrize("costs", [b"", bytes(4), bytes([10, 0, 0])])
 def test_a_table_of_another_size_or_costs_above_the_bound_is_refused(costs: bytes) -> None:
     robot = begun(products("AB", "AB"), "RA", below="B")
-    told(robot, ("RB", dimensions({"RA": 3})))
+    replies(robot, ("RB", dimensions({"RA": 3})))
     with pytest.raises(ValueError, match=r"no piece|more than the most"):
-        told(robot, ("RB", UTIL(1, costs)))
+        replies(robot, ("RB", UTIL(1, costs)))
 
 
 def test_children_that_contradict_each_other_are_refused() -> None:
     robot = begun(products("ABCD", "AB BC BD"), "RB", "A", "CD")
     with pytest.raises(ValueError, match="RC says that RA has 4 values"):
-        told(robot, ("RA", domain()), ("RC", dimensions({"RA": 4})), ("RD", dimensions({"RA": 3})))
+        replies(robot, ("RA", domain()), ("RC", dimensions({"RA": 4})), ("RD", dimensions({"RA": 3})))
 
 
 @pytest.mark.parametrize(
@@ -136,17 +137,17 @@ def test_children_that_contradict_each_other_are_refused() -> None:
 )
 def test_who_speaks_twice_or_out_of_place_is_refused(sender: str, message: Message) -> None:
     robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
-    told(robot, ("RC", dimensions({"RB": 3})))
+    replies(robot, ("RC", dimensions({"RB": 3})))
     with pytest.raises(ValueError, match=f"{sender} had nothing to say"):
-        told(robot, (sender, message))
+        replies(robot, (sender, message))
 
 
 def test_who_has_no_room_does_not_proceed() -> None:
     """Though a root should never let it."""
     robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
-    told(robot, ("RA", domain()), ("RC", dimensions({"RB": 3, **{f"R{number}": 10**9 for number in range(9)}})))
+    replies(robot, ("RA", domain()), ("RC", dimensions({"RB": 3, **{f"R{number}": 10**9 for number in range(9)}})))
     with pytest.raises(ValueError, match="no room"):
-        told(robot, ("RA", Proceed(["RA", *(f"R{number}" for number in range(9))])))
+        replies(robot, ("RA", Proceed(["RA", *(f"R{number}" for number in range(9))])))
 
 
 @pytest.mark.parametrize(
@@ -161,27 +162,27 @@ def test_who_has_no_room_does_not_proceed() -> None:
 def test_dimensions_that_cannot_be_are_refused(said: Dimensions) -> None:
     robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
     with pytest.raises(ValueError, match="cannot be"):
-        told(robot, ("RC", said))
+        replies(robot, ("RC", said))
 
 
 def test_axes_that_are_not_the_separator_s_are_refused() -> None:
     with pytest.raises(ValueError, match="is none"):
-        told(leaf(products("ABC", "AB BC AC")), ("RB", Proceed(["RB"])))
+        replies(leaf(products("ABC", "AB BC AC")), ("RB", Proceed(["RB"])))
 
 
 @pytest.mark.parametrize("assignment", [[], [0], [0, 3], [-1, 0]])
 def test_values_that_are_none_are_refused(assignment: list[int]) -> None:
     robot = leaf(products("ABC", "AB BC AC"))
-    told(robot, ("RB", Proceed(["RB", "RA"])))
+    replies(robot, ("RB", Proceed(["RB", "RA"])))
     with pytest.raises(ValueError, match="are no values of RB, RA"):
-        told(robot, ("RB", VALUE(assignment)))
+        replies(robot, ("RB", VALUE(assignment)))
 
 
 def test_a_value_that_comes_twice_is_refused() -> None:
     robot = leaf(products("ABC", "AB BC AC"))
-    told(robot, ("RB", Proceed(["RB", "RA"])), ("RB", VALUE([0, 0])))
+    replies(robot, ("RB", Proceed(["RB", "RA"])), ("RB", VALUE([0, 0])))
     with pytest.raises(ValueError, match="RC has a value already"):
-        told(robot, ("RB", VALUE([0, 0])))
+        replies(robot, ("RB", VALUE([0, 0])))
 
 
 def test_the_limit_is_the_robots_too() -> None:

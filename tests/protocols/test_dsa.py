@@ -14,9 +14,16 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.cycles import Value
 from robochoc.protocols.dsa import DSA, DSASettings
-from tests.support.agents import told, value
+from tests.support.agents import replies, value
 from tests.support.cost_problems import random_cost_team
-from tests.support.courses import burden_of, course_of, domains_of, played, robot_of, started
+from tests.support.local_search_runs import (
+    assignments_by_cycle,
+    cost_of_assignment,
+    domains_of,
+    played,
+    robot_of,
+    started,
+)
 from tests.support.problems import team_of
 
 EQUAL_COSTS = Relation("E", 2, Semantics.SOFT, ((1, 1), (2, 2), (3, 3)), (1, 1, 1), 0)
@@ -39,7 +46,7 @@ def middle(*chances: float, variant: str = "A", values: int = 3) -> DSA:
 
 
 def hears(robot: DSA, left: int, right: int) -> tuple[int | None, ...] | None:
-    told(robot, ("RA", Value((left,))), ("RC", Value((right,))))
+    replies(robot, ("RA", Value((left,))), ("RC", Value((right,))))
     return value(robot)
 
 
@@ -52,7 +59,7 @@ def test_the_first_value_is_drawn_by_lot(lot: float, first: int) -> None:
 def test_the_value_is_told_in_each_cycle_also_if_it_is_the_old_one() -> None:
     robot = middle()
     for _ in range(2):
-        assert told(robot, ("RA", Value((3,))), ("RC", Value((3,)))) == [("RA", Value((1,))), ("RC", Value((1,)))]
+        assert replies(robot, ("RA", Value((3,))), ("RC", Value((3,)))) == [("RA", Value((1,))), ("RC", Value((1,)))]
 
 
 @pytest.mark.parametrize("variant", ["A", "B", "C"])
@@ -91,7 +98,7 @@ def test_what_the_own_value_costs_by_itself_is_no_conflict() -> None:
     constraints = [Constraint("C", EQUAL_COSTS, ("A", "B"), ("A", "B")), Constraint("P", prices, ("B",), ("B",))]
     robot = robot_of(DSA, team_of(dict.fromkeys("AB", (1, 2, 3)), constraints), "RB", 0.0, MOVES)
     started(robot)
-    told(robot, ("RA", Value((3,))))
+    replies(robot, ("RA", Value((3,))))
     assert value(robot) == (1,)
 
 
@@ -102,7 +109,7 @@ def test_breaking_less_is_better_than_paying_less() -> None:
     constraints = [Constraint("C", hard, ("A", "B"), ("A", "B")), Constraint("P", prices, ("B",), ("B",))]
     robot = robot_of(DSA, team_of(dict.fromkeys("AB", (1, 2)), constraints), "RB", 0.0, MOVES)
     started(robot)
-    told(robot, ("RA", Value((1,))))
+    replies(robot, ("RA", Value((1,))))
     assert value(robot) == (2,)
 
 
@@ -113,7 +120,7 @@ def test_an_n_ary_constraint_is_weighed_by_each_robot_of_its_scope() -> None:
     for name, others in (("RA", ("RB", "RC")), ("RB", ("RA", "RC")), ("RC", ("RA", "RB"))):
         robot = robot_of(DSA, team, name, 0.0, MOVES)
         started(robot)
-        told(robot, *((other, Value((1,))) for other in others))
+        replies(robot, *((other, Value((1,))) for other in others))
         assert value(robot) == (2,)
 
 
@@ -125,8 +132,8 @@ def test_variant_a_gets_better_on_the_whole() -> None:
         if all(domains_of(team).values()):
             result = played(team, DSA, Concurrent(seed), seed, cycles=20, variant="A")
             assert result.verdict is Verdict.SOLUTION
-            course = course_of(team, result)
-            first, last = burden_of(team, course[0]), burden_of(team, course[-1])
+            course = assignments_by_cycle(team, result)
+            first, last = cost_of_assignment(team, course[0]), cost_of_assignment(team, course[-1])
             better += last < first
             worse += last > first
     assert better > 40

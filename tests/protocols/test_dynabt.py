@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from robochoc.formats import PREDEFINED
-from robochoc.model.change import changed
-from robochoc.model.message import Message
+from robochoc.model.change import apply_changes
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
-    Change,
     Constraint,
     Domain,
     Parent,
@@ -30,39 +28,11 @@ from robochoc.protocols.dynabt import DynABT, Nogood
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.explanation import Invalidated, invalidated_by
-from tests.protocols.test_abt import DIFFERENT, differ, triangle
-from tests.support.agents import told, value
+from robochoc.solver.explanation import Invalidated
+from tests.support.agents import replies, value
+from tests.support.dynabt_robots import after, agent, change
 from tests.support.problems import team_of
-
-
-def agent(team: Team, name: str) -> DynABT:
-    """The protocol object of one robot, started, with nothing left to say."""
-    dynabt = DynABT(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
-    dynabt.start()
-    dynabt.outbox.clear()
-    return dynabt
-
-
-def change(dynabt: DynABT, old: Team, new: Team) -> None:
-    """Tell the robot what the runtime tells it between two epochs; nothing may be said meanwhile."""
-    name = dynabt.problem.agent
-    dynabt.change(LocalProblem(agent_problems(new)[name]), PriorityOrder(new.order), invalidated_by(old, new))
-    assert dynabt.outbox == []
-
-
-def after(dynabt: DynABT, team: Team, *changes: Change, quiet: bool = True) -> list[tuple[str, Message]]:
-    """What the robot says when it goes on after `changes`."""
-    change(dynabt, team, changed(team, changes))
-    dynabt.resume(quiet=quiet)
-    said = list(dynabt.outbox)
-    dynabt.outbox.clear()
-    return said
-
-
-def named(left: str, right: str, name: str) -> Constraint:
-    return Constraint(name, DIFFERENT, (left, right), (left, right))
-
+from tests.support.small_teams import DIFFERENT, differ, triangle
 
 CAB, CBC, CAC = "RB<RA:C", "RC<RB:C", "RC<RA:C"  # keys of the triangle's constraints
 
@@ -72,43 +42,43 @@ CAB, CBC, CAC = "RB<RA:C", "RC<RB:C", "RC<RA:C"  # keys of the triangle's constr
 
 def test_a_direct_conflict_is_explained_by_its_constraint() -> None:
     dynabt = agent(triangle(), "RB")
-    told(dynabt, ("RA", Ok((1,))))
+    replies(dynabt, ("RA", Ok((1,))))
     assert list(dynabt.store) == [{"RA": (1,)}]
     assert dynabt.store.because(0) == {CAB}
 
 
 def test_of_two_constraints_the_one_that_is_broken_explains() -> None:
     one_only = Constraint("one", DIFFERENT, ("A", 1), ("A", 1), model=None)
-    team = team_of(dict.fromkeys("AB", (1, 2)), [named("A", "B", "C1"), named("A", "B", "C2"), one_only])
+    team = team_of(dict.fromkeys("AB", (1, 2)), [differ("A", "B", "C1"), differ("A", "B", "C2"), one_only])
     dynabt = agent(team, "RB")
-    told(dynabt, ("RA", Ok((1,))))
+    replies(dynabt, ("RA", Ok((1,))))
     assert dynabt.store.because(0) == {"RB<RA:C1"}
 
 
 def test_a_resolvent_is_explained_by_what_it_resolves_and_by_the_own_domain() -> None:
     dynabt = agent(triangle(), "RC")
-    said = told(dynabt, ("RA", Ok((1,))), ("RB", Ok((2,))))
+    said = replies(dynabt, ("RA", Ok((1,))), ("RB", Ok((2,))))
     assert said[0] == ("RB", Nogood({"RA": (1,)}, (2,), [CAC, CBC, "RC="]))
 
 
 def test_a_nogood_that_was_told_keeps_its_explanation() -> None:
     dynabt = agent(triangle(3), "RB")
-    told(dynabt, ("RA", Ok((1,))))
-    told(dynabt, ("RC", Nogood({"RA": (1,)}, (2,), [CAC, CBC, "RC="])))
+    replies(dynabt, ("RA", Ok((1,))))
+    replies(dynabt, ("RC", Nogood({"RA": (1,)}, (2,), [CAC, CBC, "RC="])))
     assert value(dynabt) == (3,)
     assert [dynabt.store.because(index) for index in (0, 1)] == [{CAB}, {CAC, CBC, "RC="}]
 
 
 def test_an_explanation_is_passed_up() -> None:
     dynabt = agent(triangle(), "RB")
-    told(dynabt, ("RA", Ok((1,))))
-    said = told(dynabt, ("RC", Nogood({"RA": (1,)}, (2,), [CAC, CBC, "RC="])))
+    replies(dynabt, ("RA", Ok((1,))))
+    said = replies(dynabt, ("RC", Nogood({"RA": (1,)}, (2,), [CAC, CBC, "RC="])))
     assert said[0] == ("RA", Nogood({}, (1,), ["RB<RA:C", "RB=", "RC<RA:C", "RC<RB:C", "RC="]))
 
 
 def test_the_empty_nogood_has_a_proof() -> None:
     dynabt = agent(triangle(1), "RA")
-    told(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
+    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
     assert dynabt.verdict is Verdict.NO_SOLUTION
     assert dynabt.proof == {CAB, "RA=", "RB="}
 
@@ -120,14 +90,14 @@ def with_two_nogoods() -> tuple[Team, DynABT]:
     """RC, whose first value RA rules out, and whose second RB."""
     team = triangle(3)
     dynabt = agent(team, "RC")
-    told(dynabt, ("RA", Ok((1,))), ("RB", Ok((2,))))
+    replies(dynabt, ("RA", Ok((1,))), ("RB", Ok((2,))))
     assert [dynabt.store.because(0), dynabt.store.because(1)] == [{CAC}, {CBC}]
     return team, dynabt
 
 
 def test_remove_constraint_drops_the_nogoods_that_it_explains_and_no_others() -> None:
     team, dynabt = with_two_nogoods()
-    change(dynabt, team, changed(team, [RemoveConstraint("RC", "RA", "C")]))
+    change(dynabt, team, apply_changes(team, [RemoveConstraint("RC", "RA", "C")]))
     assert list(dynabt.store) == [{"RB": (2,)}]
     assert value(dynabt) == (3,)
 
@@ -136,17 +106,17 @@ def test_remove_constraint_drops_what_was_derived_from_it_far_away() -> None:
     team = triangle()
     for gone, left in ((CBC, 0), ("RD<RC:C", 1)):
         dynabt = agent(team, "RA")
-        told(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
+        replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
         holder, _, rest = gone.partition("<")
-        change(dynabt, team, changed(team, [RemoveConstraint(holder, rest.removesuffix(":C"), "C")]))
+        change(dynabt, team, apply_changes(team, [RemoveConstraint(holder, rest.removesuffix(":C"), "C")]))
         assert len(list(dynabt.store)) == left
 
 
 def test_a_no_solution_goes_with_a_constraint_that_it_rests_on() -> None:
     team = triangle(1)
     dynabt = agent(team, "RA")
-    told(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
-    said = after(dynabt, team, RemoveConstraint("RB", "RA", "C"), quiet=False)
+    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
+    said = after(dynabt, team, RemoveConstraint("RB", "RA", "C"), lossless=False)
     assert (dynabt.verdict, dynabt.proof) == (None, frozenset())
     assert ("RB", Ok((1,))) in said
 
@@ -154,25 +124,25 @@ def test_a_no_solution_goes_with_a_constraint_that_it_rests_on() -> None:
 def test_a_no_solution_stays_when_another_constraint_goes() -> None:
     team = triangle(1)
     dynabt = agent(team, "RA")
-    told(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
-    assert after(dynabt, team, RemoveConstraint("RC", "RB", "C"), quiet=False) == []
+    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
+    assert after(dynabt, team, RemoveConstraint("RC", "RB", "C"), lossless=False) == []
     assert dynabt.verdict is Verdict.NO_SOLUTION
 
 
 def test_two_constraints_of_one_name_go_together() -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [differ("A", "B"), differ("B", "A")])
     dynabt = agent(team, "RB")
-    told(dynabt, ("RA", Ok((1,))))
-    change(dynabt, team, changed(team, [RemoveConstraint("RB", "RA", "C")]))
+    replies(dynabt, ("RA", Ok((1,))))
+    change(dynabt, team, apply_changes(team, [RemoveConstraint("RB", "RA", "C")]))
     assert list(dynabt.store) == []
 
 
 def test_a_constraint_that_comes_in_the_place_of_its_namesake_is_another() -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [differ("A", "B")])
     dynabt = agent(team, "RB")
-    told(dynabt, ("RA", Ok((1,))))
+    replies(dynabt, ("RA", Ok((1,))))
     other = AddConstraint("RB", "RA", Constraint("C", PREDEFINED["le"], ("B", "A"), ("B", "A")))
-    change(dynabt, team, changed(team, [RemoveConstraint("RB", "RA", "C"), other]))
+    change(dynabt, team, apply_changes(team, [RemoveConstraint("RB", "RA", "C"), other]))
     assert list(dynabt.store) == []
 
 
@@ -181,28 +151,28 @@ def test_a_constraint_that_comes_in_the_place_of_its_namesake_is_another() -> No
 
 def test_additions_keep_nogoods_and_a_no_solution() -> None:
     team, dynabt = with_two_nogoods()
-    change(dynabt, team, changed(team, [AddConstraint("RD", "RA", named("A", "D", "N"))]))
+    change(dynabt, team, apply_changes(team, [AddConstraint("RD", "RA", differ("A", "D", "N"))]))
     assert list(dynabt.store) == [{"RA": (1,)}, {"RB": (2,)}]
     unsolvable = triangle(1)
     top = agent(unsolvable, "RA")
-    told(top, ("RB", Nogood({}, (1,), [CAB, "RB="])))
-    assert after(top, unsolvable, AddConstraint("RD", "RA", named("A", "D", "N")), quiet=False) == []
+    replies(top, ("RB", Nogood({}, (1,), [CAB, "RB="])))
+    assert after(top, unsolvable, AddConstraint("RD", "RA", differ("A", "D", "N")), lossless=False) == []
     assert top.verdict is Verdict.NO_SOLUTION
 
 
 def test_add_constraint_links_the_new_child_and_tells_the_value_there_only() -> None:
     team = triangle()
     dynabt = agent(team, "RA")
-    assert after(dynabt, team, AddConstraint("RD", "RA", named("A", "D", "N"))) == [("RD", Ok((1,)))]
+    assert after(dynabt, team, AddConstraint("RD", "RA", differ("A", "D", "N"))) == [("RD", Ok((1,)))]
     assert dynabt.lower == ["RB", "RC", "RD"]
-    assert told(dynabt, ("RB", Nogood({}, (1,), [])))[-1] == ("RD", Ok((2,)))
+    assert replies(dynabt, ("RB", Nogood({}, (1,), [])))[-1] == ("RD", Ok((2,)))
 
 
 def test_a_link_is_made_while_there_is_no_solution() -> None:
     team = triangle(1)
     dynabt = agent(team, "RA")
-    told(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
-    after(dynabt, team, AddConstraint("RD", "RA", named("A", "D", "N")), quiet=False)
+    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
+    after(dynabt, team, AddConstraint("RD", "RA", differ("A", "D", "N")), lossless=False)
     assert "RD" in dynabt.lower
 
 
@@ -219,7 +189,7 @@ def test_add_constraint_is_checked_against_what_the_lower_robot_knows() -> None:
 
 def test_values_that_go_take_their_nogoods_along() -> None:
     team, dynabt = with_two_nogoods()
-    change(dynabt, team, changed(team, [RemoveValue("C", 1)]))
+    change(dynabt, team, apply_changes(team, [RemoveValue("C", 1)]))
     assert dynabt.problem.values == ((2,), (3,))
     assert [dynabt.store[index] for index in (0, 1)] == [{"RB": (2,)}, None]
     assert dynabt.store.because(0) == {CBC}
@@ -241,15 +211,15 @@ def test_who_loses_its_last_value_says_why() -> None:
 def test_a_domain_that_grew_voids_the_resolvents_of_its_owner() -> None:
     team = triangle()
     dynabt = agent(team, "RA")
-    told(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
+    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
     assert value(dynabt) == (2,)
-    change(dynabt, team, changed(team, [AddValue("C", 3)]))
+    change(dynabt, team, apply_changes(team, [AddValue("C", 3)]))
     assert list(dynabt.store) == []
 
 
 def test_a_domain_that_grew_leaves_direct_conflicts() -> None:
     team, dynabt = with_two_nogoods()
-    change(dynabt, team, changed(team, [AddValue("C", 0)]))
+    change(dynabt, team, apply_changes(team, [AddValue("C", 0)]))
     assert dynabt.problem.values == ((0,), (1,), (2,), (3,))
     assert [dynabt.store[index] for index in range(4)] == [None, {"RA": (1,)}, {"RB": (2,)}, None]
     assert value(dynabt) == (3,)
@@ -258,8 +228,8 @@ def test_a_domain_that_grew_leaves_direct_conflicts() -> None:
 def test_a_domain_that_shrank_leaves_resolvents() -> None:
     team = triangle(3)
     dynabt = agent(team, "RA")
-    told(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
-    change(dynabt, team, changed(team, [RemoveValue("C", 3)]))
+    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
+    change(dynabt, team, apply_changes(team, [RemoveValue("C", 3)]))
     assert list(dynabt.store) == [{}]
 
 
@@ -267,8 +237,8 @@ def test_a_no_solution_goes_when_a_domain_that_it_rests_on_grows() -> None:
     team = triangle(1)
     for variable, stands in (("B", False), ("A", False), ("D", True)):
         dynabt = agent(team, "RA")
-        told(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
-        change(dynabt, team, changed(team, [AddValue(variable, 3)]))
+        replies(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
+        change(dynabt, team, apply_changes(team, [AddValue(variable, 3)]))
         assert (dynabt.verdict is Verdict.NO_SOLUTION) is stands
 
 
@@ -277,7 +247,7 @@ def test_a_no_solution_goes_when_a_domain_that_it_rests_on_grows() -> None:
 
 def test_a_robot_that_left_is_forgotten() -> None:
     team, dynabt = with_two_nogoods()
-    change(dynabt, team, changed(team, [RemoveAgent("RA")]))
+    change(dynabt, team, apply_changes(team, [RemoveAgent("RA")]))
     assert (dynabt.view, dynabt.higher, list(dynabt.store)) == ({"RB": (2,)}, {"RB"}, [{"RB": (2,)}])
 
 
@@ -291,15 +261,15 @@ def test_a_child_that_left_is_told_nothing_more() -> None:
 def test_nogoods_that_rest_on_a_robot_that_left_are_void() -> None:
     team = triangle()
     dynabt = agent(team, "RA")
-    told(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
-    change(dynabt, team, changed(team, [RemoveAgent("RC")]))
+    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
+    change(dynabt, team, apply_changes(team, [RemoveAgent("RC")]))
     assert list(dynabt.store) == []
 
 
 def test_a_robot_that_comes_is_told_the_value_of_its_parents() -> None:
     team = triangle()
     newcomer = Robot(
-        "RE", (Variable("E", Domain("D", (range(1, 3),))),), parents=(Parent("RA", (named("A", "E", "N"),)),)
+        "RE", (Variable("E", Domain("D", (range(1, 3),))),), parents=(Parent("RA", (differ("A", "E", "N"),)),)
     )
     assert after(agent(team, "RA"), team, AddAgent(newcomer)) == [("RE", Ok((1,)))]
     assert after(agent(team, "RB"), team, AddAgent(newcomer)) == []
@@ -308,13 +278,13 @@ def test_a_robot_that_comes_is_told_the_value_of_its_parents() -> None:
 def test_a_robot_of_an_old_name_is_a_stranger() -> None:
     team = triangle()
     dynabt = agent(team, "RA")
-    told(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
-    again = replace(team["RD"], parents=(Parent("RA", (named("A", "D", "N"),)),))
-    new = changed(team, [RemoveAgent("RD"), AddAgent(again)])
+    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
+    again = replace(team["RD"], parents=(Parent("RA", (differ("A", "D", "N"),)),))
+    new = apply_changes(team, [RemoveAgent("RD"), AddAgent(again)])
     dynabt.change(
         LocalProblem(agent_problems(new)["RA"]), PriorityOrder(new.order), Invalidated(frozenset(), frozenset({"RD"}))
     )
-    dynabt.resume(quiet=True)
+    dynabt.resume(lossless=True)
     assert dynabt.outbox == [("RD", Ok((2,)))]
 
 
@@ -323,37 +293,37 @@ def test_a_robot_of_an_old_name_is_a_stranger() -> None:
 
 def test_after_a_quiet_epoch_nobody_says_again_what_is_known() -> None:
     team, dynabt = with_two_nogoods()
-    assert after(dynabt, team, AddValue("A", 9), quiet=True) == []
+    assert after(dynabt, team, AddValue("A", 9), lossless=True) == []
 
 
 def test_after_an_epoch_that_was_broken_off_values_are_told_once_more() -> None:
     team, dynabt = with_two_nogoods()
-    assert after(dynabt, team, AddValue("A", 9), quiet=False) == [("RD", Ok((3,)))]
+    assert after(dynabt, team, AddValue("A", 9), lossless=False) == [("RD", Ok((3,)))]
 
 
 def test_after_an_epoch_that_was_broken_off_links_are_asked_for_again() -> None:
     team = team_of(dict.fromkeys("ABC", (1, 2)), [differ("A", "C"), differ("B", "C")])
     dynabt = agent(team, "RB")
-    told(dynabt, ("RC", Nogood({"RA": (1,)}, (1,), [CAC])))
+    replies(dynabt, ("RC", Nogood({"RA": (1,)}, (1,), [CAC])))
     assert dynabt.higher == {"RA"}
-    assert after(dynabt, team, AddValue("C", 9), quiet=True) == []
-    assert after(dynabt, team, AddValue("C", 9), quiet=False) == [("RA", AddLink()), ("RC", Ok((2,)))]
+    assert after(dynabt, team, AddValue("C", 9), lossless=True) == []
+    assert after(dynabt, team, AddValue("C", 9), lossless=False) == [("RA", AddLink()), ("RC", Ok((2,)))]
 
 
 def test_who_changes_twice_before_it_goes_on_tells_all_that_is_new() -> None:
     """A robot was lost before all had taken in the change before."""
     team = triangle()
-    first = changed(team, [AddConstraint("RD", "RA", named("A", "D", "N"))])
+    first = apply_changes(team, [AddConstraint("RD", "RA", differ("A", "D", "N"))])
     dynabt = agent(team, "RA")
     change(dynabt, team, first)
     assert after(dynabt, first, RemoveAgent("RB")) == [("RD", Ok((1,)))]
-    assert after(dynabt, changed(first, [RemoveAgent("RB")]), AddValue("C", 9)) == []
+    assert after(dynabt, apply_changes(first, [RemoveAgent("RB")]), AddValue("C", 9)) == []
 
 
 def test_links_that_were_added_stay() -> None:
     team = triangle()
     dynabt = agent(team, "RA")
-    told(dynabt, ("RD", AddLink()))
+    replies(dynabt, ("RD", AddLink()))
     said = after(dynabt, team, RemoveValue("A", 1))
     assert [receiver for receiver, _ in said] == ["RB", "RC", "RD"]
 
@@ -361,5 +331,5 @@ def test_links_that_were_added_stay() -> None:
 def test_who_takes_another_value_tells_it_once() -> None:
     team = triangle()
     dynabt = agent(team, "RA")
-    said = after(dynabt, team, AddConstraint("RD", "RA", named("A", "D", "N")), RemoveValue("A", 1), quiet=False)
+    said = after(dynabt, team, AddConstraint("RD", "RA", differ("A", "D", "N")), RemoveValue("A", 1), lossless=False)
     assert said == [("RB", Ok((2,))), ("RC", Ok((2,))), ("RD", Ok((2,)))]

@@ -17,11 +17,11 @@ from robochoc.run.registry import protocol_named
 from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import Invalidated, invalidated_by
-from robochoc.verification.checker import objections
-from tests.conformance.test_complex_teams import compiled_by_hand
-from tests.support.changes import random_journey, stages
-from tests.support.complex_changes import random_complex_journey
+from robochoc.verification.checker import violations
+from tests.support.complex_changes import random_complex_changing_team
 from tests.support.problems import solutions
+from tests.support.random_changes import random_changing_team, stages
+from tests.support.solver_networks import compiled_by_brute_force
 
 
 def random_schedule(chance: Random) -> Schedule:
@@ -31,7 +31,7 @@ def random_schedule(chance: Random) -> Schedule:
 
 def played(team: Team, schedule: Schedule) -> Counter[Verdict]:
     """The verdicts of all epochs that came to their end; each is right."""
-    journey = ScenarioRun(team, None, compiled_by_hand, lambda: None)
+    journey = ScenarioRun(team, None, compiled_by_brute_force, lambda: None)
     seen = Counter[Verdict]()
     with Simulation(journey.compiled(), protocol_named("dynabt"), schedule) as session:
         epochs = list(journey.go(session, lambda _: None))
@@ -47,7 +47,7 @@ def check(team: Team, result: RunResult) -> None:
     assert result.verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION)
     if result.verdict is Verdict.SOLUTION:
         assignment = {name: value for own in result.assignments.values() for name, value in own.items()}
-        assert not list(objections(team, assignment))
+        assert not list(violations(team, assignment))
 
 
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 20))])
@@ -55,7 +55,7 @@ def test_complex_robots_agree_with_brute_force_after_each_change(batch: int) -> 
     chance = Random(f"dynabt complex {batch}")
     seen = Counter[Verdict]()
     for _ in range(26):
-        seen += played(random_complex_journey(chance), random_schedule(chance))
+        seen += played(random_complex_changing_team(chance), random_schedule(chance))
     assert min(seen[Verdict.SOLUTION], seen[Verdict.NO_SOLUTION]) > 30, seen
     assert seen.total() > 200
 
@@ -64,7 +64,7 @@ def test_the_problem_may_change_again_before_the_search_goes_on() -> None:
     """So it is when robots are lost before all have taken in an event."""
     chance = Random("twice")
     for _ in range(20):
-        team = random_journey(chance, 8)
+        team = random_changing_team(chance, 8)
         now, *later = stages(team)
         with Simulation(now, protocol_named("dynabt"), random_schedule(chance)) as session:
             check(now, session.search())

@@ -20,9 +20,17 @@ from robochoc.protocols.maxsum import MaxSum, MaxSumSettings, Q, R
 from robochoc.protocols.maxsum_factor import Factor
 from robochoc.solver import cost_table
 from robochoc.solver.encoding import UnsupportedError
-from tests.support.agents import told, value
-from tests.support.cost_problems import DEAREST, least_cost, random_cost_team
-from tests.support.courses import any_schedule, burden_of, course_of, domains_of, played, robot_of, started
+from tests.support.agents import replies, value
+from tests.support.cost_problems import MAX_COST, least_cost, random_cost_team
+from tests.support.local_search_runs import (
+    any_schedule,
+    assignments_by_cycle,
+    cost_of_assignment,
+    domains_of,
+    played,
+    robot_of,
+    started,
+)
 from tests.support.problems import team_of
 
 COSTS = Relation("C", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1), (2, 2)), (3, 1, 4, 6))
@@ -51,49 +59,49 @@ def test_domains_go_to_those_who_hold_the_functions() -> None:
 
 def test_r_is_the_least_that_a_value_costs_by_what_the_others_told() -> None:
     robot = middle(chain())
-    assert told(robot, ("RA", TWO)) == [("RA", R([[1, 4]]))]
-    told(robot, ("RC", R([[0, 0]])))
+    assert replies(robot, ("RA", TWO)) == [("RA", R([[1, 4]]))]
+    replies(robot, ("RC", R([[0, 0]])))
     robot.edges = [[5, 0]]
-    assert told(robot, ("RA", Q([[0, 0]]))) == [("RA", R([[1, 6]]))]
+    assert replies(robot, ("RA", Q([[0, 0]]))) == [("RA", R([[1, 6]]))]
 
 
 def test_q_is_what_a_value_costs_by_all_other_functions_less_the_least() -> None:
     robot = middle(chain())
-    told(robot, ("RA", TWO))
-    assert told(robot, ("RC", R([[9, 2]]))) == [("RC", Q([[2, 0]]))]  # by the own function 3 and 1
+    replies(robot, ("RA", TWO))
+    assert replies(robot, ("RC", R([[9, 2]]))) == [("RC", Q([[2, 0]]))]  # by the own function 3 and 1
     assert robot.edges == [[7, 0], [2, 0]]
 
 
 def test_the_value_is_that_which_costs_least_by_all_functions() -> None:
     robot = middle(chain())
-    told(robot, ("RA", TWO))
-    told(robot, ("RC", R([[2, 3]])))
+    replies(robot, ("RA", TWO))
+    replies(robot, ("RC", R([[2, 3]])))
     assert value(robot) == (2,)
-    told(robot, ("RA", Q([[0, 5]])), ("RC", R([[0, 3]])))
+    replies(robot, ("RA", Q([[0, 5]])), ("RC", R([[0, 3]])))
     assert value(robot) == (1,)
 
 
 def test_a_cycle_is_r_of_all_functions_and_then_q_of_all_variables() -> None:
     robot = middle(chain())
-    assert told(robot, ("RC", R([[0, 0]]))) == []
-    assert [receiver for receiver, _ in told(robot, ("RA", TWO))] == ["RA", "RC"]
+    assert replies(robot, ("RC", R([[0, 0]]))) == []
+    assert [receiver for receiver, _ in replies(robot, ("RA", TWO))] == ["RA", "RC"]
     assert robot.cycle == 1
-    assert [type(message) for _, message in told(robot, ("RA", Q([[0, 0]])))] == [R]
+    assert [type(message) for _, message in replies(robot, ("RA", Q([[0, 0]])))] == [R]
 
 
 def test_in_the_last_cycle_no_q_is_said() -> None:
     robot = middle(chain(), cycles=1)
-    told(robot, ("RA", TWO))
-    assert told(robot, ("RC", R([[0, 0]]))) == []
+    replies(robot, ("RA", TWO))
+    assert replies(robot, ("RC", R([[0, 0]]))) == []
     assert robot.over
 
 
 def test_damping_keeps_a_share_of_the_last_q() -> None:
     robot = middle(chain(), damping=0.75)
-    told(robot, ("RA", TWO))
-    assert told(robot, ("RC", R([[0, 0]]))) == [("RC", Q([[2, 0]]))]
+    replies(robot, ("RA", TWO))
+    assert replies(robot, ("RC", R([[0, 0]]))) == [("RC", Q([[2, 0]]))]
     robot.edges = [[0, 0], [8, 0]]
-    assert told(robot, ("RA", Q([[0, 0]])), ("RC", R([[0, 0]])))[-1] == ("RC", Q([[6.5, 0]]))
+    assert replies(robot, ("RA", Q([[0, 0]])), ("RC", R([[0, 0]])))[-1] == ("RC", Q([[6.5, 0]]))
 
 
 def test_preferences_are_drawn_by_lot() -> None:
@@ -113,7 +121,7 @@ def test_what_the_own_value_costs_by_itself_is_a_preference() -> None:
     robot = robot_of(MaxSum, team, "RA")
     started(robot)
     assert value(robot) == (2,)
-    assert told(robot, ("RB", R([[0, 0]]))) == [("RB", Q([[7, 0]]))]
+    assert replies(robot, ("RB", R([[0, 0]]))) == [("RB", Q([[7, 0]]))]
 
 
 def test_constraints_over_the_same_robots_are_one_function() -> None:
@@ -121,7 +129,7 @@ def test_constraints_over_the_same_robots_are_one_function() -> None:
     team = team_of(dict.fromkeys(pair, (1, 2)), [Constraint(name, COSTS, pair, pair) for name in ("C", "D")])
     robot = robot_of(MaxSum, team, "RB")
     started(robot)
-    assert told(robot, ("RA", TWO)) == [("RA", R([[2, 8]]))]
+    assert replies(robot, ("RA", TWO)) == [("RA", R([[2, 8]]))]
 
 
 def test_what_one_robot_says_to_another_goes_in_one_message() -> None:
@@ -131,31 +139,31 @@ def test_what_one_robot_says_to_another_goes_in_one_message() -> None:
     constraints = [Constraint("P", COSTS, pair, pair), Constraint("T", triple, scope, scope)]
     robot = robot_of(MaxSum, team_of(dict.fromkeys("ABC", (1, 2)), constraints), "RC")
     started(robot)
-    assert told(robot, ("RA", TWO), ("RB", TWO)) == [("RA", R([[1, 4], [0, 0]])), ("RB", R([[0, 0]]))]
+    assert replies(robot, ("RA", TWO), ("RB", TWO)) == [("RA", R([[1, 4], [0, 0]])), ("RB", R([[0, 0]]))]
 
 
 def test_a_value_that_breaks_a_hard_constraint_is_out_and_nothing_is_subtracted_from_that() -> None:
     robot = middle(chain(HARD))
-    assert told(robot, ("RA", TWO)) == [("RA", R([[0, INFINITE]]))]
-    assert told(robot, ("RC", R([[INFINITE, 3]]))) == [("RC", Q([[0, 0]]))]
+    assert replies(robot, ("RA", TWO)) == [("RA", R([[0, INFINITE]]))]
+    assert replies(robot, ("RC", R([[INFINITE, 3]]))) == [("RC", Q([[0, 0]]))]
     assert robot.edges[0] == [INFINITE, 0]
     assert value(robot) == (2,)
 
 
 def test_damping_leaves_what_is_out_out() -> None:
     robot = middle(chain(), damping=0.5)
-    told(robot, ("RA", TWO))
-    told(robot, ("RC", R([[INFINITE, 3]])))
-    told(robot, ("RA", Q([[0, 0]])), ("RC", R([[INFINITE, 3]])))
+    replies(robot, ("RA", TWO))
+    replies(robot, ("RC", R([[INFINITE, 3]])))
+    replies(robot, ("RA", Q([[0, 0]])), ("RC", R([[INFINITE, 3]])))
     assert robot.edges[0] == [INFINITE, 0]
 
 
 def test_a_robot_all_of_whose_values_are_out_has_proven_that_there_is_no_solution() -> None:
     robot = middle(chain())
-    told(robot, ("RA", TWO))
-    assert told(robot, ("RC", R([[INFINITE, INFINITE]]))) == []
+    replies(robot, ("RA", TWO))
+    assert replies(robot, ("RC", R([[INFINITE, INFINITE]]))) == []
     assert robot.verdict is Verdict.NO_SOLUTION
-    assert told(robot, ("RA", Q([[0, 0]]))) == []
+    assert replies(robot, ("RA", Q([[0, 0]]))) == []
 
 
 def test_values_that_are_alike_do_not_freeze_the_search() -> None:
@@ -163,8 +171,8 @@ def test_values_that_are_alike_do_not_freeze_the_search() -> None:
     ring = [("A", "B"), ("B", "C"), ("C", "D"), ("D", "E"), ("A", "E")]
     team = team_of(dict.fromkeys("ABCDE", (1, 2, 3)), [Constraint("C", differ, pair, pair) for pair in ring])
     for seed in range(20):
-        course = course_of(team, played(team, MaxSum, Concurrent(0), seed, cycles=30))
-        assert min(burden_of(team, values) for values in course) == (0, 0)
+        course = assignments_by_cycle(team, played(team, MaxSum, Concurrent(0), seed, cycles=30))
+        assert min(cost_of_assignment(team, values) for values in course) == (0, 0)
 
 
 @pytest.mark.parametrize("batch", range(2))
@@ -179,7 +187,7 @@ def test_on_a_tree_the_end_is_an_optimum(batch: int) -> None:
         assert (result.verdict is Verdict.NO_SOLUTION) is (least == INFINITE)
         if least < INFINITE:
             soluble += 1
-            assert burden_of(team, course_of(team, result)[-1]) == (0, least)
+            assert cost_of_assignment(team, assignments_by_cycle(team, result)[-1]) == (0, least)
     assert soluble > 60
 
 
@@ -190,7 +198,7 @@ def random_tree(chance: Random) -> Team:
     for number, name in enumerate(list(domains)[1:], 1):
         pair = (f"X{chance.randrange(number)}", name)
         rows = list(itertools.product(*(domains[one] for one in pair)))
-        costs = tuple(INFINITE if chance.random() < 0.15 else chance.randint(0, DEAREST) for _ in rows)
+        costs = tuple(INFINITE if chance.random() < 0.15 else chance.randint(0, MAX_COST) for _ in rows)
         relation = Relation("R", 2, Semantics.SOFT, tuple(rows), costs)
         constraints.append(Constraint("C", relation, pair, pair))
     return team_of(domains, constraints)
@@ -234,7 +242,7 @@ def test_a_table_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(cost_table, "MOST_TUPLES", 3)
     robot = middle(chain())
     with pytest.raises(UnsupportedError, match="has 4 entries, more than 3"):
-        told(robot, ("RA", TWO))
+        replies(robot, ("RA", TWO))
 
 
 @pytest.mark.parametrize(

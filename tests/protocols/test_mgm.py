@@ -11,12 +11,12 @@ import robochoc.protocols.mgm
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.cycles import Value
 from robochoc.protocols.mgm import MGM, Gain
-from tests.support.agents import told, value
+from tests.support.agents import replies, value
 from tests.support.cost_problems import random_cost_team, random_hard_team
-from tests.support.courses import (
+from tests.support.local_search_runs import (
     any_schedule,
-    burden_of,
-    course_of,
+    assignments_by_cycle,
+    cost_of_assignment,
     domains_of,
     is_optimal,
     never_rises,
@@ -49,34 +49,34 @@ def test_the_first_value_is_drawn_by_lot_and_told() -> None:
 
 def test_when_all_values_are_known_the_gain_of_the_best_move_is_told() -> None:
     robot = middle()
-    assert told(robot, ("RA", Value((1,)))) == []
-    assert told(robot, ("RC", Value((1,)))) == [("RA", Gain(0, 10)), ("RC", Gain(0, 10))]
+    assert replies(robot, ("RA", Value((1,)))) == []
+    assert replies(robot, ("RC", Value((1,)))) == [("RA", Gain(0, 10)), ("RC", Gain(0, 10))]
 
 
 def test_who_gains_most_moves_and_tells_its_value() -> None:
     robot = middle(0.9)
-    told(robot, ("RA", Value((1,))), ("RC", Value((1,))))
-    assert told(robot, ("RA", Gain(0, 5)), ("RC", Gain(0, 9))) == [("RA", Value((3,))), ("RC", Value((3,)))]
+    replies(robot, ("RA", Value((1,))), ("RC", Value((1,))))
+    assert replies(robot, ("RA", Gain(0, 5)), ("RC", Gain(0, 9))) == [("RA", Value((3,))), ("RC", Value((3,)))]
 
 
 def test_who_does_not_stays_and_tells_its_value() -> None:
     robot = middle()
-    told(robot, ("RA", Value((1,))), ("RC", Value((1,))))
-    assert told(robot, ("RA", Gain(0, 5)), ("RC", Gain(0, 11))) == [("RA", Value((1,))), ("RC", Value((1,)))]
+    replies(robot, ("RA", Value((1,))), ("RC", Value((1,))))
+    assert replies(robot, ("RA", Gain(0, 5)), ("RC", Gain(0, 11))) == [("RA", Value((1,))), ("RC", Value((1,)))]
 
 
 @pytest.mark.parametrize(("left", "right", "moves"), [(10, 0, False), (0, 10, True)])
 def test_of_equal_gains_the_first_in_the_order_moves(left: int, right: int, moves: bool) -> None:  # noqa: FBT001
     robot = middle()
-    told(robot, ("RA", Value((1,))), ("RC", Value((1,))))
-    told(robot, ("RA", Gain(0, left)), ("RC", Gain(0, right)))
+    replies(robot, ("RA", Value((1,))), ("RC", Value((1,))))
+    replies(robot, ("RA", Gain(0, left)), ("RC", Gain(0, right)))
     assert value(robot) == ((2,) if moves else (1,))
 
 
 def test_who_gains_nothing_stays_though_nobody_gains_more() -> None:
     robot = middle()
-    assert told(robot, ("RA", Value((2,))), ("RC", Value((2,)))) == [("RA", Gain(0, 0)), ("RC", Gain(0, 0))]
-    told(robot, ("RA", Gain(0, 0)), ("RC", Gain(0, 0)))
+    assert replies(robot, ("RA", Value((2,))), ("RC", Value((2,)))) == [("RA", Gain(0, 0)), ("RC", Gain(0, 0))]
+    replies(robot, ("RA", Gain(0, 0)), ("RC", Gain(0, 0)))
     assert value(robot) == (1,)
 
 
@@ -85,8 +85,8 @@ def test_a_broken_constraint_weighs_more_than_any_cost() -> None:
     robot = robot_of(MGM, team_of(dict.fromkeys("ABC", (1, 2)), constraints), "RB", 0.0)
     started(robot)
     packet = [("RA", Value((1,))), ("RC", Value((2,)))]
-    assert told(robot, *packet) == [("RA", Gain(1, -1)), ("RC", Gain(1, -1))]
-    told(robot, ("RA", Gain(0, 99)), ("RC", Gain(0, 99)))
+    assert replies(robot, *packet) == [("RA", Gain(1, -1)), ("RC", Gain(1, -1))]
+    replies(robot, ("RA", Gain(0, 99)), ("RC", Gain(0, 99)))
     assert value(robot) == (2,)
 
 
@@ -96,8 +96,8 @@ def test_the_cost_never_rises_and_the_end_is_a_local_optimum(batch: int) -> None
     for seed in range(100):
         team = chance.choice((random_cost_team, random_hard_team))(chance)
         if all(domains_of(team).values()):
-            course = course_of(team, played(team, MGM, any_schedule(chance), seed, cycles=30))
-            assert never_rises([burden_of(team, values) for values in course])
+            course = assignments_by_cycle(team, played(team, MGM, any_schedule(chance), seed, cycles=30))
+            assert never_rises([cost_of_assignment(team, values) for values in course])
             assert is_optimal(team, course[-1], together=1)
 
 

@@ -15,12 +15,12 @@ from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.cycles import Domain, Value
 from robochoc.protocols.mgm import MGM, Gain
 from robochoc.protocols.mgm2 import MGM2, Accept, Go, Offer, Reject
-from tests.support.agents import told, value
+from tests.support.agents import replies, value
 from tests.support.cost_problems import random_cost_team, random_hard_team
-from tests.support.courses import (
+from tests.support.local_search_runs import (
     any_schedule,
-    burden_of,
-    course_of,
+    assignments_by_cycle,
+    cost_of_assignment,
     domains_of,
     is_optimal,
     never_rises,
@@ -47,7 +47,7 @@ def middle(*chances: float) -> MGM2:
     """B, which begins with the value 1, has heard the domains, and will draw `chances`."""
     robot = robot_of(MGM2, chain(), "RB", 0.0, *chances)
     assert started(robot) == [("RA", TWO), ("RC", TWO)]
-    assert told(robot, ("RA", TWO), ("RC", TWO)) == [("RA", Value((1,))), ("RC", Value((1,)))]
+    assert replies(robot, ("RA", TWO), ("RC", TWO)) == [("RA", Value((1,))), ("RC", Value((1,)))]
     return robot
 
 
@@ -63,30 +63,30 @@ def gains(*rows: tuple[int, ...]) -> Offer:
 def test_an_offerer_tells_one_neighbour_what_each_pair_of_values_saves_it() -> None:
     """B pays 5 to A and 5 to C. A row for each value of the receiver."""
     robot = middle(OFFERS, SECOND)
-    assert told(robot, *both(Value((1,)))) == [("RA", Offer(None)), ("RC", gains((0, -8), (-4, 1)))]
+    assert replies(robot, *both(Value((1,)))) == [("RA", Offer(None)), ("RC", gains((0, -8), (-4, 1)))]
 
 
 def test_who_is_no_offerer_tells_that_there_is_no_offer() -> None:
-    assert told(middle(WAITS), *both(Value((1,)))) == both(Offer(None))
+    assert replies(middle(WAITS), *both(Value((1,)))) == both(Offer(None))
 
 
 @pytest.mark.parametrize(("lot", "offers"), [(0.49, True), (0.5, False)])
 def test_the_threshold_is_the_probability_of_being_an_offerer(lot: float, offers: bool) -> None:  # noqa: FBT001
-    said = told(middle(lot), *both(Value((1,))))
+    said = replies(middle(lot), *both(Value((1,))))
     assert any(offer.gains is not None for _, offer in said if isinstance(offer, Offer)) is offers
 
 
 def test_an_offerer_takes_no_offer() -> None:
     robot = middle(OFFERS, FIRST)
-    told(robot, *both(Value((1,))))
-    assert told(robot, *both(gains((0, 0), (0, 99)))) == both(Reject())
+    replies(robot, *both(Value((1,))))
+    assert replies(robot, *both(gains((0, 0), (0, 99)))) == both(Reject())
 
 
 def test_a_receiver_adds_what_the_offerer_has_no_part_in() -> None:
     """A would save 5 by (2, 2); B pays 5 to C now, and would pay 9 then."""
     robot = middle(WAITS)
-    told(robot, *both(Value((1,))))
-    assert told(robot, ("RA", gains((0, -4), (-4, 5))), ("RC", Offer(None))) == [
+    replies(robot, *both(Value((1,))))
+    assert replies(robot, ("RA", gains((0, -4), (-4, 5))), ("RC", Offer(None))) == [
         ("RA", Accept(1, 0, 1)),
         *both(Gain(0, 1)),
     ]
@@ -94,68 +94,68 @@ def test_a_receiver_adds_what_the_offerer_has_no_part_in() -> None:
 
 def test_the_best_of_all_offers_is_taken_and_the_others_are_not() -> None:
     robot = middle(WAITS)
-    told(robot, *both(Value((1,))))
-    said = told(robot, ("RA", gains((0, -4), (-4, 5))), ("RC", gains((0, -4), (-4, 6))))
+    replies(robot, *both(Value((1,))))
+    said = replies(robot, ("RA", gains((0, -4), (-4, 5))), ("RC", gains((0, -4), (-4, 6))))
     assert said == [("RC", Accept(1, 0, 2)), ("RA", Reject()), *both(Gain(0, 2))]
 
 
 def test_an_offer_that_saves_nothing_is_not_taken() -> None:
     robot = middle(WAITS)
-    told(robot, *both(Value((1,))))
-    assert told(robot, *both(gains((0, -4), (-4, 4)))) == [*both(Reject()), *both(Gain(0, 0))]
+    replies(robot, *both(Value((1,))))
+    assert replies(robot, *both(gains((0, -4), (-4, 4)))) == [*both(Reject()), *both(Gain(0, 0))]
 
 
 def test_an_offerer_whose_offer_is_not_taken_stands_alone() -> None:
     robot = middle(OFFERS, FIRST)
-    told(robot, *both(Value((2,))))
-    told(robot, *both(Offer(None)))
-    assert told(robot, ("RA", Reject())) == both(Gain(0, 18))
-    assert told(robot, *both(Gain(0, 9))) == both(Value((2,)))
+    replies(robot, *both(Value((2,))))
+    replies(robot, *both(Offer(None)))
+    assert replies(robot, ("RA", Reject())) == both(Gain(0, 18))
+    assert replies(robot, *both(Gain(0, 9))) == both(Value((2,)))
 
 
 def test_an_offerer_whose_offer_is_taken_tells_the_gain_of_both() -> None:
     robot = middle(OFFERS, FIRST)
-    told(robot, *both(Value((1,))))
-    told(robot, *both(Offer(None)))
-    assert told(robot, ("RA", Accept(1, 0, 7))) == both(Gain(0, 7))
+    replies(robot, *both(Value((1,))))
+    replies(robot, *both(Offer(None)))
+    assert replies(robot, ("RA", Accept(1, 0, 7))) == both(Gain(0, 7))
 
 
 @pytest.mark.parametrize(("rival", "go"), [(6, True), (7, True), (8, False)])
 def test_the_committed_say_go_if_nobody_else_gains_more(rival: int, go: bool) -> None:  # noqa: FBT001
     robot = middle(OFFERS, FIRST)
-    told(robot, *both(Value((1,))))
-    told(robot, *both(Offer(None)))
-    told(robot, ("RA", Accept(1, 0, 7)))
-    assert told(robot, ("RA", Gain(0, 7)), ("RC", Gain(0, rival))) == [("RA", Go(go))]
+    replies(robot, *both(Value((1,))))
+    replies(robot, *both(Offer(None)))
+    replies(robot, ("RA", Accept(1, 0, 7)))
+    assert replies(robot, ("RA", Gain(0, 7)), ("RC", Gain(0, rival))) == [("RA", Go(go))]
 
 
 @pytest.mark.parametrize(("theirs", "moved"), [(True, (2,)), (False, (1,))])
 def test_both_move_or_neither(theirs: bool, moved: tuple[int]) -> None:  # noqa: FBT001
     robot = middle(OFFERS, FIRST)
-    told(robot, *both(Value((1,))))
-    told(robot, *both(Offer(None)))
-    told(robot, ("RA", Accept(1, 0, 7)))
-    told(robot, ("RA", Gain(0, 7)), ("RC", Gain(0, 0)))
-    assert told(robot, ("RA", Go(theirs))) == both(Value(moved))
+    replies(robot, *both(Value((1,))))
+    replies(robot, *both(Offer(None)))
+    replies(robot, ("RA", Accept(1, 0, 7)))
+    replies(robot, ("RA", Gain(0, 7)), ("RC", Gain(0, 0)))
+    assert replies(robot, ("RA", Go(theirs))) == both(Value(moved))
 
 
 def test_who_is_committed_and_has_lost_stays_though_the_partner_would_go() -> None:
     robot = middle(OFFERS, FIRST)
-    told(robot, *both(Value((1,))))
-    told(robot, *both(Offer(None)))
-    told(robot, ("RA", Accept(1, 0, 7)))
-    told(robot, ("RA", Gain(0, 7)), ("RC", Gain(0, 8)))
-    told(robot, ("RA", Go(True)))
+    replies(robot, *both(Value((1,))))
+    replies(robot, *both(Offer(None)))
+    replies(robot, ("RA", Accept(1, 0, 7)))
+    replies(robot, ("RA", Gain(0, 7)), ("RC", Gain(0, 8)))
+    replies(robot, ("RA", Go(True)))
     assert value(robot) == (1,)
 
 
 def test_a_neighbour_may_be_several_phases_ahead() -> None:
     """A has taken B's offer, and tells its gain, while B still waits for C's."""
     robot = middle(OFFERS, FIRST)
-    told(robot, *both(Value((1,))))
-    assert told(robot, ("RA", Offer(None)), ("RA", Accept(1, 0, 7)), ("RA", Gain(0, 7))) == []
-    assert told(robot, ("RC", Offer(None))) == both(Gain(0, 7))
-    assert told(robot, ("RC", Gain(0, 0))) == [("RA", Go(True))]
+    replies(robot, *both(Value((1,))))
+    assert replies(robot, ("RA", Offer(None)), ("RA", Accept(1, 0, 7)), ("RA", Gain(0, 7))) == []
+    assert replies(robot, ("RC", Offer(None))) == both(Gain(0, 7))
+    assert replies(robot, ("RC", Gain(0, 0))) == [("RA", Go(True))]
 
 
 def test_an_n_ary_constraint_that_both_have_part_in_counts_once() -> None:
@@ -163,13 +163,13 @@ def test_an_n_ary_constraint_that_both_have_part_in_counts_once() -> None:
     scope = ("A", "B", "C")
     team = team_of(dict.fromkeys("ABC", (1, 2)), [Constraint("T", rows, scope, scope)])
     result = played(team, MGM2, Concurrent(0), 1, cycles=20)
-    course = course_of(team, result)
-    assert burden_of(team, course[-1]) == (0, 0)
+    course = assignments_by_cycle(team, result)
+    assert cost_of_assignment(team, course[-1]) == (0, 0)
     robot = robot_of(MGM2, team, "RB", 0.0, WAITS)
     started(robot)
-    told(robot, *both(TWO))
-    told(robot, *both(Value((1,))))
-    assert told(robot, ("RA", gains((0, -3), (-3, 6))), ("RC", Offer(None)))[0] == ("RA", Accept(1, 0, 6))
+    replies(robot, *both(TWO))
+    replies(robot, *both(Value((1,))))
+    assert replies(robot, ("RA", gains((0, -3), (-3, 6))), ("RC", Offer(None)))[0] == ("RA", Accept(1, 0, 6))
 
 
 def test_two_that_are_stuck_alone_move_together() -> None:
@@ -177,7 +177,9 @@ def test_two_that_are_stuck_alone_move_together() -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [Constraint("C", BOTH, pair, pair)])
     ends = {
         protocol: [
-            burden_of(team, course_of(team, played(team, protocol, Concurrent(0), seed, cycles=20))[-1])
+            cost_of_assignment(
+                team, assignments_by_cycle(team, played(team, protocol, Concurrent(0), seed, cycles=20))[-1]
+            )
             for seed in range(20)
         ]
         for protocol in (MGM, MGM2)
@@ -194,8 +196,8 @@ def test_the_cost_never_rises_and_the_end_is_a_2_optimum(batch: int) -> None:
     for seed in range(60):
         team = chance.choice((random_cost_team, random_hard_team))(chance)
         if all(domains_of(team).values()):
-            course = course_of(team, played(team, MGM2, any_schedule(chance), seed, cycles=60))
-            assert never_rises([burden_of(team, values) for values in course])
+            course = assignments_by_cycle(team, played(team, MGM2, any_schedule(chance), seed, cycles=60))
+            assert never_rises([cost_of_assignment(team, values) for values in course])
             ended += 1
             at_optimum += is_optimal(team, course[-1], together=2)
     assert at_optimum >= ended - 1

@@ -10,44 +10,31 @@ from random import Random
 import pytest
 
 from robochoc.communication.processes.processes import ProcessesRun
-from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
-from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats.folder import write_team
 from robochoc.formats.team import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Model, Relation, Semantics, Team
+from robochoc.model.problem import ConstraintModel, Team
 from robochoc.protocols.abt import ABT, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import Protocol
 from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.verification.checker import objections
-from tests.conformance.test_complex_teams import compiled_by_hand
-from tests.support.agents import told
+from tests.support.agents import replies
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.pkc_bytes import changed_elsewhere, nothing_hidden, restated, run, watched
-from tests.support.pkc_problems import pkc_parts, random_pkc_team, with_part, with_private_parts
+from tests.support.pkc_problems import (
+    SECRETS,
+    check_against_brute_force,
+    pkc_pair,
+    pkc_part,
+    pkc_parts,
+    random_pkc_team,
+    with_part,
+    with_private_parts,
+)
 from tests.support.problems import ON_ONE_MACHINE, random_team, solutions, team_of
-from tests.support.program import ROOT
-
-SECRETS = ROOT / "docs" / "examples" / "secrets"
-
-
-def part(pair: str, *forbidden: tuple[int, int], name: str = "C") -> Constraint:
-    """One robot's part of a PKC over the variables named by two letters."""
-    called = "R" + "_".join(f"{one}.{other}" for one, other in forbidden)
-    relation = Relation(called, 2, Semantics.CONFLICTS, forbidden)
-    return Constraint(name, relation, tuple(pair), tuple(pair), Model.PKC)
-
-
-def pair_team(below: Constraint | None, above: Constraint | None, values: int = 2) -> Team:
-    """A above B, which share a PKC of these two parts."""
-    domains = dict.fromkeys("AB", range(1, values + 1))
-    team = team_of(domains, [below or part("AB")])
-    return team if above is None else with_part(team, "RA", "RB", above)
 
 
 def agent(team: Team, name: str) -> ABT:
@@ -62,7 +49,7 @@ def agent(team: Team, name: str) -> ABT:
 
 
 def test_the_value_goes_up_too_where_a_pkc_is_shared_and_only_there() -> None:
-    constraints = [part("AC"), replace(part("BC", name="T"), model=Model.TKC)]
+    constraints = [pkc_part("AC"), replace(pkc_part("BC", name="T"), model=ConstraintModel.TKC)]
     team = team_of(dict.fromkeys("ABC", (1, 2)), constraints)
     abt = ABT(LocalProblem(agent_problems(team)["RC"]), PriorityOrder(team.order))
     abt.start()
@@ -70,79 +57,79 @@ def test_the_value_goes_up_too_where_a_pkc_is_shared_and_only_there() -> None:
 
 
 def test_the_value_goes_up_where_only_the_parent_holds_a_part() -> None:
-    shown = replace(part("AB", name="T"), model=Model.TKC)
-    team = with_part(team_of(dict.fromkeys("AB", (1, 2)), [shown]), "RA", "RB", part("AB", (1, 1)))
+    shown = replace(pkc_part("AB", name="T"), model=ConstraintModel.TKC)
+    team = with_part(team_of(dict.fromkeys("AB", (1, 2)), [shown]), "RA", "RB", pkc_part("AB", (1, 1)))
     assert LocalProblem(agent_problems(team)["RB"]).partners == ("RA",)
 
 
 def test_a_lower_robot_checks_its_own_part() -> None:
-    abt = agent(pair_team(part("AB", (1, 1)), part("AB")), "RB")
-    assert told(abt, ("RA", Ok((1,)))) == [("RA", Ok((2,)))]
+    abt = agent(pkc_pair(pkc_part("AB", (1, 1)), pkc_part("AB")), "RB")
+    assert replies(abt, ("RA", Ok((1,)))) == [("RA", Ok((2,)))]
 
 
 def test_a_higher_robot_refuses_a_pair_that_its_part_forbids() -> None:
-    abt = agent(pair_team(part("AB"), part("AB", (1, 2))), "RA")
-    assert told(abt, ("RB", Ok((1,)))) == []
-    assert told(abt, ("RB", Ok((2,)))) == [("RB", Nogood({"RA": (1,)}, (2,)))]
+    abt = agent(pkc_pair(pkc_part("AB"), pkc_part("AB", (1, 2))), "RA")
+    assert replies(abt, ("RB", Ok((1,)))) == []
+    assert replies(abt, ("RB", Ok((2,)))) == [("RB", Nogood({"RA": (1,)}, (2,)))]
 
 
 def test_a_lower_value_is_no_part_of_the_view() -> None:
-    abt = agent(pair_team(part("AB"), part("AB")), "RA")
-    told(abt, ("RB", Ok((1,))))
+    abt = agent(pkc_pair(pkc_part("AB"), pkc_part("AB")), "RA")
+    replies(abt, ("RB", Ok((1,))))
     assert abt.view == {}
 
 
 def test_a_new_own_value_is_held_against_what_lower_robots_told() -> None:
-    abt = agent(pair_team(part("AB"), part("AB", (2, 1))), "RA")
-    assert told(abt, ("RB", Ok((1,)))) == []
-    said = told(abt, ("RB", Nogood({}, (1,))))
+    abt = agent(pkc_pair(pkc_part("AB"), pkc_part("AB", (2, 1))), "RA")
+    assert replies(abt, ("RB", Ok((1,)))) == []
+    said = replies(abt, ("RB", Nogood({}, (1,))))
     assert said == [("RB", Ok((2,))), ("RB", Nogood({"RA": (2,)}, (1,)))]
 
 
 def test_each_pair_is_checked_once() -> None:
-    abt = agent(pair_team(part("AB"), part("AB")), "RA")
-    told(abt, ("RB", Ok((1,))))
+    abt = agent(pkc_pair(pkc_part("AB"), pkc_part("AB")), "RA")
+    replies(abt, ("RB", Ok((1,))))
     assert abt.problem.checks == 1
-    told(abt)
+    replies(abt)
     assert abt.problem.checks == 1
 
 
 def test_a_refused_value_is_forgotten_until_it_is_told_again() -> None:
-    abt = agent(pair_team(part("AB"), part("AB", (1, 2))), "RA")
-    told(abt, ("RB", Ok((2,))))
-    assert told(abt) == []
-    assert told(abt, ("RB", Ok((2,)))) == [("RB", Nogood({"RA": (1,)}, (2,)))]
+    abt = agent(pkc_pair(pkc_part("AB"), pkc_part("AB", (1, 2))), "RA")
+    replies(abt, ("RB", Ok((2,))))
+    assert replies(abt) == []
+    assert replies(abt, ("RB", Ok((2,)))) == [("RB", Nogood({"RA": (1,)}, (2,)))]
 
 
 def test_the_refused_robot_accepts_as_in_abt() -> None:
-    abt = agent(pair_team(part("AB"), part("AB")), "RB")
-    told(abt, ("RA", Ok((1,))))
-    assert told(abt, ("RA", Nogood({"RA": (1,)}, (1,)))) == [("RA", Ok((2,)))]
+    abt = agent(pkc_pair(pkc_part("AB"), pkc_part("AB")), "RB")
+    replies(abt, ("RA", Ok((1,))))
+    assert replies(abt, ("RA", Nogood({"RA": (1,)}, (1,)))) == [("RA", Ok((2,)))]
 
 
 def test_the_refused_robot_answers_a_nogood_that_rests_on_an_old_value() -> None:
-    abt = agent(pair_team(part("AB"), part("AB")), "RB")
-    told(abt, ("RA", Ok((2,))))
-    assert told(abt, ("RA", Nogood({"RA": (1,)}, (1,)))) == [("RA", Ok((1,)))]
+    abt = agent(pkc_pair(pkc_part("AB"), pkc_part("AB")), "RB")
+    replies(abt, ("RA", Ok((2,))))
+    assert replies(abt, ("RA", Nogood({"RA": (1,)}, (1,)))) == [("RA", Ok((1,)))]
 
 
 def test_a_refusal_names_only_the_variables_that_the_part_looks_at() -> None:
     domains = dict.fromkeys(("a", "A", "b", "B"), (1, 2))
-    shown = [replace(part(pair, name="T"), model=Model.TKC) for pair in ("ab", "AB")]
+    shown = [replace(pkc_part(pair, name="T"), model=ConstraintModel.TKC) for pair in ("ab", "AB")]
     team = complex_team({"RA": ["a", "A"], "RB": ["b", "B"]}, domains, shown)
-    problem = LocalProblem(agent_problems(with_part(team, "RA", "RB", part("AB", (1, 2))))["RA"])
+    problem = LocalProblem(agent_problems(with_part(team, "RA", "RB", pkc_part("AB", (1, 2))))["RA"])
     assert problem.refuses(0, "RB", (1, 2)) == {"RA": (None, 1), "RB": (None, 2)}
     assert problem.refuses(0, "RB", (2, 1)) is None
 
 
 def test_two_parts_that_leave_nothing_together_have_no_solution() -> None:
-    team = pair_team(part("AB", (1, 1), (2, 2)), part("AB", (1, 2), (2, 1)))
+    team = pkc_pair(pkc_part("AB", (1, 1), (2, 2)), pkc_part("AB", (1, 2), (2, 1)))
     outcome = solve(team, Options(protocol="abt", runtime=Runtime.SIMULATOR))
     assert outcome.verdict is Verdict.NO_SOLUTION
 
 
 def test_who_steps_aside_cannot_be_found_with_pkc() -> None:
-    team = pair_team(part("AB", (1, 1)), part("AB"))
+    team = pkc_pair(pkc_part("AB", (1, 1)), pkc_part("AB"))
     with pytest.raises(UnsupportedError, match="PKC"):
         solve(team, Options(runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL))
 
@@ -150,40 +137,23 @@ def test_who_steps_aside_cannot_be_found_with_pkc() -> None:
 # The truth
 
 
-def schedule(chance: Random) -> Schedule:
-    if chance.random() < 0.5:
-        return RandomChannels(chance.getrandbits(32))
-    return Concurrent(chance.getrandbits(32), chance.choice((0, 3, 20, 200)))
-
-
-def agrees(team: Team, protocol: type[Protocol], chance: Random) -> Verdict:
-    """Solve `team`; the verdict must be brute force's, and a solution must hold."""
-    result = Simulation(compiled_by_hand(team), protocol, schedule(chance)).run(60)
-    solvable = any(solutions(team))
-    assert result.verdict is (Verdict.SOLUTION if solvable else Verdict.NO_SOLUTION), team
-    if solvable:
-        flat = {name: value for own in result.assignments.values() for name, value in own.items()}
-        assert not list(objections(team, flat))
-    return result.verdict
-
-
 def test_abt_agrees_with_brute_force() -> None:
     chance = Random("pkc abt")
-    seen = Counter(agrees(random_pkc_team(chance), ABT, chance) for _ in range(500))
+    seen = Counter(check_against_brute_force(random_pkc_team(chance), ABT, chance) for _ in range(500))
     assert min(seen.values()) > 125, seen
 
 
 def test_abt_agrees_where_all_is_split_and_n_ary_constraints_stay() -> None:
     chance = Random("pkc split")
     for _ in range(60):
-        agrees(with_private_parts(random_team(chance), chance), ABT, chance)
+        check_against_brute_force(with_private_parts(random_team(chance), chance), ABT, chance)
 
 
 def test_abt_agrees_on_complex_robots() -> None:
     chance = Random("pkc complex")
     for _ in range(40):
         team = with_private_parts(random_complex_team(chance), chance)
-        agrees(team, ABT, chance)
+        check_against_brute_force(team, ABT, chance)
 
 
 def test_splitting_keeps_the_solutions() -> None:
@@ -253,7 +223,7 @@ def test_how_the_queens_parts_are_stated_changes_no_byte(private_queens: Team) -
 
 def test_private_queens_have_no_solution(private_queens: Team) -> None:
     shared = [constraint for robot in private_queens.robots for constraint in robot.shared]
-    assert {constraint.model for constraint in shared} == {Model.PKC}
+    assert {constraint.model for constraint in shared} == {ConstraintModel.PKC}
     assert len(pkc_parts(private_queens)) == 2 * len(shared)
     assert run(private_queens, ABT, 0).result.verdict is Verdict.NO_SOLUTION
     assert ProcessesRun(private_queens, ABT).run(60).verdict is Verdict.NO_SOLUTION
@@ -264,7 +234,7 @@ def test_private_queens_have_no_solution(private_queens: Team) -> None:
 
 def test_the_example_is_solved() -> None:
     team = read_team(SECRETS)
-    assert {model.model for model in pkc_parts(team).values()} == {Model.PKC}
+    assert {model.model for model in pkc_parts(team).values()} == {ConstraintModel.PKC}
     for runtime in ON_ONE_MACHINE:
         outcome = solve(team, Options(protocol="abt", runtime=runtime, timeout=60))
         assert (outcome.verdict, outcome.verified) == (Verdict.SOLUTION, True)

@@ -19,11 +19,12 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.interchangeable import one_by_one
-from robochoc.protocols.sfb import LARGEST, SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
+from robochoc.protocols.sfb import LARGEST, SFB, SFBSettings
+from robochoc.protocols.sfb_messages import Above, Below, CPAs, Explored, Solution
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact import EXACT
-from tests.support.agents import told, value
+from tests.support.agents import replies, value
 from tests.support.cost_problems import least_cost, random_cost_team
 from tests.support.problems import team_of
 from tests.support.sfb_robots import CHAIN, agents, cpas, introduced, row, rows, team
@@ -39,20 +40,20 @@ def test_the_first_robot_tells_its_values_and_each_adds_its_own() -> None:
         robot.start()
     assert robots["RA"].outbox == [("RB", Above.of([BOTH]))]
     assert robots["RB"].outbox == []
-    assert told(robots["RB"], ("RA", Above.of([BOTH]))) == [("RC", Above.of([BOTH] * 2))]
+    assert replies(robots["RB"], ("RA", Above.of([BOTH]))) == [("RC", Above.of([BOTH] * 2))]
 
 
 def test_the_last_robot_turns_round_with_what_its_values_are_charged() -> None:
     robots = agents(team({**CHAIN, "C": (5, 0)}))
-    said = told(robots["RC"], ("RB", Above.of([BOTH] * 2)))
+    said = replies(robots["RC"], ("RB", Above.of([BOTH] * 2)))
     assert said == [("RB", Below.of([(BOTH, (5, 0))], 5))]
 
 
 def test_on_the_way_up_each_robot_adds_the_most_that_it_can_come_to() -> None:
     """Charges, and constraints of which it is the last but one: each constraint counts once, infinite costs not."""
     robots = agents(team({**CHAIN, "BC": (0, math.inf, 2, 1)}))
-    told(robots["RB"], ("RA", Above.of([BOTH])))
-    said = told(robots["RB"], ("RC", Below.of([(BOTH, (0, 0))], 0)))
+    replies(robots["RB"], ("RA", Above.of([BOTH])))
+    said = replies(robots["RB"], ("RC", Below.of([(BOTH, (0, 0))], 0)))
     assert said == [("RA", Below.of([(BOTH, (0, 0))] * 2, 2))]
     assert "RC" not in robots["RA"].problem.neighbours
 
@@ -66,7 +67,7 @@ def test_a_robot_without_values_ends_the_search_at_the_start() -> None:
     robots = agents(team_of({"A": (1, 2), "B": (), "C": (1,)}, []))
     robots["RB"].start()
     assert robots["RB"].verdict is Verdict.NO_SOLUTION
-    assert told(robots["RB"], ("RA", Above.of([BOTH]))) == []
+    assert replies(robots["RB"], ("RA", Above.of([BOTH]))) == []
 
 
 def test_a_robot_alone_solves_its_problem_in_silence() -> None:
@@ -107,7 +108,7 @@ def test_domains_of_more_or_fewer_robots_than_there_are_above_are_refused(messag
 )
 def test_charges_that_do_not_fit_are_refused(message: Below) -> None:
     robot = agents(team(CHAIN))["RB"]
-    told(robot, ("RA", Above.of([BOTH])))
+    replies(robot, ("RA", Above.of([BOTH])))
     with pytest.raises(ValueError, match="cannot say"):
         robot.receive("RC", message)
 
@@ -118,42 +119,42 @@ def test_charges_that_do_not_fit_are_refused(message: Below) -> None:
 def test_the_first_cpa_goes_alone_and_each_bundle_is_twice_as_large() -> None:
     robots, said_first = introduced(team(CHAIN), SFBSettings(window=9), begun=False)
     assert [message.count for message in said_first] == [1, 1]
-    said = told(robots["RB"], ("RA", cpas(*[row(0)] * 11, ceiling=10)))
+    said = replies(robots["RB"], ("RA", cpas(*[row(0)] * 11, ceiling=10)))
     assert [message.count for _, message in said if isinstance(message, CPAs)] == [1, 1, 4, 8, 8]
 
 
 def test_the_others_of_the_first_robot_s_values_wait_for_what_the_first_comes_to() -> None:
     robots, said = introduced(team(CHAIN), begun=False)
     assert [message.count for message in said] == [1]
-    assert told(robots["RA"], ("RB", Solution(1, [1, 0, 0])), ("RB", Explored())) == []
+    assert replies(robots["RA"], ("RB", Solution(1, [1, 0, 0])), ("RB", Explored())) == []
     assert robots["RA"].findings.bound == 1
 
 
 def test_no_bundle_is_larger_than_the_setting() -> None:
     robots, _ = introduced(team(CHAIN), SFBSettings(window=9, batch=2))
-    said = told(robots["RB"], ("RA", cpas(*[row(0)] * 6, ceiling=10)))
+    said = replies(robots["RB"], ("RA", cpas(*[row(0)] * 6, ceiling=10)))
     assert [message.count for _, message in said if isinstance(message, CPAs)] == [2, 4, 4, 2]
 
 
 def test_what_does_not_fit_into_a_message_waits_until_that_is_explored() -> None:
     robots, _ = introduced(team(CHAIN), SFBSettings(memory=3 * 6))  # a CPA for RC has 6 bytes
-    said = told(robots["RB"], ("RA", cpas(row(0), row(0), ceiling=10)))
+    said = replies(robots["RB"], ("RA", cpas(row(0), row(0), ceiling=10)))
     for _ in range(4):
         assert [message.count for _, message in said if isinstance(message, CPAs)] == [1]
-        said = told(robots["RB"], ("RC", Explored()))
+        said = replies(robots["RB"], ("RC", Explored()))
     assert said == [("RA", Explored())]
 
 
 def test_what_waits_is_pruned_like_what_is_not_extended() -> None:
     robots, _ = introduced(team(CHAIN), SFBSettings(memory=1))
-    told(robots["RB"], ("RA", cpas(row(0), ceiling=10)))
-    said = told(robots["RB"], ("RC", Solution(1, [1, 0, 0])), ("RC", Explored()))
+    replies(robots["RB"], ("RA", cpas(row(0), ceiling=10)))
+    said = replies(robots["RB"], ("RC", Solution(1, [1, 0, 0])), ("RC", Explored()))
     assert said == [("RA", Solution(1, [1, 0, 0])), ("RA", Explored())]
 
 
 def test_what_waits_counts_for_the_bound() -> None:
     robots, _ = introduced(team({"AB": (2, 5, 4, 9)}), SFBSettings(memory=1))
-    told(robots["RA"], ("RB", Solution(9, [1, 1])), ("RB", Explored()))
+    replies(robots["RA"], ("RB", Solution(9, [1, 1])), ("RB", Explored()))
     assert robots["RA"].findings.bound == 4
 
 
@@ -209,30 +210,30 @@ def test_with_much_memory_messages_are_no_larger_than_others_can_take() -> None:
 
 def test_no_more_messages_are_under_way_than_the_window_allows() -> None:
     robots, _ = introduced(team(CHAIN), SFBSettings(window=2))
-    said = told(robots["RB"], ("RA", cpas(*[row(0)] * 11, ceiling=10)))
+    said = replies(robots["RB"], ("RA", cpas(*[row(0)] * 11, ceiling=10)))
     assert [message.count for _, message in said if isinstance(message, CPAs)] == [2, 4]
-    said = told(robots["RB"], ("RC", Explored()))
+    said = replies(robots["RB"], ("RC", Explored()))
     assert [message.count for _, message in said if isinstance(message, CPAs)] == [8]
 
 
 def test_one_message_is_under_way_unless_more_are_asked_for() -> None:
     robots, _ = introduced(team(CHAIN))
-    said = told(robots["RB"], ("RA", cpas(*[row(0)] * 11, ceiling=10)))
+    said = replies(robots["RB"], ("RA", cpas(*[row(0)] * 11, ceiling=10)))
     assert [message.count for _, message in said if isinstance(message, CPAs)] == [2]
 
 
 def test_a_bundle_is_explored_when_all_that_came_of_it_is() -> None:
     robots, _ = introduced(team(CHAIN), SFBSettings(window=2))
-    told(robots["RB"], ("RA", cpas(row(0), row(0), ceiling=10)))
-    assert told(robots["RB"], ("RC", Explored())) == []
-    assert told(robots["RB"], ("RC", Explored())) == [("RA", Explored())]
+    replies(robots["RB"], ("RA", cpas(row(0), row(0), ceiling=10)))
+    assert replies(robots["RB"], ("RC", Explored())) == []
+    assert replies(robots["RB"], ("RC", Explored())) == [("RA", Explored())]
 
 
 def test_bundles_are_explored_in_the_order_in_which_they_came() -> None:
     robots, _ = introduced(team(CHAIN), SFBSettings(window=2))
     first, second = cpas(row(0), ceiling=10), cpas(row(9), least=9, ceiling=10)
-    assert [type(message) for _, message in told(robots["RB"], ("RA", first), ("RA", second))] == [CPAs]
-    assert told(robots["RB"], ("RC", Explored())) == [("RA", Explored())] * 2
+    assert [type(message) for _, message in replies(robots["RB"], ("RA", first), ("RA", second))] == [CPAs]
+    assert replies(robots["RB"], ("RC", Explored())) == [("RA", Explored())] * 2
 
 
 @pytest.mark.parametrize("settings", [{"batch": "0"}, {"window": "0"}, {"memory": "0"}, {"batch": "many"}])
@@ -246,30 +247,30 @@ def test_settings_that_will_not_do_are_refused(settings: dict[str, str]) -> None
 
 def test_the_last_robot_makes_the_cheapest_of_its_cpas_a_solution() -> None:
     robots, _ = introduced(team(CHAIN))
-    said = told(robots["RC"], ("RB", cpas([2, 2, 0, 1, 2, 1], [1, 1, 1, 0, 0, 4], ceiling=10)))
+    said = replies(robots["RC"], ("RB", cpas([2, 2, 0, 1, 2, 1], [1, 1, 1, 0, 0, 4], ceiling=10)))
     assert said == [("RB", Solution(1, [1, 0, 0])), ("RB", Explored())]
     assert value(robots["RC"]) == (1,)
 
 
 def test_one_that_is_no_cheaper_is_none() -> None:
     robots, _ = introduced(team(CHAIN))
-    assert told(robots["RC"], ("RB", cpas([1, 1, 1, 0, 0, 4], least=1, ceiling=10))) == [("RB", Explored())]
+    assert replies(robots["RC"], ("RB", cpas([1, 1, 1, 0, 0, 4], least=1, ceiling=10))) == [("RB", Explored())]
     assert value(robots["RC"]) is None
 
 
 def test_a_solution_is_told_up_the_order_and_everybody_holds_its_value() -> None:
     robots, _ = introduced(team(CHAIN))
-    told(robots["RB"], ("RA", cpas(row(0), ceiling=10)))
-    assert told(robots["RB"], ("RC", Solution(1, [1, 0, 0]))) == [("RA", Solution(1, [1, 0, 0]))]
+    replies(robots["RB"], ("RA", cpas(row(0), ceiling=10)))
+    assert replies(robots["RB"], ("RC", Solution(1, [1, 0, 0]))) == [("RA", Solution(1, [1, 0, 0]))]
     assert value(robots["RB"]) == (1,)
-    assert told(robots["RA"], ("RB", Solution(1, [1, 0, 0]))) == []
+    assert replies(robots["RA"], ("RB", Solution(1, [1, 0, 0]))) == []
     assert value(robots["RA"]) == (2,)
 
 
 def test_what_a_solution_costs_prunes_what_is_there_already_and_what_is_sent() -> None:
     robots, _ = introduced(team(CHAIN), SFBSettings(window=1))
-    told(robots["RB"], ("RA", cpas(row(0), row(3), row(0), ceiling=10)))
-    said = told(robots["RB"], ("RC", Solution(2, [1, 0, 0])), ("RC", Explored()))
+    replies(robots["RB"], ("RA", cpas(row(0), row(3), row(0), ceiling=10)))
+    said = replies(robots["RB"], ("RC", Solution(2, [1, 0, 0])), ("RC", Explored()))
     (sent,) = [message for _, message in said if isinstance(message, CPAs)]
     assert sent.least == 2
     assert [one[0] for one in rows(sent)] == [0, 1]
@@ -277,14 +278,14 @@ def test_what_a_solution_costs_prunes_what_is_there_already_and_what_is_sent() -
 
 def test_when_the_first_robot_has_explored_all_there_is_nothing_to_say_and_the_solution_stands() -> None:
     robots, _ = introduced(team(CHAIN))
-    assert told(robots["RA"], ("RB", Solution(1, [1, 0, 0])), ("RB", Explored())) == []
+    assert replies(robots["RA"], ("RB", Solution(1, [1, 0, 0])), ("RB", Explored())) == []
     assert robots["RA"].verdict is None
     assert value(robots["RA"]) == (2,)
 
 
 def test_when_the_first_robot_has_explored_all_without_a_solution_there_is_none() -> None:
     robots, _ = introduced(team(CHAIN))
-    told(robots["RA"], ("RB", Explored()))
+    replies(robots["RA"], ("RB", Explored()))
     assert robots["RA"].verdict is Verdict.NO_SOLUTION
 
 
@@ -335,7 +336,7 @@ def test_what_no_robot_says_is_refused(sender: str, message: Message) -> None:
             stranger.receive(sender, message)
         return
     with pytest.raises(ValueError, match=r"cannot say|are not|there are not"):
-        told(robots["RB"], (sender, message))
+        replies(robots["RB"], (sender, message))
 
 
 def test_costs_that_floats_do_not_hold_exactly_are_refused() -> None:
@@ -359,7 +360,7 @@ def test_the_first_robot_tells_the_least_bound_of_what_is_not_explored() -> None
 
 def test_whoever_has_heard_of_a_solution_tells_it() -> None:
     robots, _ = introduced(team(CHAIN))
-    told(robots["RB"], ("RA", cpas(row(0), ceiling=10)), ("RC", Solution(7, [0, 1, 0])))
+    replies(robots["RB"], ("RA", cpas(row(0), ceiling=10)), ("RC", Solution(7, [0, 1, 0])))
     best = robots["RB"].findings.best
     assert best is not None
     assert best.cost == 7

@@ -8,10 +8,11 @@ import pytest
 
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.protocols.sfb import SFB, Explored
-from tests.support.agents import told
+from robochoc.protocols.sfb import SFB
+from robochoc.protocols.sfb_messages import Explored
+from tests.support.agents import replies
+from tests.support.pseudo_trees import priced
 from tests.support.sfb_robots import CHAIN, cpas, introduced, rows, team
-from tests.support.trees import priced
 
 
 def test_a_cpa_tells_its_bound_its_cost_its_values_and_what_values_below_would_cost() -> None:
@@ -37,13 +38,13 @@ def test_the_bound_adds_the_least_of_each_robot_below() -> None:
 
 def test_what_cannot_become_cheaper_than_the_best_known_is_not_sent() -> None:
     robots, _ = introduced(team(CHAIN))
-    said = told(robots["RB"], ("RA", cpas([1, 1, 1, 0, 2, 0, 0], least=3, ceiling=10)))
+    said = replies(robots["RB"], ("RA", cpas([1, 1, 1, 0, 2, 0, 0], least=3, ceiling=10)))
     assert [row[:4] for row in rows(said[0][1])] == [[1, 1, 1, 0]]  # RB 2 would have paid 2, and RC 1
 
 
 def test_where_nothing_is_left_to_send_the_robot_goes_back_at_once() -> None:
     robots, _ = introduced(team(CHAIN))
-    assert told(robots["RB"], ("RA", cpas([1, 1, 1, 0, 2, 0, 0], least=1, ceiling=10))) == [("RA", Explored())]
+    assert replies(robots["RB"], ("RA", cpas([1, 1, 1, 0, 2, 0, 0], least=1, ceiling=10))) == [("RA", Explored())]
 
 
 def test_a_broken_hard_constraint_reaches_the_ceiling() -> None:
@@ -65,7 +66,7 @@ def test_of_an_n_ary_constraint_the_last_but_one_adds_what_the_last_will_pay() -
     """The first robot of the scope adds nothing."""
     robots, said = introduced(team({"ABC": (1, 2, 3, 4, 5, 6, 7, 8)}))
     assert [row[3:] for row in rows(said[0])] == [[0, 0, 0, 0]] * 2
-    said_next = told(robots["RB"], ("RA", cpas([0, 0, 1, 0, 0, 0, 0], ceiling=9)))
+    said_next = replies(robots["RB"], ("RA", cpas([0, 0, 1, 0, 0, 0, 0], ceiling=9)))
     assert rows(said_next[0][1]) == [[5, 0, 1, 0, 5, 6], [7, 0, 1, 1, 7, 8]]
 
 
@@ -77,5 +78,5 @@ def test_domains_may_be_of_different_sizes() -> None:
 def test_all_constraint_checks_are_done_before_the_search() -> None:
     robots, said = introduced(team(CHAIN))
     checks = [robot.problem.checks for robot in robots.values()]
-    assert told(robots["RB"], ("RA", said[0]))
+    assert replies(robots["RB"], ("RA", said[0]))
     assert [robot.problem.checks for robot in robots.values()] == checks

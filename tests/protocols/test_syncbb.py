@@ -20,7 +20,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.syncbb import Backtrack, BestPath, Cost, Path, SyncBB, Terminate
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import told, value
+from tests.support.agents import replies, value
 from tests.support.cost_problems import least_cost, random_cost_team
 from tests.support.problems import team_of
 
@@ -73,70 +73,70 @@ def test_the_first_robot_makes_the_path_and_the_others_wait() -> None:
 
 def test_a_robot_adds_its_first_value_and_what_it_costs() -> None:
     robot = agent(triangle(), "RB")
-    assert told(robot, ("RA", path((1, 0)))) == [("RC", path((1, 0), (1, 5)))]
+    assert replies(robot, ("RA", path((1, 0)))) == [("RC", path((1, 0), (1, 5)))]
     assert value(robot) == (1,)
 
 
 def test_a_value_with_which_the_path_costs_as_much_as_the_best_one_is_passed_over() -> None:
     bound = best(5, 2, 1, 2)
     robot = agent(triangle(), "RB")
-    assert told(robot, ("RA", path((1, 0), best=bound))) == [("RC", path((1, 0), (2, 0), best=bound))]
+    assert replies(robot, ("RA", path((1, 0), best=bound))) == [("RC", path((1, 0), (2, 0), best=bound))]
 
 
 def test_a_robot_without_a_value_left_sends_the_path_back_to_the_robot_before() -> None:
     bound = best(4, 2, 1, 2)
     robot = agent(triangle(), "RB")
-    told(robot, ("RA", path((2, 0), best=bound)))
-    assert told(robot, ("RC", Backtrack(bound))) == [("RA", Backtrack(bound))]
+    replies(robot, ("RA", path((2, 0), best=bound)))
+    assert replies(robot, ("RC", Backtrack(bound))) == [("RA", Backtrack(bound))]
     assert value(robot) is None
 
 
 def test_the_robot_before_takes_its_next_value_and_does_not_price_the_first_ones_again() -> None:
     robot = agent(triangle(), "RB")
-    told(robot, ("RA", path((1, 0))))
+    replies(robot, ("RA", path((1, 0))))
     before = robot.problem.checks
     bound = best(8, 1, 1, 1)
-    assert told(robot, ("RC", Backtrack(bound))) == [("RC", path((1, 0), (2, 0), best=bound))]
+    assert replies(robot, ("RC", Backtrack(bound))) == [("RC", path((1, 0), (2, 0), best=bound))]
     assert robot.problem.checks == before + 1
 
 
 def test_the_last_robot_s_path_is_the_best_one_and_it_looks_on_for_a_cheaper_one() -> None:
     robot = agent(triangle(), "RC")
-    assert told(robot, ("RB", path((1, 0), (1, 5)))) == [("RB", Backtrack(best(7, 1, 1, 2)))]
+    assert replies(robot, ("RB", path((1, 0), (1, 5)))) == [("RB", Backtrack(best(7, 1, 1, 2)))]
 
 
 def test_a_path_that_costs_as_much_as_the_new_bound_goes_back_without_a_look_at_other_values() -> None:
     robot = agent(triangle(), "RB")
-    told(robot, ("RA", path((2, 3))))
+    replies(robot, ("RA", path((2, 3))))
     before = robot.problem.checks
-    assert told(robot, ("RC", Backtrack(best(3, 1, 2, 1)))) == [("RA", Backtrack(best(3, 1, 2, 1)))]
+    assert replies(robot, ("RC", Backtrack(best(3, 1, 2, 1)))) == [("RA", Backtrack(best(3, 1, 2, 1)))]
     assert robot.problem.checks == before
 
 
 def test_a_broken_hard_constraint_is_never_added() -> None:
     hard = team_of(dict.fromkeys("AB", (1, 2)), [priced("AB", {(1, 1): INFINITE, (1, 2): INFINITE})])
-    assert told(agent(hard, "RB"), ("RA", path((1, 0)))) == [("RA", Backtrack(NONE))]
+    assert replies(agent(hard, "RB"), ("RA", path((1, 0)))) == [("RA", Backtrack(NONE))]
 
 
 def test_the_best_path_is_told_to_all_when_the_first_robot_has_no_value_left() -> None:
     robot = agent(triangle(), "RA")
-    told(robot, ("RB", Backtrack(best(4, 1, 2, 2))))
+    replies(robot, ("RB", Backtrack(best(4, 1, 2, 2))))
     found = best(1, 1, 2, 1)
-    assert told(robot, ("RB", Backtrack(found))) == [("RB", Terminate(found)), ("RC", Terminate(found))]
+    assert replies(robot, ("RB", Backtrack(found))) == [("RB", Terminate(found)), ("RC", Terminate(found))]
     assert value(robot) == (1,)
     assert robot.verdict is None
 
 
 def test_who_is_told_the_end_takes_its_value_in_the_best_path_and_is_silent() -> None:
     robot = agent(triangle(), "RB")
-    assert told(robot, ("RA", Terminate(best(1, 1, 2, 1)))) == []
+    assert replies(robot, ("RA", Terminate(best(1, 1, 2, 1)))) == []
     assert value(robot) == (2,)
 
 
 def test_there_is_no_solution_when_the_first_robot_has_heard_of_none() -> None:
     robot = agent(triangle(), "RA")
-    told(robot, ("RB", Backtrack(NONE)))
-    assert told(robot, ("RB", Backtrack(NONE))) == []
+    replies(robot, ("RB", Backtrack(NONE)))
+    assert replies(robot, ("RB", Backtrack(NONE))) == []
     assert robot.verdict is Verdict.NO_SOLUTION
 
 
@@ -151,8 +151,8 @@ def test_a_robot_alone_is_the_first_and_the_last() -> None:
 
 def test_an_n_ary_constraint_is_paid_by_its_lowest_robot() -> None:
     team = team_of(dict.fromkeys("ABC", (1, 2)), [priced("ABC", {(1, 1, 1): 7})])
-    assert told(agent(team, "RB"), ("RA", path((1, 0)))) == [("RC", path((1, 0), (1, 0)))]
-    assert told(agent(team, "RC"), ("RB", path((1, 0), (1, 0)))) == [("RB", Backtrack(best(0, 1, 1, 2)))]
+    assert replies(agent(team, "RB"), ("RA", path((1, 0)))) == [("RC", path((1, 0), (1, 0)))]
+    assert replies(agent(team, "RC"), ("RB", path((1, 0), (1, 0)))) == [("RB", Backtrack(best(0, 1, 1, 2)))]
 
 
 def test_who_may_step_aside_does_so_last() -> None:
@@ -160,8 +160,8 @@ def test_who_may_step_aside_does_so_last() -> None:
     robot = SyncBB(LocalProblem(agent_problems(team, brief=RunParameters(aside=3))["RB"]), PriorityOrder(team.order))
     robot.start()
     aside: Value = (None,)
-    assert told(robot, ("RA", path((1, 0)))) == [("RA", Backtrack(BestPath(3, ((1,), aside))))]
-    told(robot, ("RA", Terminate(BestPath(3, ((1,), aside)))))
+    assert replies(robot, ("RA", path((1, 0)))) == [("RA", Backtrack(BestPath(3, ((1,), aside))))]
+    replies(robot, ("RA", Terminate(BestPath(3, ((1,), aside)))))
     assert robot.assignment == {}
 
 
@@ -169,7 +169,7 @@ def test_the_best_path_and_a_bound_are_found_before_the_end() -> None:
     constraints = [priced("A", {(1,): 2, (2,): 3}), priced("AB", {(1, 2): 4})]
     robot = agent(team_of(dict.fromkeys("AB", (1, 2)), constraints), "RA")
     assert robot.findings == Findings(bound=2)
-    told(robot, ("RB", Backtrack(best(6, 1, 1))))
+    replies(robot, ("RB", Backtrack(best(6, 1, 1))))
     assert robot.findings == Findings(best=Best(6, {"RA": (1,), "RB": (1,)}), bound=3)
     assert agent(triangle(), "RB").findings == Findings()
 

@@ -27,10 +27,10 @@ from robochoc.ros.live.rosbridge import (
     outgoing,
 )
 from robochoc.ros.sink import SinkError
-from robochoc.ros.source import Heard, SourceError
+from robochoc.ros.source import ReceivedMessage, SourceError
 from tests.support.clocks import waiting
+from tests.support.fake_servers import fake_server
 from tests.support.rosbridge_server import Manner, Server
-from tests.support.strangers import stranger
 
 POSE = "geometry_msgs/PoseStamped"
 STAMP = 1_700_000_000_123_456_789
@@ -138,7 +138,7 @@ def test_nobody_listens() -> None:
 @pytest.mark.parametrize("answer", [b"", b"HTTP/1.1 404 Not Found\r\n\r\n", b"\xff" * 100_000])
 def test_what_listens_is_no_rosbridge(answer: bytes) -> None:
     refusal = pytest.raises(SinkError, match="does not answer as a rosbridge does; start it")
-    with stranger(answer, hangs_up=False) as port, waiting(3), refusal:
+    with fake_server(answer, hangs_up=False) as port, waiting(3), refusal:
         RosbridgeSink(f"//127.0.0.1:{port}")
 
 
@@ -236,14 +236,14 @@ def test_a_server_that_dies_wakes_who_waits(server: Server) -> None:
 PROGRAM = """
 import sys
 from robochoc.ros.live.rosbridge import RosbridgeSink, RosbridgeSource
-from robochoc.ros.sink import SinkFailed
+from robochoc.ros.sink import SinkError
 source = RosbridgeSource(sys.argv[1])
 source.listen({"/a": "std_msgs/String"})
 sink = RosbridgeSink(sys.argv[1])
 try:
     for number in range(100_000):
         sink.publish("/a", "std_msgs/String", {"data": "x" * 1000}, 0)
-except SinkFailed as failed:
+except SinkError as failed:
     print(failed)
 """
 
@@ -323,11 +323,11 @@ def test_what_we_send_we_understand(stamp: int, fields: dict[str, object]) -> No
 
 def test_a_loud_topic_does_not_push_out_others() -> None:
     inbox = Inbox(per_topic=10, weight=1000)
-    inbox.put(Heard("/blocked", "a", {}, 0))
+    inbox.put(ReceivedMessage("/blocked", "a", {}, 0))
     for number in range(100):
-        inbox.put(Heard("/battery", "b", {}, number))
-    inbox.put(Heard("/long", "c", {}, 0), 900)
-    inbox.put(Heard("/long", "c", {}, 1), 980)
+        inbox.put(ReceivedMessage("/battery", "b", {}, number))
+    inbox.put(ReceivedMessage("/long", "c", {}, 0), 900)
+    inbox.put(ReceivedMessage("/long", "c", {}, 1), 980)
     heard = []
     while (one := inbox.get(0)) is not None:
         heard.append((one.topic, one.at_ns))

@@ -211,7 +211,7 @@ def test_a_full_disk_is_told_and_nothing_is_left(text: str) -> None:
     """The process may write 40 kB to a file: its next write fails."""
     program = f"""
 import resource, signal, sys
-from robochoc.ros.sink import SinkFailed
+from robochoc.ros.sink import SinkError
 from robochoc.ros.sinks import open_sink
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
@@ -221,7 +221,7 @@ try:
         for at in range(20_000):
             point = {{"point": {{"x": random.random(), "y": random.random()}}}}
             sink.publish("/b", "geometry_msgs/PointStamped", point, at)
-except SinkFailed as failed:
+except SinkError as failed:
     print(failed)
 """
     done = subprocess.run([sys.executable, "-W", "error", "-c", program], capture_output=True, text=True, check=True)

@@ -8,24 +8,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from robochoc.flight.flight import Flown
+from robochoc.flight.flight import FlightLog
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Mission
 from robochoc.formats import read_team
-from robochoc.model.change import changed_by
+from robochoc.model.change import team_after_events
 from robochoc.model.outcome import Outcome, Verdict
-from robochoc.model.problem import Event, RemoveAgent, RemoveValue
-from robochoc.ros.closed_loop import Loop, drones_of
-from robochoc.ros.simulated import CannotFlyError, Flying, Surroundings, UnknownDroneError
+from robochoc.model.problem import RemoveAgent, RemoveValue, ScenarioEvent
+from robochoc.ros.closed_loop import ClosedLoop, drones_of
+from robochoc.ros.simulated_feedback import CannotFlyError, FlightSettings, SimulatedFeedback, UnknownDroneError
 from robochoc.run.orchestrator import Options, Runtime, solve
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import ROOT
 
 HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")
 PLACE: Point = (3.0, 1.0, 3.0)
 """Where Port is first sent."""
-MET = Surroundings(obstacles=(PLACE,), failures=(("Fin", 7.0),))
+MET = FlightSettings(obstacles=(PLACE,), failures=(("Fin", 7.0),))
 SIMULATED = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
 
 
@@ -34,14 +34,14 @@ class Looped:
     """What a closed loop has come to."""
 
     outcome: Outcome
-    loop: Loop
-    flown: Flown
+    loop: ClosedLoop
+    flown: FlightLog
     mission: Mission
 
 
-def looped(surroundings: Surroundings, options: Options = SIMULATED, *, scale: float | None = None) -> Looped:
-    flying = Flying(surroundings)
-    loop = Loop(HANGAR, (), flying, scale=scale)
+def looped(surroundings: FlightSettings, options: Options = SIMULATED, *, scale: float | None = None) -> Looped:
+    flying = SimulatedFeedback(surroundings)
+    loop = ClosedLoop(HANGAR, (), flying, scale=scale)
     outcome = solve(HANGAR, options, field=loop)
     flown = flying.flown()
     assert flown is not None
@@ -63,11 +63,11 @@ def test_an_obstacle_and_a_drone_that_falls_out(runtime: Runtime, met: Looped) -
     done = met if runtime is Runtime.SIMULATOR else looped(MET, replace(SIMULATED, runtime=runtime))
     outcome, flown = done.outcome, done.flown
     assert openings(outcome) == ["the start", "port without 3", "-Fin"]
-    assert done.loop.events == [Event((RemoveValue("port", 3),)), Event((RemoveAgent("Fin"),))]
+    assert done.loop.events == [ScenarioEvent((RemoveValue("port", 3),)), ScenarioEvent((RemoveAgent("Fin"),))]
     assert (outcome.verdict, outcome.verified, outcome.protocol) == (Verdict.SOLUTION, True, "dynabt")
     assert all(epoch.verified for epoch in outcome.epochs)
-    now = changed_by(done.loop.team, outcome.events)
-    assert list(objections(now, outcome.assignment)) == []
+    now = team_after_events(done.loop.team, outcome.events)
+    assert list(violations(now, outcome.assignment)) == []
     assert "Fin" not in now
     assert outcome.assignment["port"] != PLACE[2]
 
@@ -82,7 +82,7 @@ def test_an_obstacle_and_a_drone_that_falls_out(runtime: Runtime, met: Looped) -
         assert done.mission.legs[-1].goals[number].at[2] == level
         assert math.dist(here, done.mission.legs[-1].goals[number].at) < 0.01
         assert math.dist(here, PLACE) > 0.5
-    assert [stage.title for stage in flown.stages] == [leg.opened_by for leg in done.mission.legs] == openings(outcome)
+    assert [leg.title for leg in flown.legs] == [leg.opened_by for leg in done.mission.legs] == openings(outcome)
     port = [drone.name for drone in done.mission.drones].index("Port")
     assert float(np.sqrt(np.square(flown.positions[:, port] - PLACE).sum(1)).min()) > 0.4
     assert flown.nearest is not None
@@ -104,19 +104,19 @@ def test_the_same_again(met: Looped) -> None:
     again = looped(MET)
     assert [epoch.assignment for epoch in met.outcome.epochs] == [epoch.assignment for epoch in again.outcome.epochs]
     assert np.array_equal(met.flown.positions, again.flown.positions)
-    assert met.flown.stages == again.flown.stages
+    assert met.flown.legs == again.flown.legs
 
 
 def test_two_things_at_once_are_two_epochs_or_one_as_they_come() -> None:
     apart = looped(replace(MET, failures=(("Fin", 3.5),)))
     assert openings(apart.outcome) == ["the start", "port without 3", "-Fin"]
-    assert [stage.title for stage in apart.flown.stages] == openings(apart.outcome)
+    assert [leg.title for leg in apart.flown.legs] == openings(apart.outcome)
     together = looped(replace(MET, failures=(("Fin", 2.8),)))
     assert openings(together.outcome) == ["the start", "port without 3, -Fin"]
 
 
 def test_an_obstacle_where_nobody_is_sent_changes_nothing() -> None:
-    calm = looped(Surroundings(obstacles=((1.0, 5.0, 2.0),)))
+    calm = looped(FlightSettings(obstacles=((1.0, 5.0, 2.0),)))
     assert openings(calm.outcome) == ["the start"]
     assert np.nanmax(calm.flown.errors_m) < 0.01
 
@@ -135,7 +135,7 @@ def test_who_falls_when_all_hover_is_missed_too() -> None:
 
 def test_one_after_the_other_falls_out() -> None:
     failures = tuple((name, 2.0 + number * 0.9) for number, name in enumerate(HANGAR.order))
-    last = looped(Surroundings(failures=failures))
+    last = looped(FlightSettings(failures=failures))
     assert last.outcome.verdict is Verdict.SOLUTION
     assert last.outcome.assignment == {}
     assert last.outcome.epochs[-1].robots == ()
@@ -146,9 +146,9 @@ def test_one_after_the_other_falls_out() -> None:
 
 def test_who_is_to_fail_has_to_be_there() -> None:
     with pytest.raises(UnknownDroneError, match="no drone 'Wing' that could fail, but Fin, Nose"):
-        Surroundings(failures=(("Wing", 1.0),)).check(drones_of(HANGAR))
+        FlightSettings(failures=(("Wing", 1.0),)).check(drones_of(HANGAR))
 
 
 def test_places_nearer_than_the_distance_to_keep_are_refused() -> None:
     with pytest.raises(CannotFlyError, match="5 m are to be kept"):
-        looped(Surroundings(distance=5.0))
+        looped(FlightSettings(distance=5.0))

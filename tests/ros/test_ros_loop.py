@@ -13,19 +13,19 @@ import pytest
 from robochoc.api import Problem
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.formats import read_team
-from robochoc.model.outcome import Epoch, Outcome, Verdict
-from robochoc.model.problem import AddAgent, Event, RemoveAgent, RemoveValue, Team
-from robochoc.ros.closed_loop import Loop, drones_of
-from robochoc.ros.listening import Listening
-from robochoc.ros.reading import Reading
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.problem import AddAgent, RemoveAgent, RemoveValue, ScenarioEvent, Team
+from robochoc.ros.closed_loop import ClosedLoop, drones_of
+from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.sink import Fields, Sink
-from robochoc.ros.source import Heard, Source, SourceError
+from robochoc.ros.source import ReceivedMessage, Source, SourceError
+from robochoc.ros.source_feedback import SourceFeedback
 from robochoc.run.orchestrator import OnLoss, Options, Runtime, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
-from tests.conformance.test_epochs import pair
 from tests.support.clocks import waiting
 from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import ROOT
+from tests.support.small_teams import pair
 
 HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")
 SIMULATED = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
@@ -39,12 +39,12 @@ PORTS = {"point": {"x": 3.0, "y": 1.0, "z": 3.0}}
 class Says:
     """A field that says what it was told to say, and keeps what it is told."""
 
-    def __init__(self, *events: Event | None) -> None:
+    def __init__(self, *events: ScenarioEvent | None) -> None:
         self.events = list(events)
-        self.told: list[tuple[tuple[str, ...], Epoch, float | None]] = []
+        self.summary: list[tuple[tuple[str, ...], EpochOutcome, float | None]] = []
 
-    def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
-        self.told.append((team.order, epoch, left_s))
+    def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
+        self.summary.append((team.order, epoch, left_s))
         return self.events.pop(0) if self.events else None
 
 
@@ -54,27 +54,30 @@ def openings(outcome: Outcome) -> list[str]:
 
 @pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_a_field_is_told_each_epoch_and_says_the_next(runtime: Runtime) -> None:
-    field = Says(Event((RemoveValue("A", 1),)), Event((RemoveAgent("RB"),)))
+    field = Says(ScenarioEvent((RemoveValue("A", 1),)), ScenarioEvent((RemoveAgent("RB"),)))
     outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=runtime), field=field)
     assert openings(outcome) == ["the start", "A without 1", "-RB"]
-    assert [(order, left_s) for order, _, left_s in field.told] == [(("RA", "RB"), None)] * 2 + [(("RA",), None)]
-    assert [epoch for _, epoch, _ in field.told] == [*outcome.epochs]
+    assert [(order, left_s) for order, _, left_s in field.summary] == [(("RA", "RB"), None)] * 2 + [(("RA",), None)]
+    assert [epoch for _, epoch, _ in field.summary] == [*outcome.epochs]
     assert all(epoch.verified for epoch in outcome.epochs)
     assert outcome.assignment == {"A": 2}
 
 
 def test_what_cannot_be_is_passed_over() -> None:
-    field = Says(Event((RemoveAgent("RX"), RemoveValue("A", 9), RemoveValue("A", 1))), Event((RemoveAgent("RX"),)))
+    field = Says(
+        ScenarioEvent((RemoveAgent("RX"), RemoveValue("A", 9), RemoveValue("A", 1))),
+        ScenarioEvent((RemoveAgent("RX"),)),
+    )
     outcome = solve(pair(values=3), SIMULATED, field=field)
     assert openings(outcome) == ["the start", "A without 1", "nothing"]
     team = pair(values=3)
-    there = Says(Event((AddAgent(team["RB"]),)))
+    there = Says(ScenarioEvent((AddAgent(team["RB"]),)))
     assert openings(solve(team, SIMULATED, field=there)) == ["the start", "nothing"]
 
 
 def test_the_files_own_events_come_first() -> None:
-    team = pair(Event((RemoveValue("A", 1),)), values=3)
-    outcome = solve(team, SIMULATED, field=Says(Event((RemoveValue("A", 2), RemoveValue("A", 1)))))
+    team = pair(ScenarioEvent((RemoveValue("A", 1),)), values=3)
+    outcome = solve(team, SIMULATED, field=Says(ScenarioEvent((RemoveValue("A", 2), RemoveValue("A", 1)))))
     assert openings(outcome) == ["the start", "A without 1", "A without 2"]
     assert outcome.events == 2
 
@@ -86,14 +89,14 @@ def test_without_a_field_a_problem_that_does_not_change_has_no_epochs() -> None:
 
 def test_an_epoch_without_a_solution_may_be_followed_by_one_with() -> None:
     values = tuple(RemoveValue("A", value) for value in (1, 2, 3))
-    outcome = solve(pair(values=3), SIMULATED, field=Says(Event(values), Event((RemoveAgent("RA"),))))
+    outcome = solve(pair(values=3), SIMULATED, field=Says(ScenarioEvent(values), ScenarioEvent((RemoveAgent("RA"),))))
     assert [epoch.verdict for epoch in outcome.epochs] == ["solution", "no-solution", "solution"]
 
 
 @pytest.mark.parametrize(
     ("options", "named"),
     [
-        (Options(protocol="dynabt", withdraw=Withdrawal.FEWEST), "--withdraw"),
+        (Options(protocol="dynabt", withdraw=Withdrawal.MINIMUM), "--withdraw"),
         (Options(protocol="dynabt", runtime=Runtime.NETWORK), "--runtime network"),
         (Options(protocol="central"), "--protocol central"),
     ],
@@ -105,29 +108,29 @@ def test_what_a_changing_problem_cannot_have_is_refused(options: Options, named:
 
 def test_when_the_time_is_over_nothing_that_comes_is_heeded() -> None:
     class Slow(Says):
-        def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
+        def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
             assert left_s is not None
             time.sleep(left_s)
             return super().__call__(team, epoch, left_s)
 
-    field = Slow(Event((RemoveValue("A", 1),)))
+    field = Slow(ScenarioEvent((RemoveValue("A", 1),)))
     outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1), field=field)
     assert (outcome.verdict, openings(outcome)) == (Verdict.UNKNOWN, ["the start", "A without 1"])
-    assert field.told[-1][2] == 0
+    assert field.summary[-1][2] == 0
     assert "--timeout" in (outcome.reason or "")
 
 
 def test_when_all_messages_are_sent_nothing_that_comes_is_heeded() -> None:
     field = Says()
     outcome = solve(HANGAR, replace(SIMULATED, messages=3), field=field)
-    assert (outcome.verdict, field.told[-1][2]) == (Verdict.UNKNOWN, 0)
+    assert (outcome.verdict, field.summary[-1][2]) == (Verdict.UNKNOWN, 0)
 
 
 class Striking(Says):
     """Kills a robot's process while the team waits."""
 
-    def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
-        if not self.told:
+    def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
+        if not self.summary:
             victim = next(process for process in multiprocessing.active_children() if process.name == "RB")
             victim.kill()
             victim.join()
@@ -137,7 +140,7 @@ class Striking(Says):
 @pytest.mark.skipif(sys.platform != "linux", reason="as the runtime's other tests of faults")
 def test_a_robot_that_dies_while_the_team_waits_is_lost() -> None:
     options = Options(protocol="dynabt")
-    event = Event((RemoveValue("A", 1),))
+    event = ScenarioEvent((RemoveValue("A", 1),))
     with pytest.raises(RobotsLostError) as lost:
         solve(pair(values=3), options, field=Striking(event))
     assert "RB" in lost.value.robots
@@ -149,7 +152,7 @@ def test_a_robot_that_dies_while_the_team_waits_is_lost() -> None:
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, SourceError("the robots cannot be heard any more")])
 def test_no_process_outlives_a_field_that_fails(error: BaseException | type[BaseException]) -> None:
-    def fails(_team: Team, _epoch: Epoch, _left_s: float | None) -> Event | None:
+    def fails(_team: Team, _epoch: EpochOutcome, _left_s: float | None) -> ScenarioEvent | None:
         assert len(multiprocessing.active_children()) == 2
         raise error
 
@@ -164,7 +167,7 @@ def test_no_process_outlives_a_field_that_fails(error: BaseException | type[Base
 class Tape(Source):
     """A source that gives what it was given; a live one whenever it comes, for nothing comes of itself."""
 
-    def __init__(self, *messages: Heard, live: bool = False) -> None:
+    def __init__(self, *messages: ReceivedMessage, live: bool = False) -> None:
         super().__init__("tape")
         self.messages = list(messages)
         self.live = live
@@ -173,7 +176,7 @@ class Tape(Source):
     def listen(self, topics: Mapping[str, str]) -> None:
         self.topics = topics
 
-    def next(self, wait_s: float) -> Heard | None:
+    def next(self, wait_s: float) -> ReceivedMessage | None:
         if self.messages:
             return self.messages.pop(0)
         if self.live:
@@ -203,14 +206,14 @@ class Kept(Sink):
         return [topic for topic, _, _ in self.messages]
 
 
-def at(seconds: float, topic: str, fields: Mapping[str, object]) -> Heard:
-    kinds = Reading(drones_of(HANGAR), "map").topics
-    return Heard(topic, kinds.get(topic, ""), fields, round(seconds * SECOND))
+def at(seconds: float, topic: str, fields: Mapping[str, object]) -> ReceivedMessage:
+    kinds = ReportDecoder(drones_of(HANGAR), "map").topics
+    return ReceivedMessage(topic, kinds.get(topic, ""), fields, round(seconds * SECOND))
 
 
-def listened(*messages: Heard, sink: Sink | None = None, team: Team = HANGAR) -> tuple[Outcome, Loop]:
-    senses = Listening(Tape(*messages), Reading(drones_of(team), "map"))
-    loop = Loop(team, [sink] if sink else [], senses)
+def listened(*messages: ReceivedMessage, sink: Sink | None = None, team: Team = HANGAR) -> tuple[Outcome, ClosedLoop]:
+    feedback = SourceFeedback(Tape(*messages), ReportDecoder(drones_of(team), "map"))
+    loop = ClosedLoop(team, [sink] if sink else [], feedback)
     return solve(team, SIMULATED, field=loop), loop
 
 
@@ -241,7 +244,7 @@ def test_reports_that_change_nothing_open_no_epoch() -> None:
 
 
 def test_what_is_known_to_come_is_not_asked_for_again() -> None:
-    team = replace(HANGAR, scenario=(Event((RemoveAgent("Fin"),)),))
+    team = replace(HANGAR, scenario=(ScenarioEvent((RemoveAgent("Fin"),)),))
     outcome, _ = listened(at(1, "/fin/out_of_order", {"data": ""}), at(3, "/fin/battery", {"percentage": 0}), team=team)
     assert openings(outcome) == ["the start", "-Fin"]
 
@@ -258,24 +261,24 @@ def test_what_was_heard_over_a_ros_is_not_said_there_again() -> None:
     sink = Kept(live=True)
     _, loop = listened(at(100, "/port/blocked", PORTS), sink=sink)
     assert set(sink.topics()) == {f"/{name.lower()}/waypoint" for name in HANGAR.order}
-    assert loop.outlets[0].told == "12 waypoints, 0 landings"
+    assert loop.publishers[0].summary == "12 waypoints, 0 landings"
 
 
 def test_who_leaves_lands() -> None:
     sink = Kept()
     _, loop = listened(at(1, "/fin/out_of_order", {"data": "a motor"}), sink=sink)
-    assert loop.outlets[0].told == "11 waypoints, 1 landing, 1 report"
+    assert loop.publishers[0].summary == "11 waypoints, 1 landing, 1 report"
     assert loop.mission is not None
     assert [drone.name for drone in loop.mission.drones] == sorted(HANGAR.order)
     assert [leg.opened_by for leg in loop.mission.legs] == ["the start", "-Fin"]
     assert [goal.lands for goal in loop.mission.legs[1].goals.values()] == [True, False, False, False, False, False]
 
 
-def live(patience_s: float, *messages: Heard) -> tuple[Loop, Callable[[], int]]:
-    senses = Listening(Tape(*messages, live=True), Reading(drones_of(HANGAR), "map"), patience_s)
+def live(patience_s: float, *messages: ReceivedMessage) -> tuple[ClosedLoop, Callable[[], int]]:
+    feedback = SourceFeedback(Tape(*messages, live=True), ReportDecoder(drones_of(HANGAR), "map"), patience_s)
     waited: list[float] = []
-    senses.idle = lambda: waited.append(time.monotonic())
-    return Loop(HANGAR, (), senses), lambda: len(waited)
+    feedback.idle = lambda: waited.append(time.monotonic())
+    return ClosedLoop(HANGAR, (), feedback), lambda: len(waited)
 
 
 def test_a_live_source_is_waited_for_and_somebody_told_so() -> None:
@@ -295,13 +298,13 @@ def test_waiting_is_bounded_by_the_time_for_all() -> None:
 
 def test_the_team_of_a_run_nobody_changed_is_as_its_files_have_it() -> None:
     sink = Kept(live=True)
-    loop = Loop(HANGAR, [sink])
+    loop = ClosedLoop(HANGAR, [sink])
     loop.publish(solve(HANGAR, SIMULATED))
     assert (loop.team, loop.mission) == (HANGAR, None)
-    assert loop.outlets[0].told == "6 waypoints, 0 landings"
+    assert loop.publishers[0].summary == "6 waypoints, 0 landings"
 
 
 def test_a_field_for_whoever_uses_the_library() -> None:
-    field = Says(Event((RemoveValue("port", 3),)))
+    field = Says(ScenarioEvent((RemoveValue("port", 3),)))
     outcome = Problem(HANGAR).solve("dynabt", "simulator", field=field)
     assert openings(outcome) == ["the start", "port without 3"]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from robochoc.flight.mission import Drone
 from robochoc.model.problem import Topic
-from robochoc.ros.names import LONGEST, REPORTS, NameClashError, Names, ros_name
+from robochoc.ros.names import LONGEST, REPORTS, NameClashError, TopicNames, ros_name
 
 TOKEN = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 TOPICS = st.text(min_size=1, max_size=30) | st.from_regex(
@@ -36,7 +36,7 @@ def legal(name: str) -> bool:
 def test_names_are_legal_and_lead_back_or_are_refused(offered: list[tuple[str, str | None]]) -> None:
     drones = [drone(name, topic, f"R{number}") for number, (name, topic) in enumerate(offered)]
     try:
-        names = Names(drones)
+        names = TopicNames(drones)
     except NameClashError:
         return
     waypoints = [topic for number in range(len(drones)) if (topic := names.waypoint(number))]
@@ -46,7 +46,7 @@ def test_names_are_legal_and_lead_back_or_are_refused(offered: list[tuple[str, s
     for number, each in enumerate(drones):
         known = names.waypoint(number)
         assert (known is None) == (each.topic is None)
-        assert names.original[known or names.space(number)] == (each.topic.name if each.topic else each.name)
+        assert names.original[known or names.namespace(number)] == (each.topic.name if each.topic else each.name)
 
 
 @given(st.from_regex(r"(/[A-Za-z](_?[A-Za-z0-9]){0,5}){1,3}", fullmatch=True))
@@ -76,23 +76,23 @@ def test_names_as_they_become(name: str, expected: str) -> None:
 
 
 def test_the_space_is_the_first_token_if_it_is_the_drones_own() -> None:
-    names = Names(
+    names = TopicNames(
         [drone("A", "/drone3.1/waypoint3.1"), drone("B", "/fleet/b"), drone("C", "/fleet/c"), drone("D.1", None)]
     )
-    assert [names.space(number) for number in range(4)] == ["/drone3_1", "/fleet/b", "/fleet/c", "/D_1"]
+    assert [names.namespace(number) for number in range(4)] == ["/drone3_1", "/fleet/b", "/fleet/c", "/D_1"]
     assert names.waypoint(3) is None
     assert names.reports()["/drone3_1/battery"] == "sensor_msgs/BatteryState"
 
 
 def test_a_waypoint_that_is_called_like_a_report_is_no_report() -> None:
-    names = Names([drone("A", "/a/pose")])
+    names = TopicNames([drone("A", "/a/pose")])
     assert names.waypoint(0) == "/a/pose"
-    assert names.space(0) == "/a/pose"
+    assert names.namespace(0) == "/a/pose"
 
 
 def test_a_clash_names_topics_robots_and_the_way_out() -> None:
     with pytest.raises(NameClashError) as clash:
-        Names([drone("A", "/a.1/w", "North"), drone("B", "/a_1/w", "South")])
+        TopicNames([drone("A", "/a.1/w", "North"), drone("B", "/a_1/w", "South")])
     told = "topic '/a.1/w' of North and topic '/a_1/w' of South would both publish on /a_1/w in ROS: rename one of them"
     assert str(clash.value) == told
 
@@ -101,25 +101,25 @@ def test_drones_do_not_share_a_topic() -> None:
     with pytest.raises(
         NameClashError, match=r"A \(North\) and B \(South\) both publish on '/w': give each a topic of its own"
     ):
-        Names([drone("A", "/w", "North"), drone("B", "/w", "South")])
+        TopicNames([drone("A", "/w", "North"), drone("B", "/w", "South")])
 
 
 def test_a_report_does_not_run_into_a_waypoint() -> None:
     with pytest.raises(NameClashError, match=r"/a/pose in ROS"):
-        Names([drone("A", "/a"), drone("B", "/b"), drone("C", "/a/pose")])
+        TopicNames([drone("A", "/a"), drone("B", "/b"), drone("C", "/a/pose")])
 
 
 def test_drones_without_topics_clash_by_their_names() -> None:
     with pytest.raises(NameClashError, match=r"drone 'a\.b' of .* and drone 'a b' of .* on /a_b/"):
-        Names([drone("a.b", None), drone("a b", None)])
+        TopicNames([drone("a.b", None), drone("a b", None)])
 
 
 def test_a_name_that_is_too_long_is_refused() -> None:
     with pytest.raises(NameClashError, match="too long"):
-        Names([drone("A", "/" + "a" * LONGEST)])
+        TopicNames([drone("A", "/" + "a" * LONGEST)])
 
 
 def test_a_clash_does_not_speak_to_the_terminal() -> None:
     with pytest.raises(NameClashError) as clash:
-        Names([drone("A", "/a\x1b[2J", "North\n"), drone("B", "/a\x1b[2J", "South")])
+        TopicNames([drone("A", "/a\x1b[2J", "North\n"), drone("B", "/a\x1b[2J", "South")])
     assert str(clash.value).isprintable()

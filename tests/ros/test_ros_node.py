@@ -17,7 +17,7 @@ from robochoc.ros.live.rospy_node import RospySink, RospySource, fields_of, fill
 from robochoc.ros.sink import SinkError
 from robochoc.ros.source import SourceError
 from tests.support.clocks import waiting
-from tests.support.strangers import stranger
+from tests.support.fake_servers import fake_server
 
 
 @pytest.fixture
@@ -66,7 +66,7 @@ def test_a_master_that_says_nothing() -> None:
 @pytest.mark.usefixtures("_rospy")
 @pytest.mark.parametrize("answer", [b"\xff" * 100, b"HTTP/1.0 200 OK\r\n\r\nhello", b"HTTP/1.0 404 Not Found\r\n\r\n"])
 def test_what_listens_is_no_master(monkeypatch: pytest.MonkeyPatch, answer: bytes) -> None:
-    with stranger(answer, hangs_up=True) as port:
+    with fake_server(answer, hangs_up=True) as port:
         monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{port}")
         with pytest.raises(SinkError, match=r"no ROS master answers at .*; start `roscore`, or set ROS_MASTER_URI"):
             RospySink("")

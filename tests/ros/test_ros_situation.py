@@ -10,9 +10,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from robochoc.flight.places import Places
+from robochoc.flight.point_index import PointIndex
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
-from robochoc.model.change import changed
+from robochoc.model.change import apply_changes
 from robochoc.model.expression import Expression, Type, parse
 from robochoc.model.problem import (
     AddValue,
@@ -26,9 +26,9 @@ from robochoc.model.problem import (
     Variable,
 )
 from robochoc.ros.closed_loop import drones_of
-from robochoc.ros.reading import Reading
+from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.situation import LIES_TIMES, Situation
-from robochoc.ros.source import Heard
+from robochoc.ros.source import ReceivedMessage
 from tests.support.problems import team_of
 
 HUGE = Domain("huge", (range(10**9),))
@@ -58,8 +58,8 @@ def after(team: Team, *reports: Report, scale: float = 1.0) -> tuple[Change, ...
     """What the last of `reports` changes; those before have happened."""
     sees = situation(team, scale)
     for report in reports[:-1]:
-        team = changed(team, sees.heed(team, report))
-    return sees.heed(team, reports[-1])
+        team = apply_changes(team, sees.changes(team, report))
+    return sees.changes(team, reports[-1])
 
 
 def test_an_obstacle_takes_the_value_that_leads_there_and_nothing_else() -> None:
@@ -78,14 +78,14 @@ def test_between_two_places_an_obstacle_takes_both() -> None:
 
 def test_an_obstacle_beside_everything_is_told_of() -> None:
     sees = situation(pair())
-    assert sees.heed(pair(), Blocked("A", (9, 9, 9))) == ()
+    assert sees.changes(pair(), Blocked("A", (9, 9, 9))) == ()
     assert "it changes nothing" in "".join(sees.notes)
 
 
 def test_not_all_that_changes_nothing_is_told_of() -> None:
     sees = situation(pair())
     for number in range(100):
-        sees.heed(pair(), Blocked("A", (9, 9, number)))
+        sees.changes(pair(), Blocked("A", (9, 9, number)))
     assert len(sees.notes) == 20
 
 
@@ -145,7 +145,7 @@ def test_a_drone_that_has_flown_and_lies_on_the_ground_is_out_of_order() -> None
 def test_a_drone_that_may_be_well_stays(poses: tuple[Pose, ...]) -> None:
     assert LIES_TIMES == 3
     sees, team = situation(pair()), pair()
-    assert not any(sees.heed(team, pose) for pose in poses)
+    assert not any(sees.changes(team, pose) for pose in poses)
 
 
 def test_a_large_domain_is_not_looked_through() -> None:
@@ -157,7 +157,7 @@ def test_a_large_domain_is_not_looked_through() -> None:
 def test_what_cannot_be_looked_through_is_told() -> None:
     team = Team("vast", (robot("A", "mod(a,10)", "3", "1", a=HUGE),))
     sees = situation(team)
-    assert sees.heed(team, Blocked("A", (4, 3, 1))) == ()
+    assert sees.changes(team, Blocked("A", (4, 3, 1))) == ()
     assert "a has too many values" in "".join(sees.notes)
 
 
@@ -170,9 +170,9 @@ def test_a_value_that_leads_there_by_reckoning() -> None:
 def test_where_no_variable_alone_decides_nothing_is_taken(x: str, z: str, why: str) -> None:
     team = Team("joint", (robot("A", x, "1", z, a=LEVELS, b=LEVELS),))
     sees = situation(team)
-    assert sees.heed(team, Blocked("A", (1, 1, 2))) == ()
+    assert sees.changes(team, Blocked("A", (1, 1, 2))) == ()
     assert why in "".join(sees.notes)
-    assert sees.heed(team, Blocked("A", (1, 9, 2))) == ()
+    assert sees.changes(team, Blocked("A", (1, 9, 2))) == ()
     assert why not in [*sees.notes][-1], "it is nowhere near"
 
 
@@ -180,7 +180,7 @@ def test_drones_without_topics_fly_above_where_they_stood() -> None:
     team = team_of(dict.fromkeys("AB", range(1, 5)), [])
     sees = Situation(drones_of(team), 1.0)
     x, y, _ = drones_of(team)[1].home
-    assert sees.heed(team, Blocked("RA", (x, y, 2))) == (RemoveValue("B", 2),)
+    assert sees.changes(team, Blocked("RA", (x, y, 2))) == (RemoveValue("B", 2),)
 
 
 def test_rows_of_drones_with_a_variable_each() -> None:
@@ -194,13 +194,13 @@ def test_thousands_of_obstacles_cost_no_more_each_than_a_few() -> None:
     """A hundred million comparisons of places would take half a minute."""
     team, sees = pair(), situation(pair())
     for number in range(9_000):
-        assert sees.heed(team, Blocked("A", (1.0, 50.0 + number, 1.0))) == ()
+        assert sees.changes(team, Blocked("A", (1.0, 50.0 + number, 1.0))) == ()
     for number in range(9_000):
-        assert sees.heed(team, Cleared("A", (1.0, 50.0 + number, 5.0))) == ()
+        assert sees.changes(team, Cleared("A", (1.0, 50.0 + number, 5.0))) == ()
     began = time.process_time()
     for _ in range(300):
-        assert sees.heed(team, Blocked("A", (1.0, 9_049.0, 1.0))) == ()
-        assert sees.heed(team, Cleared("A", (9.0, 9_049.0, 1.0))) == ()
+        assert sees.changes(team, Blocked("A", (1.0, 9_049.0, 1.0))) == ()
+        assert sees.changes(team, Cleared("A", (9.0, 9_049.0, 1.0))) == ()
     assert time.process_time() - began < 0.3
 
 
@@ -213,7 +213,7 @@ somewhere = st.tuples(*[st.floats(-2, 2) | st.sampled_from([-0.5, 0.0, 0.5, 1.0]
 def test_what_is_near_is_found_as_if_all_were_looked_at(
     kept: list[tuple[float, float, float]], asked: list[tuple[tuple[float, float, float], bool]]
 ) -> None:
-    places = Places()
+    places = PointIndex()
     for place in kept:
         places.add(place)
     for there, gone in asked:
@@ -240,7 +240,7 @@ def test_the_team_can_always_take_it_and_what_is_blocked_is_nobodys(heard: list[
     obstacles: list[tuple[float, float, float]] = []
     for report in heard:
         there = report.drone in team
-        team = changed(team, sees.heed(team, report))  # raises `ChangeError` for what it cannot take
+        team = apply_changes(team, sees.changes(team, report))  # raises `ChangeError` for what it cannot take
         if isinstance(report, Blocked) and there:
             obstacles.append(report.place)
         elif isinstance(report, Cleared) and there:
@@ -254,13 +254,13 @@ def test_the_team_can_always_take_it_and_what_is_blocked_is_nobodys(heard: list[
 # From raw messages
 
 
-def heard(topic: str, fields: object, at_ns: int = 2_500_000_000) -> Heard:
-    reading = Reading(drones_of(pair()), "map")
-    return Heard(topic, reading.topics.get(topic, ""), fields, at_ns)  # type: ignore[arg-type]  # what comes in
+def heard(topic: str, fields: object, at_ns: int = 2_500_000_000) -> ReceivedMessage:
+    reading = ReportDecoder(drones_of(pair()), "map")
+    return ReceivedMessage(topic, reading.topics.get(topic, ""), fields, at_ns)  # type: ignore[arg-type]  # what comes in
 
 
 def read(topic: str, fields: object) -> Report | None:
-    return Reading(drones_of(pair()), "map").report(heard(topic, fields))
+    return ReportDecoder(drones_of(pair()), "map").report(heard(topic, fields))
 
 
 PLACE = {"x": 1, "y": 2.0, "z": 3.0}
@@ -291,14 +291,14 @@ def test_what_is_missing_is_passed_over(fields: object) -> None:
 
 
 def test_a_place_in_another_frame_is_no_place_of_ours() -> None:
-    reading = Reading(drones_of(pair()), "map")
+    reading = ReportDecoder(drones_of(pair()), "map")
     assert reading.report(heard("/A/blocked", {"header": {"frame_id": "odom"}, "point": PLACE})) is None
     assert reading.strange == {"/A/blocked": "odom"}
     assert reading.report(heard("/A/blocked", {"header": {"frame_id": "/map"}, "point": PLACE})) is not None
 
 
 def test_all_that_drones_may_report_is_listened_to() -> None:
-    topics = Reading(drones_of(pair()), "map").topics
+    topics = ReportDecoder(drones_of(pair()), "map").topics
     assert topics["/A/battery"] == "sensor_msgs/BatteryState"
     assert len(topics) == 10
 
@@ -306,4 +306,4 @@ def test_all_that_drones_may_report_is_listened_to() -> None:
 def test_two_drones_of_one_name_cannot_be_told_apart() -> None:
     one, other = drones_of(pair())
     sees = Situation([one, replace(other, name=one.name)], 1.0)
-    assert sees.heed(pair(), OutOfOrder(one.name)) == ()
+    assert sees.changes(pair(), OutOfOrder(one.name)) == ()

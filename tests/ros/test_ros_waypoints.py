@@ -20,7 +20,7 @@ from robochoc.ros.publisher import NothingToPublishError, Publisher
 from robochoc.ros.recordings.types import UnknownTypeError, types_of
 from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.waypoint import Waypoint
-from tests.support.offered import offered
+from tests.support.installed_packages import install_entry_points
 
 POSE = "geometry_msgs/PoseStamped"
 NOW = 1_700_000_000_250_000_000
@@ -63,7 +63,9 @@ class Heap(Sink):
 
 def installed(monkeypatch: pytest.MonkeyPatch, **places: str) -> None:
     """As if a package offered these mappings: types are written with a double underscore here."""
-    offered(monkeypatch, mappings.GROUP, **{name.replace("__", "/"): place for name, place in places.items()})
+    install_entry_points(
+        monkeypatch, mappings.GROUP, **{name.replace("__", "/"): place for name, place in places.items()}
+    )
     mapping_for.cache_clear()
     monkeypatch.setattr(mappings, "mapping_for", mapping_for.__wrapped__)
 
@@ -193,7 +195,7 @@ def test_both_spellings_are_one_type() -> None:
 
 
 def test_a_package_brings_a_type_and_its_definition(monkeypatch: pytest.MonkeyPatch) -> None:
-    installed(monkeypatch, my_msgs__Target="test_ros_waypoints:TARGET")
+    installed(monkeypatch, my_msgs__Target="tests.ros.test_ros_waypoints:TARGET")
     heap = Heap()
     drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", "my_msgs/msg/Target"))
     Publisher("team", [drone], [heap]).decide(LANDS, NOW)
@@ -205,7 +207,7 @@ def test_a_package_brings_a_type_and_its_definition(monkeypatch: pytest.MonkeyPa
         assert "MSG: my_msgs/Deep\nint8[2] pair" in types.definition(kind).text
 
 
-@pytest.mark.parametrize("place", ["test_ros_waypoints:NUMBER", "test_ros_waypoints:missing", "no_such_module:x"])
+@pytest.mark.parametrize("place", [f"{__name__}:NUMBER", f"{__name__}:missing", "no_such_module:x"])
 def test_a_broken_package_is_told(monkeypatch: pytest.MonkeyPatch, place: str) -> None:
     installed(monkeypatch, my_msgs__Target=place)
     drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", "my_msgs/Target"))
@@ -214,7 +216,7 @@ def test_a_broken_package_is_told(monkeypatch: pytest.MonkeyPatch, place: str) -
 
 
 def test_a_mapping_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    installed(monkeypatch, my_msgs__Failing="test_ros_waypoints:failing")
+    installed(monkeypatch, my_msgs__Failing="tests.ros.test_ros_waypoints:failing")
     drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", "my_msgs/Failing"))
     publisher = Publisher("team", [drone], [Heap()])
     with pytest.raises(NoMappingError, match=r"my_msgs/Failing failed: ValueError: no \("):
@@ -223,6 +225,6 @@ def test_a_mapping_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(("name", "told"), [("LOOSE", "needs types that nobody defines"), ("WRONG", "brings is wrong")])
 def test_a_definition_that_cannot_be_used_is_told(monkeypatch: pytest.MonkeyPatch, name: str, told: str) -> None:
-    installed(monkeypatch, **{f"my_msgs__{name.title()}": f"test_ros_waypoints:{name}"})
+    installed(monkeypatch, **{f"my_msgs__{name.title()}": f"tests.ros.test_ros_waypoints:{name}"})
     with pytest.raises(UnknownTypeError, match=told):
         types_of(2).encode(f"my_msgs/{name.title()}", {})

@@ -1,4 +1,4 @@
-"""One protocol object, alone: what it says to a packet, and the value it holds."""
+"""One protocol object, alone: what it sends after a packet, and its value."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from robochoc.model.message import Message, Value
 from robochoc.protocols.protocol import Protocol
 
 
-def told(robot: Protocol, *packet: tuple[str, Message]) -> list[tuple[str, Message]]:
-    """What `robot` says after a packet."""
+def replies(robot: Protocol, *packet: tuple[str, Message]) -> list[tuple[str, Message]]:
+    """Return what `robot` sends after a packet."""
     for sender, message in packet:
         robot.receive(sender, message)
     robot.settle()
@@ -17,5 +17,5 @@ def told(robot: Protocol, *packet: tuple[str, Message]) -> list[tuple[str, Messa
 
 
 def value(robot: Protocol) -> Value | None:
-    """The own value, as others see it."""
+    """Return its value, as others see it."""
     return None if robot.value is None else robot.problem.values[robot.value]

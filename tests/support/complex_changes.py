@@ -14,14 +14,14 @@ from robochoc.model.problem import (
     RemoveAgent,
     Team,
 )
-from tests.support.changes import Author, domains
 from tests.support.complex_problems import complex_team, random_complex_team, random_constraint
+from tests.support.random_changes import ScenarioAuthor, domains
 
 MOST_VARIABLES, MOST_VALUES = 8, 4
 VALUES = range(-4, 7)
 
 
-class ComplexAuthor(Author):
+class ComplexScenarioAuthor(ScenarioAuthor):
     """Writes scenarios for complex robots. Constraints come and go with what neighbours see of each other."""
 
     values = VALUES
@@ -62,7 +62,7 @@ class ComplexAuthor(Author):
         return AddAgent(complex_team(owned, values, constraints)[f"R{self._number}x"])
 
 
-def random_complex_journey(chance: Random, events: int = 8) -> Team:
+def random_complex_changing_team(chance: Random, events: int = 8) -> Team:
     """A random team of complex robots with a scenario of so many events."""
     team = random_complex_team(chance)
-    return replace(team, scenario=tuple(ComplexAuthor(chance).scenario(team, events)))
+    return replace(team, scenario=tuple(ComplexScenarioAuthor(chance).scenario(team, events)))

@@ -7,11 +7,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from random import Random
 
-from robochoc.model.problem import INFINITE, Assignment, Constraint, Kind, Predicate, Relation, Robot, Semantics, Team
+from robochoc.model.problem import (
+    INFINITE,
+    Assignment,
+    Constraint,
+    Predicate,
+    ProblemKind,
+    Relation,
+    Robot,
+    Semantics,
+    Team,
+)
 from tests.support.complex_problems import random_complex_team
 from tests.support.problems import PREDICATES, random_team, team_of
 
-DEAREST = 9
+MAX_COST = 9
 
 
 def random_cost_team(chance: Random, *, n_ary: bool = True) -> Team:
@@ -45,7 +55,7 @@ def random_hard_team(chance: Random, *, n_ary: bool = True) -> Team:
 
 def with_costs(team: Team) -> Team:
     """`team` as a DisWCSP."""
-    return replace(team, robots=tuple(replace(robot, kind=Kind.DISWCSP) for robot in team.robots))
+    return replace(team, robots=tuple(replace(robot, kind=ProblemKind.DISWCSP) for robot in team.robots))
 
 
 def softened(team: Team, chance: Random) -> Team:
@@ -56,9 +66,9 @@ def softened(team: Team, chance: Random) -> Team:
             return constraint
         definition = constraint.definition
         if isinstance(definition, Predicate):
-            return replace(constraint, cost=chance.randint(1, DEAREST))
-        listed, other = chance.randint(0, DEAREST), chance.randint(0, DEAREST)
-        costs = tuple(chance.choice((listed, chance.randint(0, DEAREST), INFINITE)) for _ in definition.tuples)
+            return replace(constraint, cost=chance.randint(1, MAX_COST))
+        listed, other = chance.randint(0, MAX_COST), chance.randint(0, MAX_COST)
+        costs = tuple(chance.choice((listed, chance.randint(0, MAX_COST), INFINITE)) for _ in definition.tuples)
         return replace(
             constraint,
             definition=replace(definition, semantics=Semantics.SOFT, costs=costs, default_cost=other),
@@ -90,7 +100,7 @@ def cost_of(assignment: Assignment, constraints: Sequence[Constraint]) -> float:
     return total
 
 
-def fewest_aside(team: Team) -> int:
+def minimum_withdrawal(team: Team) -> int:
     """The least weight of robots that have to step aside so that the others have a solution, by brute force."""
     constraints = list(team.constraints())
     own = {robot.name: {variable.name for variable in robot.variables} for robot in team.robots}
@@ -120,7 +130,7 @@ def _random_constraint(
     chance.shuffle(scope)
     if chance.random() < 0.6:
         return _soft_table(chance, domains, scope, hard)
-    cost = INFINITE if chance.random() < hard else chance.randint(1, DEAREST)
+    cost = INFINITE if chance.random() < hard else chance.randint(1, MAX_COST)
     return Constraint("C", chance.choice(PREDICATES), tuple(scope), tuple(scope), cost=cost)
 
 
@@ -128,7 +138,7 @@ def _soft_table(chance: Random, domains: Mapping[str, Sequence[int]], scope: Seq
     """Every tuple has a cost; those that are not listed have the default."""
     rows = list(itertools.product(*(domains[name] for name in scope)))
     listed = [row for row in rows if chance.random() < 0.8]
-    costs = tuple(INFINITE if chance.random() < hard else chance.randint(0, DEAREST) for _ in listed)
-    default = INFINITE if chance.random() < hard else chance.randint(0, DEAREST)
+    costs = tuple(INFINITE if chance.random() < hard else chance.randint(0, MAX_COST) for _ in listed)
+    default = INFINITE if chance.random() < hard else chance.randint(0, MAX_COST)
     relation = Relation("R", len(scope), Semantics.SOFT, tuple(listed), costs, default)
     return Constraint("C", relation, tuple(scope), tuple(scope))

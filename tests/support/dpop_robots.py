@@ -6,11 +6,12 @@ import itertools
 from collections.abc import Iterable, Sequence
 
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.dpop import DPOP, Dimensions, Domain, Need
-from tests.support.agents import told
+from robochoc.protocols.dpop import DPOP
+from robochoc.protocols.dpop_messages import Dimensions, Domain, Need
+from tests.support.agents import replies
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of
-from tests.support.trees import placed
+from tests.support.pseudo_trees import placed
 
 PRODUCT = Relation("R", 2, Semantics.SOFT, tuple(itertools.product((1, 2, 3), repeat=2)), (1, 2, 3, 2, 4, 6, 3, 6, 9))
 """Two values cost their product."""
@@ -43,5 +44,5 @@ def dimensions(sizes: dict[str, int], dearest: int = 9, width: int = 1, most: Ne
 def leaf(team: Team, name: str = "RC") -> DPOP:
     """The lowest of three, which has told its separator."""
     robot = begun(team, name, "BA")
-    told(robot, ("RB", domain()), ("RA", domain()))
+    replies(robot, ("RB", domain()), ("RA", domain()))
     return robot

@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from robochoc.flight.layout import Point
-from robochoc.flight.mission import Mission
-from robochoc.flight.quadrotor.flown import Flown, Happening, Stage
-from robochoc.flight.quadrotor.nearest import Nearest
-from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.flight.log import ClosestApproach, FlightEvent, FlightLog, LegTimes
+from robochoc.flight.mission import Mission, mission_of
+from robochoc.flight.preview import preview_of
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Team, Variable
+from robochoc.view import scene as scenes
+from robochoc.view.scene import Scene
 
 FPS = 30
 LEG_S = 2
@@ -21,7 +23,16 @@ TILT = 0.1
 """Radians, by which everybody leans when under way."""
 
 
-def straight(mission: Mission, *, falls: Mapping[int, float] | None = None, obstacles: tuple[Point, ...] = ()) -> Flown:
+def scene_of(outcome: Outcome, team: Team | None = None, *, mission: Mission | None = None) -> Scene:
+    """Return the scene of a preview flight, as the command line makes it."""
+    mission = mission or mission_of(outcome, team)
+    preview = preview_of(mission)
+    return scenes.scene_of(outcome, mission, preview.flown, flown_mission=preview.mission, why_not=preview.why_not)
+
+
+def straight(
+    mission: Mission, *, falls: Mapping[int, float] | None = None, obstacles: tuple[Point, ...] = ()
+) -> FlightLog:
     """Everybody goes straight to each goal, all at the same time; who `falls` (since when) drops to the ground."""
     here = np.array([drone.home for drone in mission.drones], dtype=np.float64).reshape(-1, 3)
     positions = [here[None]]
@@ -38,22 +49,22 @@ def straight(mission: Mission, *, falls: Mapping[int, float] | None = None, obst
     return flown
 
 
-def _record(mission: Mission, positions: np.ndarray, obstacles: tuple[Point, ...]) -> Flown:
+def _record(mission: Mission, positions: np.ndarray, obstacles: tuple[Point, ...]) -> FlightLog:
     times = np.arange(len(positions)) / FPS
     lean = TILT / 2 * np.sin(np.pi * times / LEG_S) ** 2
     attitudes = np.zeros((*positions.shape[:2], 4))
     attitudes[..., 0], attitudes[..., 3] = np.sin(lean)[:, None], np.cos(lean)[:, None]
-    return Flown(
+    return FlightLog(
         names=tuple(drone.name for drone in mission.drones),
         times=times,
         positions=positions,
         attitudes=attitudes,
-        stages=tuple(
-            Stage(leg.opened_by, LEG_S * number, LEG_S * (number + 1)) for number, leg in enumerate(mission.legs)
+        legs=tuple(
+            LegTimes(leg.opened_by, LEG_S * number, LEG_S * (number + 1)) for number, leg in enumerate(mission.legs)
         ),
-        happenings=(),
+        events=(),
         errors_m=np.zeros(positions.shape[1]),
-        nearest=Nearest(0.98, 0, 1, 1.0),
+        nearest=ClosestApproach(0.98, 0, 1, 1.0),
         nearest_fallen=None,
         distance=0.5,
         obstacles=obstacles,
@@ -61,15 +72,15 @@ def _record(mission: Mission, positions: np.ndarray, obstacles: tuple[Point, ...
     )
 
 
-def _fallen(flown: Flown, number: int, since: float, ground: float) -> Flown:
+def _fallen(flown: FlightLog, number: int, since: float, ground: float) -> FlightLog:
     positions, errors = flown.positions.copy(), flown.errors_m.copy()
     after = flown.times >= since
     height = positions[after][0, number, 2] - 4.9 * (flown.times[after] - since) ** 2
     positions[after, number] = positions[after][0, number]
     positions[after, number, 2] = np.maximum(height, ground)
     errors[number] = np.nan
-    stopped = Happening(since, number, "motor 2 stopped")
-    return replace(flown, positions=positions, errors_m=errors, happenings=(*flown.happenings, stopped))
+    stopped = FlightEvent(since, number, "motor 2 stopped")
+    return replace(flown, positions=positions, errors_m=errors, events=(*flown.events, stopped))
 
 
 def five() -> Team:
@@ -84,8 +95,8 @@ def epochs_of_three(team: str = "watch") -> Outcome:
     places = {f"V{place}.1": place for place in range(2, 6)}
     last = {"V1.1": 1, "V2.1": 4, "V3.1": 3, "V4.1": 4}
     epochs = (
-        Epoch(Verdict.SOLUTION, everybody, assignment=places),
-        Epoch(Verdict.NO_SOLUTION, everybody[:4], "-R5.1"),
-        Epoch(Verdict.SOLUTION, everybody[:4], "V2.1 without <2>", last),
+        EpochOutcome(Verdict.SOLUTION, everybody, assignment=places),
+        EpochOutcome(Verdict.NO_SOLUTION, everybody[:4], "-R5.1"),
+        EpochOutcome(Verdict.SOLUTION, everybody[:4], "V2.1 without <2>", last),
     )
     return Outcome(team, "dynabt", "simulator", 0, Verdict.SOLUTION, last, epochs=epochs)

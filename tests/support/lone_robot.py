@@ -26,7 +26,7 @@ from robochoc.protocols.abt import ABT, Ok
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import NO_BRIEF
 from robochoc.solver.compiled_team import CompiledRobot
-from tests.support.offices import RUN, Scripted
+from tests.support.in_memory_network import RUN, ScriptedTransport
 from tests.support.problems import team_of
 
 UNPROVEN = cast("Identity", None)
@@ -34,14 +34,14 @@ PATIENCE_S = 5.0
 LEAVE = Leave("over", failed=False)
 
 
-def differ() -> Team:
+def chain_of_three() -> Team:
     pairs = [("A", "B"), ("B", "C")]
     return team_of(dict.fromkeys("ABC", (1, 2)), [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in pairs])
 
 
 def task(protocol: type[Protocol] = ABT, epoch: int = 1) -> Task:
     members = Members()
-    for robot in differ().robots:
+    for robot in chain_of_three().robots:
         members.register(robot.name, profile_of(robot), "visit")
     return members.tasks(epoch, protocol.__name__, protocol.traits, NO_BRIEF)["RB"]
 
@@ -50,10 +50,12 @@ def ok(value: int) -> bytes:
     return encode(Ok((value,)))
 
 
-Script = Callable[[Scripted, Word], Iterable[Word | Item]]
+Script = Callable[[ScriptedTransport, Word], Iterable[Word | Item]]
 
 
-def played(script: Script, protocol: type[Protocol] = ABT, patience_s: float = PATIENCE_S) -> tuple[Ending, Scripted]:
+def played(
+    script: Script, protocol: type[Protocol] = ABT, patience_s: float = PATIENCE_S
+) -> tuple[Ending, ScriptedTransport]:
     """How RB fares when all its words to the master are answered by `script`; it is welcomed, as a rule."""
 
     def answers(word: Word) -> Iterator[Item]:
@@ -67,6 +69,8 @@ def played(script: Script, protocol: type[Protocol] = ABT, patience_s: float = P
             raise LookupError(f"no protocol {name!r}")
         return protocol
 
-    post = Scripted("RB", answers)
-    robot = NetworkRobot(CompiledRobot(differ()["RB"]), UNPROVEN, cast("Transport", post), named, Manner(patience_s))
+    post = ScriptedTransport("RB", answers)
+    robot = NetworkRobot(
+        CompiledRobot(chain_of_three()["RB"]), UNPROVEN, cast("Transport", post), named, Manner(patience_s)
+    )
     return robot.run(), post

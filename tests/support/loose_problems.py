@@ -12,15 +12,15 @@ from dataclasses import replace
 from random import Random
 
 from robochoc.formats import PREDEFINED
-from robochoc.model.orders import Order, OrderError, in_order
+from robochoc.model.orders import Order, OrderError, with_order
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import (
     INFINITE,
     Child,
     Constraint,
     Domain,
-    Kind,
     Parent,
+    ProblemKind,
     Robot,
     Team,
     Variable,
@@ -64,7 +64,7 @@ def every_order(team: Team, chance: Random) -> list[Order | tuple[str, ...] | No
     orders: list[Order | tuple[str, ...] | None] = [None]
     for order in (*Order, *listed):
         try:
-            in_order(team, order)
+            with_order(team, order)
         except OrderError:
             continue
         orders.append(order)
@@ -93,7 +93,7 @@ def loose_team(protocol: str, chance: Random, *, costs: bool = False) -> Team:
     return loosened(random_team(chance, n_ary=traits.n_ary), chance)
 
 
-def agrees(team: Team, options: Options, solver: AceProcess | None = None) -> Outcome:
+def check_against_brute_force(team: Team, options: Options, solver: AceProcess | None = None) -> Outcome:
     """Solve `team` and return the outcome; it must be brute force's. `solve` itself has the assignment checked.
 
     A protocol that is not complete need not find the best answer, or any.
@@ -104,8 +104,8 @@ def agrees(team: Team, options: Options, solver: AceProcess | None = None) -> Ou
     if not protocol.traits.complete:
         options = replace(options, messages=ENOUGH)
     outcome = solve(team, options, solver=solver)
-    truth = least(team)
-    found = Verdict.OPTIMAL if team.kind is Kind.DISWCSP else Verdict.SOLUTION
+    truth = minimum_cost(team)
+    found = Verdict.OPTIMAL if team.kind is ProblemKind.DISWCSP else Verdict.SOLUTION
     what = (team, options, outcome.verdict, outcome.cost)
     if outcome.assignment:
         assert outcome.verified, what
@@ -150,7 +150,7 @@ def untold_interface() -> Team:
     return Team("untold-interface", (above, robots[1]))
 
 
-def least(team: Team) -> float:
+def minimum_cost(team: Team) -> float:
     """The least cost of a solution, by brute force; without costs 0 for one, and `INFINITE` where there is none."""
     needed = {name for constraint in team.constraints() for name in constraint.variables}
     robots = (
@@ -161,7 +161,7 @@ def least(team: Team) -> float:
         for robot in team.robots
     )
     smaller = replace(team, robots=tuple(robots))
-    if team.kind is Kind.DISWCSP:
+    if team.kind is ProblemKind.DISWCSP:
         return least_cost(smaller)
     return 0 if any(solutions(smaller)) else INFINITE
 

@@ -13,7 +13,7 @@ from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
 from robochoc.communication.run_result import Progress
 from robochoc.solver.agent_problem import RunParameters
-from tests.support.held import CHAIN, Held
+from tests.support.paused_abt import CHAIN, PausedABT
 
 
 def main(folder: str, endpoint: str, file: str) -> None:
@@ -26,7 +26,7 @@ def main(folder: str, endpoint: str, file: str) -> None:
     identity = authority.master_identity([LOOPBACK])
     with Master(authority, identity, endpoint, Members(CHAIN.order), progress=progress) as master:
         master.gather()
-        result = master.search("held", Held.traits, RunParameters(settings={"file": file}))
+        result = master.search("held", PausedABT.traits, RunParameters(settings={"file": file}))
         sys.stdout.write(f"{result.verdict}\n")
         master.leave("the run is over")
 

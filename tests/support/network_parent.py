@@ -8,14 +8,14 @@ import sys
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.run_result import Progress
 from robochoc.solver.agent_problem import RunParameters
-from tests.support.held import CHAIN, Held
+from tests.support.paused_abt import CHAIN, PausedABT
 
 
 def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     brief = RunParameters(settings={"file": "/nowhere"})
     try:
-        with LocalNetwork(CHAIN, Held, brief=brief, progress=tell) as network:
+        with LocalNetwork(CHAIN, PausedABT, brief=brief, progress=tell) as network:
             network.search()
     except KeyboardInterrupt:
         sys.exit(128 + signal.SIGINT)

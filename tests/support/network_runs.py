@@ -31,7 +31,7 @@ from robochoc.model.problem import Team
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.faults import wait_until
-from tests.support.held import CHAIN, Held
+from tests.support.paused_abt import CHAIN, PausedABT
 
 WITHIN_S = 30.0
 SLICE_S = 0.2
@@ -56,7 +56,7 @@ def letter(run: NetworkRun, sender: str, receiver: str, word: Word, number: int 
 
 
 class NetworkRun:
-    """`team` searches by `Held`, and is held until `let_go`. `absent` robots do not come by themselves.
+    """`team` searches by `PausedABT`, and is held until `let_go`. `absent` robots do not come by themselves.
 
     `master` and the household are there for tests to use; `events` is all that was observed.
     """
@@ -199,7 +199,7 @@ class NetworkRun:
                 self.master.gather(time.monotonic() + SLICE_S)
             if self.master.members.closed:
                 brief = RunParameters(settings={"file": str(self._gate)})
-                self.result = self.master.search("held", Held.traits, brief, self._seconds)
+                self.result = self.master.search("held", PausedABT.traits, brief, self._seconds)
                 if not self.result.lost and self.result.assignments:
                     self.held = self.master.checked(self.result.assignments)
         except Exception as error:  # noqa: BLE001 - the test is told
@@ -212,7 +212,7 @@ class NetworkRun:
                 CompiledRobot(self.team[name]),
                 self.household.identity(name),
                 post,
-                lambda _name: Held,
+                lambda _name: PausedABT,
                 Manner(self.conditions.patience_s),
             )
             self.endings[name] = robot.run()

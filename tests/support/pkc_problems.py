@@ -7,9 +7,26 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from random import Random
 
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.expression import Type, parse
-from robochoc.model.problem import Child, Constraint, Model, Parent, Predicate, Relation, Robot, Semantics, Team
-from tests.support.problems import PREDICATES, team_of
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import (
+    Child,
+    Constraint,
+    ConstraintModel,
+    Parent,
+    Predicate,
+    Relation,
+    Robot,
+    Semantics,
+    Team,
+)
+from robochoc.protocols.protocol import Protocol
+from robochoc.verification.checker import violations
+from tests.support.problems import PREDICATES, solutions, team_of
+from tests.support.program import ROOT
+from tests.support.solver_networks import compiled_by_brute_force
 
 Row = tuple[int, ...]
 """Values of a constraint's variables, in the order of its `variables`."""
@@ -34,7 +51,7 @@ def random_pkc_team(chance: Random) -> Team:
             held.append(_random_part(chance, domains, pair, f"C{number}"))
             parts[pair] = _random_part(chance, domains, pair, f"C{number}")
         if kinds != "pkc":
-            held.append(replace(_random_part(chance, domains, pair, f"T{number}"), model=Model.TKC))
+            held.append(replace(_random_part(chance, domains, pair, f"T{number}"), model=ConstraintModel.TKC))
     private = (_table(chance, domains, (name,), 0.3, f"U{name}") for name in domains if chance.random() < 0.1)
     team = team_of(domains, [*held, *(replace(one, model=None) for one in private)], "pkc")
     for (parent, child), part in parts.items():
@@ -79,7 +96,7 @@ def pkc_parts(team: Team) -> dict[Part, Constraint]:
         neighbours: tuple[Parent | Child, ...] = (*robot.parents, *robot.children)
         for neighbour in neighbours:
             for constraint in neighbour.constraints:
-                if constraint.model is Model.PKC:
+                if constraint.model is ConstraintModel.PKC:
                     found[robot.name, neighbour.name, constraint.name] = constraint
     return found
 
@@ -133,7 +150,7 @@ def _random_part(chance: Random, domains: Mapping[str, Sequence[int]], pair: Seq
     chance.shuffle(scope)
     if chance.random() < 0.7:
         return _table(chance, domains, scope, chance.uniform(0, 0.45), name)
-    return Constraint(name, chance.choice(PREDICATES), tuple(scope), tuple(scope), Model.PKC)
+    return Constraint(name, chance.choice(PREDICATES), tuple(scope), tuple(scope), ConstraintModel.PKC)
 
 
 def _table(
@@ -143,7 +160,7 @@ def _table(
     every = itertools.product(*(domains[variable] for variable in scope))
     listed = [row for row in every if (chance.random() < tightness) is (semantics is Semantics.CONFLICTS)]
     relation = Relation(f"r{name}.{chance.getrandbits(40)}", len(scope), semantics, tuple(listed))
-    return Constraint(name, relation, tuple(scope), tuple(scope), Model.PKC)
+    return Constraint(name, relation, tuple(scope), tuple(scope), ConstraintModel.PKC)
 
 
 def _one_sided(team: Team, chance: Random) -> Team:
@@ -180,7 +197,7 @@ def _split(team: Team, constraint: Constraint, chance: Random, name: str) -> tup
         listed = rejected if conflicts else [row for row in every if row not in rejected]
         semantics = Semantics.CONFLICTS if conflicts else Semantics.SUPPORTS
         part = as_table(constraint, listed, semantics, f"{name}.{side}")
-        both.append(replace(part, name=name, model=Model.PKC))
+        both.append(replace(part, name=name, model=ConstraintModel.PKC))
     return both[0], both[1]
 
 
@@ -189,3 +206,38 @@ def _replaced(team: Team, holder: str, old: Constraint, new: Constraint) -> Team
         return new if robot.name == holder and constraint is old else constraint
 
     return with_constraints(team, change)
+
+
+SECRETS = ROOT / "docs" / "examples" / "secrets"
+
+
+def pkc_part(pair: str, *forbidden: tuple[int, int], name: str = "C") -> Constraint:
+    """Return one robot's part of a PKC over the variables named by two letters."""
+    called = "R" + "_".join(f"{one}.{other}" for one, other in forbidden)
+    relation = Relation(called, 2, Semantics.CONFLICTS, forbidden)
+    return Constraint(name, relation, tuple(pair), tuple(pair), ConstraintModel.PKC)
+
+
+def pkc_pair(below: Constraint | None, above: Constraint | None, values: int = 2) -> Team:
+    """Return the team of A above B, which share a PKC of these two parts."""
+    domains = dict.fromkeys("AB", range(1, values + 1))
+    team = team_of(domains, [below or pkc_part("AB")])
+    return team if above is None else with_part(team, "RA", "RB", above)
+
+
+def random_schedule(chance: Random) -> Schedule:
+    """Return a schedule of either kind."""
+    if chance.random() < 0.5:
+        return RandomChannels(chance.getrandbits(32))
+    return Concurrent(chance.getrandbits(32), chance.choice((0, 3, 20, 200)))
+
+
+def check_against_brute_force(team: Team, protocol: type[Protocol], chance: Random) -> Verdict:
+    """Solve `team` by `protocol` on the simulator; the verdict must be brute force's, and a solution must hold."""
+    result = Simulation(compiled_by_brute_force(team), protocol, random_schedule(chance)).run(60)
+    solvable = any(solutions(team))
+    assert result.verdict is (Verdict.SOLUTION if solvable else Verdict.NO_SOLUTION), team
+    if solvable:
+        flat = {name: value for own in result.assignments.values() for name, value in own.items()}
+        assert not list(violations(team, flat))
+    return result.verdict

@@ -138,3 +138,26 @@ def _random_table(
 
 def _domain(values: Sequence[int]) -> Domain:
     return Domain("D", tuple(range(value, value + 1) for value in values))
+
+
+def shuffled(chance: Random, team: Team) -> list[str]:
+    """Return the names of the robots of `team` in random order."""
+    return chance.sample(team.order, len(team.order))
+
+
+def with_unique_definitions(team: Team) -> Team:
+    """Return `team` with another name for each definition, as they are read back from files."""
+    numbers = itertools.count()
+
+    def apart(constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
+        return tuple(replace(one, definition=replace(one.definition, name=f"d{next(numbers)}")) for one in constraints)
+
+    robots = (
+        replace(
+            robot,
+            private=tuple(replace(one, model=None) for one in apart(robot.private)),
+            parents=tuple(replace(parent, constraints=apart(parent.constraints)) for parent in robot.parents),
+        )
+        for robot in team.robots
+    )
+    return replace(team, robots=tuple(robots))

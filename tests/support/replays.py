@@ -8,20 +8,20 @@ from random import Random
 
 import msgspec
 
-from robochoc.journal.events import AnyEvent, Began
+from robochoc.journal.events import AnyEvent, Began, Given
 from robochoc.journal.journal import Header, Journal, Recorder, read_journal
 from robochoc.model.orders import Order
-from robochoc.model.problem import Kind, Model, Team
+from robochoc.model.problem import ConstraintModel, ProblemKind, Team
 from robochoc.run.orchestrator import Options, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
-from tests.conformance.test_conformance import random_schedule
-from tests.support.changes import random_journey
-from tests.support.complex_changes import random_complex_journey
+from tests.support.complex_changes import random_complex_changing_team
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import random_team
+from tests.support.random_changes import random_changing_team
+from tests.support.random_options import random_schedule
 
 ENOUGH = 1500
 """Messages after which a run may end."""
@@ -35,11 +35,11 @@ def families(protocol: str) -> list[Callable[[Random], Team]]:
         found.append(lambda chance: random_cost_team(chance, n_ary=traits.n_ary))
     if traits.n_ary:
         found.append(random_complex_cost_team if traits.costs else random_complex_team)
-        found.append(lambda chance: random_journey(chance, 4))
+        found.append(lambda chance: random_changing_team(chance, 4))
     if traits.partially_known:
         found.append(random_pkc_team)
     if traits.n_ary and not traits.costs:
-        found.append(lambda chance: random_complex_journey(chance, 3))
+        found.append(lambda chance: random_complex_changing_team(chance, 3))
     return found
 
 
@@ -52,7 +52,7 @@ def random_run(protocol: str, chance: Random, number: int) -> tuple[Team, Option
         options = replace(options, settings={"cycles": "8"})
     if team.dynamic:
         return team, options
-    parts = any(one.model is Model.PKC for one in team.constraints())
+    parts = any(one.model is ConstraintModel.PKC for one in team.constraints())
     order = None if parts else chance.choice((None, Order.MIN_WIDTH, Order.RANDOM))
     return team, replace(options, withdraw=withdrawal(protocol, team, chance), order=order)
 
@@ -60,10 +60,10 @@ def random_run(protocol: str, chance: Random, number: int) -> tuple[Team, Option
 def withdrawal(protocol: str, team: Team, chance: Random) -> Withdrawal | None:
     """Who may step aside, if anybody."""
     traits = protocol_named(protocol).traits
-    parts = any(one.model is Model.PKC for one in team.constraints())
+    parts = any(one.model is ConstraintModel.PKC for one in team.constraints())
     fewest = not parts and (traits.complete or not traits.costs)
-    maximal = not parts and team.kind is Kind.DISCSP
-    return chance.choice([None, None, *([Withdrawal.FEWEST] * fewest), *([Withdrawal.MAXIMAL] * maximal)])
+    maximal = not parts and team.kind is ProblemKind.DISCSP
+    return chance.choice([None, None, *([Withdrawal.MINIMUM] * fewest), *([Withdrawal.MAXIMAL] * maximal)])
 
 
 def recorded(team: Team, options: Options, solver: AceProcess | None = None) -> Journal:
@@ -92,7 +92,7 @@ def with_events(journal: Journal, events: Sequence[AnyEvent]) -> Journal:
     return replace(journal, events=tuple(events))
 
 
-def as_told(team: Team, options: Options) -> tuple[Journal, list[AnyEvent]]:
+def with_events_as_observed(team: Team, options: Options) -> tuple[Journal, list[AnyEvent]]:
     """The journal of a run, and its events as they were told: in the order in which a journal has them."""
     told: list[AnyEvent] = []
     recorder = Recorder(header_of(team, options))
@@ -108,3 +108,8 @@ def as_told(team: Team, options: Options) -> tuple[Journal, list[AnyEvent]]:
             runs.append([])
         runs[-1].append(event)
     return read_journal(recorder.content()), [event for run in runs for event in sorted(run, key=lambda one: one.t)]
+
+
+def without_given(journal: Journal) -> Journal:
+    """Return `journal` as older versions wrote it: without what robots were given."""
+    return with_events(journal, [event for event in journal.events if not isinstance(event, Given)])

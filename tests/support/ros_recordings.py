@@ -9,7 +9,7 @@ from typing import Any
 
 from robochoc.ros.sink import Fields
 from robochoc.ros.sinks import open_sink, open_source
-from robochoc.ros.source import Heard
+from robochoc.ros.source import ReceivedMessage
 
 POSE, BATTERY, TEXT, POINT = (
     "geometry_msgs/PoseStamped",
@@ -52,7 +52,7 @@ def write(text: str, said: Sequence[Said], topics: dict[str, str] = TOPICS) -> P
     return Path(text.split(":")[1])
 
 
-def read(text: str | Path, topics: dict[str, str] = TOPICS) -> list[Heard]:
+def read(text: str | Path, topics: dict[str, str] = TOPICS) -> list[ReceivedMessage]:
     with open_source(str(text)) as source:
         source.listen(topics)
         return [*iter(lambda: source.next(0.0), None)]
@@ -65,7 +65,7 @@ def part(found: Any, expected: Any) -> Any:  # noqa: ANN401 - fields, or what st
     return found
 
 
-def check(heard: Sequence[Heard], said: Sequence[Said]) -> None:
+def check(heard: Sequence[ReceivedMessage], said: Sequence[Said]) -> None:
     assert len(heard) == len(said)
     for (topic, fields, at), found in zip(said, heard, strict=True):
         assert (found.topic, found.kind, found.at_ns) == (topic, TOPICS[topic], at)

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from robochoc.model.message import Message
 from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.sfb import SFB, CPAs, SFBSettings
+from robochoc.protocols.sfb import SFB, SFBSettings
+from robochoc.protocols.sfb_messages import CPAs
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import told
-from tests.support.trees import Costs, priced
+from tests.support.agents import replies
+from tests.support.pseudo_trees import Costs, priced
 
 CHAIN: Costs = {"AB": (3, 1, 0, 2), "BC": (0, 4, 2, 1), "A": (0, 1)}
 """RA and RB, RB and RC; the cheapest is RA 2, RB 1, RC 1, for 1."""
@@ -25,7 +26,7 @@ def team(costs: Costs) -> Team:
 def agents(problem: Team, settings: SFBSettings | None = None) -> dict[str, SFB]:
     """The protocol objects of all robots, not started."""
     order = PriorityOrder(problem.order)
-    found = {name: SFB(LocalProblem(part), order) for name, part in agent_problems(problem, everywhere=True).items()}
+    found = {name: SFB(LocalProblem(part), order) for name, part in agent_problems(problem, shared_scopes=True).items()}
     for robot in found.values():
         robot.settings = settings or robot.settings
     return found
@@ -49,7 +50,7 @@ def introduced(
         if isinstance(message, CPAs):
             said.append(message)
         else:
-            todo += [(receiver, *one) for one in told(robots[receiver], (sender, message))]
+            todo += [(receiver, *one) for one in replies(robots[receiver], (sender, message))]
     return robots, said
 
 

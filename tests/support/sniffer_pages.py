@@ -20,8 +20,8 @@ from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from robochoc.sniffer.feed import Feed
 from robochoc.sniffer.trace import Trace
-from tests.support.pages import watched
-from tests.support.sniffed import journal_of
+from tests.support.browser_pages import watched_page
+from tests.support.sniffer_server import journal_of
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 REFUSED = "ERR_CONNECTION_REFUSED"
@@ -55,7 +55,7 @@ def chromium() -> Iterator[Any]:
 @contextmanager
 def shown(browser: Any, url: str, whole: str = ALL, **options: Any) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
     """The page at `url` once it says `whole`. No script may complain, and nothing else may be asked for anything."""
-    with watched(browser, **{"viewport": {"width": 1400, "height": 900}, **options}) as (page, complaints, asked):
+    with watched_page(browser, **{"viewport": {"width": 1400, "height": 900}, **options}) as (page, complaints, asked):
         page.goto(url)
         text_is(page, "#counts", whole)
         yield page

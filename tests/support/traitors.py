@@ -178,7 +178,8 @@ def program(lie: str, name: str, *words: object) -> str:
     """The text of a program that is `robochoc` with `words`, but for its lie."""
     path = list(sys.path)
     return (
-        f"import sys; sys.path[:] = {path!r}; import traitors; traitors.main({lie!r}, {name!r}, {[*map(str, words)]!r})"
+        f"import sys; sys.path[:] = {path!r}; from tests.support import traitors; "
+        f"traitors.main({lie!r}, {name!r}, {[*map(str, words)]!r})"
     )
 
 

@@ -26,8 +26,10 @@ from __future__ import annotations
 
 from typing import assert_never, cast
 
+from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
+from robochoc.model.wording import Wording, counted
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
@@ -42,6 +44,10 @@ class Ok(Message, frozen=True):
 
     value: Value
 
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} in this wave"
+
 
 class Improve(Message, frozen=True):
     """By how much the sender could improve, what it pays now, and its termination counter (`improve`)."""
@@ -50,13 +56,20 @@ class Improve(Message, frozen=True):
     current_eval: int
     my_termination_counter: int
 
+    act = Act(Performative.PROPOSE, "of neighbours, the one that improves most is to move")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        weight = counted(self.current_eval, "weighted violation")
+        return f"I have {weight}, and could do with {self.my_improve} less"
+
 
 class Breakout(Protocol):
     """One agent of distributed breakout. State: as the paper names it, and what has come of the two waves so far."""
 
     messages = Ok | Improve
     traits = Traits(
-        paper="Yokoo & Hirayama 1996, 2005", complete=False, everywhere=True, privacy="constraints among others"
+        paper="Yokoo & Hirayama 1996, 2005", complete=False, shared_scopes=True, privacy="constraints among others"
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -6,34 +6,39 @@ from pathlib import Path
 
 import click
 
-from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
+from robochoc.cli.options.pages import html_option, serve_option
+from robochoc.cli.options.paths import InputPath, refuse_same_places
 from robochoc.cli.options.saved import saved_outcome, team_of, team_option
 from robochoc.cli.reports.failures import invalid_input_fails
 
 
 @click.command()
 @click.argument("saved", type=InputPath(), metavar="RESULT.json|JOURNAL")
-@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="The page to write; needed unless --serve.")
+@html_option("-o", "--output")
+@serve_option
 @team_option
-@click.option("--serve", is_flag=True, help="Show the scene live on this machine until Ctrl-C.")
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port for --serve; 0 is any free one.")
+@click.option("--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Port of --serve; 0: any free one.")
 @invalid_input_fails
-def animate(saved: Path, output: Path | None, folder: Path | None, port: int, *, serve: bool) -> None:
-    """Make the 3D scene of what `robochoc solve --json` printed, or of the journal that `--journal` wrote."""
-    from robochoc.cli.reports.progress import stages
-    from robochoc.cli.reports.scene import serve_scene, write_page
-    from robochoc.view.scene import scene_of
+def animate(saved: Path, html: Path | None, folder: Path | None, port: int, *, serve: bool) -> None:
+    """Write or show the 3D scene of a saved result: what 'robochoc solve' wrote with --json or --journal.
 
-    if not (output or serve):
-        raise click.UsageError("say where the page goes (-o FILE), or show it live (--serve)")
+    It is the page of 'robochoc solve --html'. 'robochoc fly' simulates the flight as well.
+
+    \b
+    robochoc solve instances/queens3d-4 --withdraw --json > out/result.json
+    robochoc animate out/result.json --html out/page.html
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.cli.reports.scene import scene_for, serve_scene, write_page
+
+    if not (html or serve):
+        raise click.UsageError("say where to write the page (--html FILE), or show it live (--serve)")
     if port and not serve:
         raise click.UsageError("--port is for --serve")
-    refuse_same_places({"-o": output}, {"the result": saved}, teams=[folder] if folder else [])
+    refuse_same_places({"--html": html}, {"the result": saved}, teams=[folder] if folder else [])
     outcome = saved_outcome(saved)
     team = team_of(outcome, saved, folder)
-    with stages(outcome.team) as progress:
-        scene = scene_of(outcome, team, progress=progress)
-    if output:
-        write_page(scene, output)
+    scene = scene_for(outcome, team)
+    if html:
+        write_page(scene, html)
     if serve:
         serve_scene(scene, port)

@@ -1,33 +1,23 @@
-"""`robochoc authority`: who may take part in runs on several machines."""
+"""`robochoc authority`: enrolment of robots and observers in runs on several machines."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import click
 
-from robochoc.cli.options.paths import InputPath
+from robochoc.cli.options.network import authority_option
+from robochoc.cli.options.paths import TeamFolder
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure, invalid_input_fails
 
 if TYPE_CHECKING:
     from robochoc.authority.authority import Authority
 
-Command = TypeVar("Command", bound=Callable[..., object])
 _LONGEST_TTL_HOURS = 24 * 366
-
-
-def _folder_option(command: Command) -> Command:
-    return click.option(
-        "--authority",
-        "folder",
-        type=InputPath(),
-        metavar="DIR",
-        help="The Authority's folder  [default: robochoc/authority in your data folder]",
-    )(command)
 
 
 def _lasting(_context: click.Context, _parameter: click.Parameter, hours: float) -> float:
@@ -38,10 +28,10 @@ def _lasting(_context: click.Context, _parameter: click.Parameter, hours: float)
 
 @click.group()
 def authority() -> None:
-    """The Authority: it says who may take part, and certifies the keys of those who may.
+    """Manage the Authority, which enrols robots and observers and certifies their keys.
 
-    Its folder holds the key that signs all certificates: whoever has it decides who takes part. Keep it where the
-    master runs, and nowhere else. What protects from what: docs/guides/security.md.
+    Its folder holds the key that signs all certificates. Keep it on the master's machine only
+    (docs/guides/security.md).
 
     \b
     robochoc authority init
@@ -51,10 +41,10 @@ def authority() -> None:
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
 
 
-@authority.command(short_help="Make an Authority.")
-@_folder_option
+@authority.command(short_help="Create an Authority.")
+@authority_option
 def init(folder: Path | None) -> None:
-    """Make a new Authority: its key, and its certificate, which is valid for ten years."""
+    """Create an Authority: a key and a certificate for ten years."""
     with _failures_told():
         from robochoc.authority.authority import Authority, default_folder
 
@@ -63,22 +53,22 @@ def init(folder: Path | None) -> None:
         click.echo(f"{made.folder}: a new Authority, until {until:%Y-%m-%d}; next: robochoc authority enrol NAME")
 
 
-@authority.command(short_help="Give names a token each.")
+@authority.command(short_help="Enrol robots or observers: one token per name.")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
-@click.option("--team", type=InputPath(), metavar="DIR", help="Enrol all robots of this team, by their files' names.")
+@click.option("--team", type=TeamFolder(), metavar="DIR", help="Enrol all robots of this team.")
 @click.option(
     "--role",
     type=click.Choice(["robot", "observer"]),
     default="robot",
     show_default=True,
-    help="What the names take part as.",
+    help="Role of the names.",
 )
 @click.option(
     "--may",
     type=click.Choice(["sniff"]),
     multiple=True,
     metavar="sniff",
-    help="A right besides: sniff, to follow runs (robochoc sniff). Without it the names do not have it (any more).",
+    help="Allow them to follow runs (robochoc sniff). Without it, the right is taken away.",
 )
 @click.option(
     "--token-ttl",
@@ -88,10 +78,10 @@ def init(folder: Path | None) -> None:
     callback=_lasting,
     show_default=True,
     metavar="HOURS",
-    help="So long the tokens work.",
+    help="Lifetime of the tokens.",
 )
-@click.option("--json", "as_json", is_flag=True, help="One JSON object a name.")
-@_folder_option
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per name.")
+@authority_option
 @invalid_input_fails
 def enrol(
     names: tuple[str, ...],
@@ -103,18 +93,17 @@ def enrol(
     may: tuple[str, ...],
     hours: float,
 ) -> None:
-    """Give each NAME a token, and print both, a line a name.
+    """Create a token for each NAME, and print one line per name.
 
-    Carry each token to its robot: it works once. A name that is enrolled already can be enrolled again, for a robot
-    that has lost its key, or was revoked: when it shows the new token, its certificates so far are revoked. Its role
-    and its rights change at once.
+    Copy each token to its robot. It can be used once. Enrol a name again if its robot has lost its key or was revoked:
+    when the new token is used, the earlier certificates are revoked. The role and the rights change at once.
     """
     if team:
         from robochoc.formats import robot_names
 
         names = (*names, *robot_names(team))
     if not names:
-        raise Failure(USAGE, "nobody to enrol: give names, or --team DIR")
+        raise Failure(USAGE, "no names to enrol: give names, or --team DIR")
     with _failures_told(), _opened(folder) as found:
         from robochoc.authority.registry import Right, Role
 
@@ -130,17 +119,17 @@ def enrol(
         click.echo(f"{name} {token}")
 
 
-@authority.command("list", short_help="Who is enrolled, and how it stands with them.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object a name.")
-@_folder_option
+@authority.command("list", short_help="List all names and their state.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per name.")
+@authority_option
 def list_members(folder: Path | None, *, as_json: bool) -> None:
     """List all names that were ever enrolled.
 
     \b
-    invited    it has a token, which it has not shown yet
-    in force   it has a certificate, and renews it by itself while it runs
-    expired    its token or its certificate is too old: enrol it again
-    revoked    it is turned away
+    invited    has a token that is not used yet
+    in force   has a certificate, and renews it during runs
+    expired    token or certificate is too old: enrol the name again
+    revoked    is refused
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     with _failures_told(), _opened(folder) as found:
         from robochoc.cli.reports.authority import json_report, print_table
@@ -151,20 +140,20 @@ def list_members(folder: Path | None, *, as_json: bool) -> None:
     elif members:
         print_table(members, now)
     else:
-        click.echo("nobody is enrolled; next: robochoc authority enrol NAME")
+        click.echo("no names are enrolled; next: robochoc authority enrol NAME")
 
 
-@authority.command(short_help="Turn a name away, at once.")
+@authority.command(short_help="Revoke a name, at once.")
 @click.argument("name")
-@_folder_option
+@authority_option
 def revoke(name: str, folder: Path | None) -> None:
-    """Revoke all that NAME was given: its certificates, and a token it has not shown.
+    """Revoke the certificates of NAME, and its token if it is not used yet.
 
-    A master that runs hears of it by itself. To let the name in again, enrol it again.
+    A running master notices it. To accept the name again, enrol it again.
     """
     with _failures_told(), _opened(folder) as found:
         found.revoke(name)
-    click.echo(f"{name} is revoked; to let it in again: robochoc authority enrol {name}")
+    click.echo(f"{name} is revoked; to accept it again: robochoc authority enrol {name}")
 
 
 @contextmanager
@@ -176,7 +165,7 @@ def _opened(folder: Path | None) -> Iterator[Authority]:
 
 @contextmanager
 def _failures_told() -> Iterator[None]:
-    """Whatever the Authority says no to becomes one line, and an exit status."""
+    """Turn the Authority's errors into `Failure`: one line and an exit status."""
     try:
         from robochoc.authority.authority import InvalidNameError, UnknownNameError
         from robochoc.authority.registry import AuthorityError

@@ -1,4 +1,4 @@
-"""`robochoc cache`: what is kept of solved local problems, and how to be rid of it."""
+"""`robochoc cache`: the cache of solved local problems."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import click
 
 @click.group()
 def cache() -> None:
-    """The cache of local problems that were solved before, in your cache folder (XDG_CACHE_HOME, or ~/.cache).
+    """Show or clear the cache of solved local problems, in your cache folder (XDG_CACHE_HOME, or ~/.cache).
 
-    compile and solve fill it by themselves. It is safe to remove at any time: what is missing is solved again.
+    'robochoc compile' and 'solve' fill it. It can be cleared at any time.
     """
 
 
-@cache.command(short_help="Where the cache is, and how large.")
+@cache.command(short_help="Show its folder and size.")
 def show() -> None:
-    """Say where the cache is, how many problems it holds, and how large it is."""
+    """Show the folder of the cache, its number of problems, and its size."""
     from robochoc.solver.cache import SolutionCache
 
     store = SolutionCache()
@@ -24,7 +24,7 @@ def show() -> None:
     click.echo(f"{store.folder}: {problems}, {sum(sizes):,} bytes")
 
 
-@cache.command(short_help="Remove what is in the cache.")
+@cache.command(short_help="Remove all problems from it.")
 def clear() -> None:
     """Remove all problems from the cache."""
     from robochoc.solver.cache import SolutionCache

@@ -1,4 +1,4 @@
-"""`robochoc compile`: what the robots' local problems come to."""
+"""`robochoc compile`: the robots' local problems, compiled into domains."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from robochoc.cli.options.local_problems import limits, local_options
-from robochoc.cli.options.paths import InputPath, teams_at
+from robochoc.cli.options.paths import TeamFolder, teams_at
 from robochoc.cli.reports.failures import LIMIT, Failure, failures_told, worst
 
 if TYPE_CHECKING:
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 
 @click.command("compile")
-@click.argument("paths", nargs=-1, required=True, type=InputPath(), metavar="TEAM ...")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object a team.")
+@click.argument("paths", nargs=-1, required=True, type=TeamFolder(), metavar="TEAM ...")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per team.")
 @local_options
 @click.pass_context
 def compile_team(
@@ -32,20 +32,20 @@ def compile_team(
     always_ace: bool,
     no_cache: bool,
 ) -> None:
-    """Compile the local problem of every robot of the teams at TEAM or below, and show what it comes to.
+    """Compile the local problems of all robots of the teams in TEAM and below, and show their sizes.
 
-    A robot's local solutions are all values of its variables that its private constraints allow. Those that look
-    alike to its neighbours make one group; the groups are the values that a protocol sees.
+    A robot's local solutions are the values of its variables that its private constraints allow. Local solutions that
+    neighbours cannot tell apart make one group. A protocol works on the groups.
 
     \b
-    variables  the robot's own
-    seen       those of them that neighbours see (shared constraints, what children are told)
-    private    constraints on own variables only
-    local      solutions of these
-    groups     of local solutions that look alike from outside
-    cost       of the cheapest local solution of a group, from the cheapest group to the dearest (DisWCSP)
-    how        direct: nothing to search; enumerated: a small problem, without ACE; ACE: solved by it now;
-               cached: by it, before; equal: for a robot above
+    variables  number of the robot's variables
+    seen       those of them in shared constraints
+    private    number of constraints on its own variables only
+    local      number of local solutions
+    groups     number of groups
+    cost       minimum and maximum cost of a group (DisWCSP)
+    how        direct: no search; enumerated: without ACE; ACE: solved by ACE;
+               cached: solved earlier; equal: same problem as a robot above
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.solver.cache import SolutionCache
 

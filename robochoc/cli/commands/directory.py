@@ -1,4 +1,4 @@
-"""`robochoc directory`: ask a running master's Directory Facilitator who is there."""
+"""`robochoc directory`: query a running master's Directory Facilitator."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.network import PlaceType, network_failures_told
-from robochoc.cli.options.paths import InputPath
+from robochoc.cli.options.network import identity_option, master_option, network_failures_told, patience_option
 from robochoc.cli.options.tokens import token_options
 
 if TYPE_CHECKING:
@@ -17,39 +16,27 @@ if TYPE_CHECKING:
 
 
 @click.command()
+@master_option
 @click.option(
-    "--master", "place", type=PlaceType(), required=True, metavar="HOST:PORT", help="Where the master listens."
-)
-@click.option(
-    "--as", "name", required=True, metavar="NAME", help="Who asks: an enrolled name (--role observer will do)."
+    "--as", "name", required=True, metavar="NAME", help="Your name, as it is enrolled (--role observer is enough)."
 )
 @token_options()
-@click.option(
-    "--identity",
-    type=InputPath(),
-    metavar="DIR",
-    help="Where the key and the certificate are  [default: robochoc/identities/NAME in your data folder]",
-)
+@identity_option
 @click.option(
     "--search",
     "slots",
     multiple=True,
     metavar="SLOT=VALUE",
-    help="Only who matches: protocol=abt, variable=V3.1, topic=..., name=Robot3.1, ontology=..., language=...",
+    help=(
+        "Only agents that match: protocol=abt, variable=V3.1, topic=..., name=Robot3.1, ontology=..., language=..."
+        " Repeatable: all have to match."
+    ),
 )
-@click.option(
-    "--patience",
-    "patience_s",
-    type=click.FloatRange(0, min_open=True),
-    default=10.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="How long the master may be out of reach.",
-)
-@click.option("--at-most", type=click.IntRange(1), metavar="N", help="At most so many agents.")
-@click.option("--watch", "watching", is_flag=True, help="Go on, and tell who comes and goes, until Ctrl-C.")
-@click.option("--sl", is_flag=True, help="Print the answer as it comes: FIPA-SL0.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object an agent.")
+@patience_option("Time without contact after which the master is given up.", 10.0)
+@click.option("--at-most", type=click.IntRange(1), metavar="N", help="At most N agents.")
+@click.option("--watch", "watching", is_flag=True, help="Print agents that register and leave, until Ctrl-C.")
+@click.option("--sl", is_flag=True, help="Print the answer in FIPA-SL0, as it is received.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per agent.")
 def directory(
     place: Address,
     name: str,
@@ -61,10 +48,11 @@ def directory(
     watching: bool,
     **given: Any,  # noqa: ANN401 - what to ask for, and how long to wait
 ) -> None:
-    """List the agents that a running master's Directory Facilitator knows: their protocols, variables and topics.
+    """List the agents in a running master's Directory Facilitator, with their protocols, variables and topics.
 
-    A search gives back who matches all that is asked for.
-    """
+    \b
+    robochoc directory --master 192.168.1.14:7447 --as Scout --search protocol=abt
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     if sl and as_json:
         raise click.UsageError("--sl and --json are two forms of one answer; drop one")
     with network_failures_told(place):

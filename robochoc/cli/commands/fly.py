@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
+from robochoc.cli.options.pages import html_option, serve_option
+from robochoc.cli.options.paths import InputPath, refuse_same_places
 from robochoc.cli.options.ros import (
     FRAME,
     conditions_of,
@@ -18,30 +19,42 @@ from robochoc.cli.options.ros import (
     ros_options,
 )
 from robochoc.cli.options.saved import saved_outcome, team_of, team_option
+from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.reports.failures import INVALID, LOST, Failure, invalid_input_fails
 
 if TYPE_CHECKING:
-    from robochoc.flight.flight import Flown
+    from robochoc.flight.flight import FlightLog
     from robochoc.flight.mission import Mission
 
 
-@click.command()
+_SECTIONS: Sections = {
+    COMMON: ("--html", "--serve", "--json", "--team", "--help"),
+    "Simulated flight": ("--fail", "--distance", "--wind", "--gusts", "--seed"),
+    "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale"),
+}
+
+
+@click.command(cls=SectionedCommand, sections=_SECTIONS)
 @click.argument("saved", type=InputPath(), metavar="RESULT.json|JOURNAL")
 @team_option
 @ros_options
 @flight_options
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of --gusts.")
-@click.option("--html", type=OutputFile(), metavar="FILE", help="Write the 3D scene: one page that needs no server.")
-@click.option("--serve", is_flag=True, help="Show the 3D scene live on this machine until Ctrl-C.")
-@click.option("--json", "as_json", is_flag=True, help="Print how it went as one JSON object.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="N", help="Seed of --gusts.")
+@html_option()
+@serve_option
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @invalid_input_fails
 def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_json: bool, **given: Any) -> None:  # noqa: ANN401 - how it is flown and published
-    """Fly what `robochoc solve --json` printed, or the journal that `--journal` wrote.
+    """Simulate the flight of a saved result: what 'robochoc solve' wrote with --json or --journal.
 
-    Epoch by epoch the drones fly to their places, or land at the edge if they have withdrawn, and keep their distance.
-    With --ros, each epoch's waypoints are published, and where all drones are 20 times a second, by the flight's
-    own time, which begins at 0. The exit status is 4 if a drone did not arrive, fell, or came nearer than it may.
-    """
+    In each epoch the drones fly to their positions and keep their distance; drones of withdrawn robots land at the
+    edge. --ros publishes the waypoints of each epoch, and all poses 20 times a second of simulated time. The exit
+    status is 4 if a drone did not arrive, fell, or came too close to another.
+
+    \b
+    robochoc solve instances/queens3d-4 --withdraw --json > out/result.json
+    robochoc fly out/result.json --html out/flight.html --wind 3
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.cli.reports.flight import as_planned, flight_json, report, too_late
 
     refuse_same_places({"--html": html}, {"the result": saved}, teams=[folder] if folder else [], sinks=given["sinks"])
@@ -58,10 +71,9 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
         for line in (*published, *too_late(given["failures"], flown)):
             click.echo(line, err=True)
     if html or serve:
-        from robochoc.cli.reports.scene import serve_scene, write_page
-        from robochoc.view.scene import scene_of
+        from robochoc.cli.reports.scene import scene_for, serve_scene, write_page
 
-        scene = scene_of(outcome, team, mission=mission, flown=flown)
+        scene = scene_for(outcome, team, mission=mission, flown=flown)
         if html:
             write_page(scene, html, quiet=as_json)
         if serve:
@@ -69,22 +81,22 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
     click.get_current_context().exit(0 if as_planned(flown) else LOST)
 
 
-def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[Flown, list[str]]:
+def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[FlightLog, list[str]]:
     """What was flown, and what of it was published where."""
     from robochoc.cli.reports.progress import stages
     from robochoc.flight.flight import fly as flight
     from robochoc.formats import on_one_line
-    from robochoc.ros.outlet import Outlet, publish_flight
+    from robochoc.ros.sink_publisher import SinkPublisher, publish_flight
 
     conditions = conditions_of(given, mission)
     with ros_failures_told(), ExitStack() as stack:
         sinks = open_sinks(given["sinks"], stack)
         frame = given["frame"] or FRAME
-        outlets = [Outlet(mission.team, mission.drones, sink, frame) for sink in sinks]
+        publishers = [SinkPublisher(mission.team, mission.drones, sink, frame) for sink in sinks]
         try:
             with stages(mission.team) as progress:
                 flown = flight(mission, conditions, progress)
         except ValueError as refused:
             raise Failure(INVALID, on_one_line(f"{saved}: it cannot be flown: {refused}")) from refused
-        publish_flight(mission, flown, outlets)
-    return flown, [f"{outlet.place}: {outlet.told}" for outlet in outlets]
+        publish_flight(mission, flown, publishers)
+    return flown, [f"{publisher.place}: {publisher.summary}" for publisher in publishers]

@@ -1,4 +1,4 @@
-"""`robochoc journal`: what is in a journal, and in forms that other programs read."""
+"""`robochoc journal`: a summary of a journal, and exports for other programs."""
 
 from __future__ import annotations
 
@@ -27,28 +27,30 @@ MOST_IN_PAGE = 100_000
 
 @click.group()
 def journal() -> None:
-    """What 'robochoc solve --journal FILE' has written: all that robots said to each other, took in and decided."""
+    """Show or export a journal: all messages and decisions of a run ('robochoc solve --journal FILE')."""
 
 
-@journal.command(short_help="Say what is in a journal.")
+@journal.command(short_help="Summarise a journal.")
 @click.argument("file", type=InputPath(), metavar="FILE")
 def show(file: Path) -> None:
-    """Say what was run, who took part, what was said how often, how it ended, and whether the journal is whole."""
+    """Summarise a journal: run, robots, messages by type, outcome, and whether the file is complete."""
     from robochoc.cli.reports.journal import report
 
     for line in report(_trace(saved_journal(file), file)):
         click.echo(line)
 
 
-@journal.command(short_help="Write conversations for other programs, or as a page.")
+@journal.command(short_help="Write messages for other programs, or as a page.")
 @click.argument("file", type=InputPath(), metavar="FILE")
-@click.option("--format", "form", type=click.Choice(FORMATS), required=True, help="What to write; see above.")
-@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File to write  [default: standard output]")
-@click.option("--robots", default="", metavar="PATTERNS", help="Only what these say to each other: Robot3.1,Robot2.*")
-@click.option("--types", default="", metavar="PATTERNS", help="Only messages of these types: Ok,Nogood")
-@click.option("--from", "first", type=click.IntRange(0), default=0, metavar="N", help="From message N on; 0 is first.")
-@click.option("--to", "last", type=click.IntRange(0), metavar="N", help="Up to message N.")
-@click.option("--conversation", type=click.IntRange(1), metavar="N", help="Only run (or epoch) N; 1 is the first.")
+@click.option("--format", "form", type=click.Choice(FORMATS), required=True, help="Format, see above.")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File to write.  [default: standard output]")
+@click.option("--robots", default="", metavar="PATTERNS", help="Only messages between these robots: Robot3.1,Robot2.*")
+@click.option("--types", default="", metavar="PATTERNS", help="Only these types of messages: Ok,Nogood")
+@click.option(
+    "--from", "first", type=click.IntRange(0), default=0, metavar="N", help="First message; they are numbered from 0."
+)
+@click.option("--to", "last", type=click.IntRange(0), metavar="N", help="Last message.")
+@click.option("--conversation", type=click.IntRange(1), metavar="N", help="Only run (or epoch) N, numbered from 1.")
 def export(
     file: Path,
     form: str,
@@ -59,16 +61,16 @@ def export(
     last: int | None,
     conversation: int | None,
 ) -> None:
-    """Write the messages in the journal FILE, all or those that are meant.
+    """Export the messages in the journal FILE, all or a selection.
 
     \b
-    jsonl    the journal as text, one JSON object a line; robochoc reads it as well
-    acl      messages of FIPA ACL as text (FIPA00070), one a line
-    csv      a table: one message a row, with its cause, its words and its content
-    mermaid  a sequence diagram, for Markdown pages
-    html     one page that holds everything, to be opened in a browser or mailed
+    jsonl    the journal as text, one JSON object per line; robochoc reads it too
+    acl      FIPA ACL messages as text (FIPA00070), one per line
+    csv      a table with one row per message: cause, explanation, content
+    mermaid  a sequence diagram for Markdown pages
+    html     the sniffer's page in one file, without a server
 
-    In PATTERNS, * stands for anything and ? for one character. Messages have the numbers that the page shows.
+    In PATTERNS, * matches anything and ? one character. Messages have the numbers of the sniffer's page.
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.sniffer.patterns import patterns_in
     from robochoc.sniffer.selection import NothingSelectedError, Selection

@@ -9,10 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.network import PlaceType, network_failures_told
-from robochoc.cli.options.paths import InputPath, OutputFile
-from robochoc.cli.options.recording import recording, shown_and_flushed
-from robochoc.cli.options.solve import WITHDRAWALS, SolveCommand, protocol_settings
+from robochoc.cli.options.network import PlaceType, authority_option, network_failures_told, patience_option
+from robochoc.cli.options.paths import TeamFolder
+from robochoc.cli.options.recording import journal_option, recording, shown_and_flushed
+from robochoc.cli.options.sections import COMMON, Sections
+from robochoc.cli.options.solve import (
+    SolveCommand,
+    filter_option,
+    messages_option,
+    protocol_option,
+    protocol_settings,
+    settings_option,
+    withdraw_option,
+)
 from robochoc.cli.reports.failures import LIMIT
 from robochoc.cli.reports.progress import progress_line
 
@@ -25,7 +34,18 @@ if TYPE_CHECKING:
     from robochoc.run.networked.lead import Led, Plan
 
 
-@click.command(cls=SolveCommand)
+_SECTIONS: Sections = {
+    COMMON: (
+        "--listen", "--robots", "--team", "--protocol", "--withdraw", "--timeout",
+        "--json", "--journal", "--sniffable", "--help",
+    ),
+    "Search": ("--set", "--seed", "--messages"),
+    "Robots and losses": ("--host", "--authority", "--gather", "--patience", "--on-loss"),
+    "Privacy and security": ("--private", "--filter"),
+}  # fmt: skip
+
+
+@click.command(cls=SolveCommand, sections=_SECTIONS)
 @click.option(
     "--listen",
     "place",
@@ -33,77 +53,49 @@ if TYPE_CHECKING:
     default="127.0.0.1:7447",
     show_default=True,
     metavar="HOST:PORT",
-    help="The address of this machine at which robots reach it. Tokens are redeemed one port higher.",
+    help="Address at which robots reach this machine. Robots enrol one port higher.",
 )
 @click.option(
     "--host",
     "hosts",
     multiple=True,
     metavar="NAME",
-    help="Another name or address by which robots may call this machine; needed with --listen 0.0.0.0.",
+    help="Another name or address of this machine; needed with --listen 0.0.0.0. Repeatable.",
 )
-@click.option("--robots", "number", type=click.IntRange(1), metavar="N", help="Begin when N robots have come.")
+@click.option("--robots", "number", type=click.IntRange(1), metavar="N", help="Start when N robots have registered.")
 @click.option(
     "--team",
-    type=InputPath(),
+    type=TeamFolder(),
     metavar="DIR",
-    help="Begin when the robots of this folder have come. Only its file names are looked at.",
+    help="Start when the robots of this folder have registered. Only the names of its files are read.",
 )
+@protocol_option(central=False)
+@settings_option
 @click.option(
-    "--protocol", metavar="NAME", help="By default abt, and sfb where there are costs; all: robochoc protocols."
+    "--seed", type=click.IntRange(0), default=0, show_default=True, metavar="N", help="Seed of protocols that draw."
 )
-@click.option("--set", "settings_given", multiple=True, metavar="NAME=VALUE", help="A setting of the protocol.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="For protocols that draw lots.")
-@click.option(
-    "--withdraw",
-    type=click.Choice(WITHDRAWALS),
-    metavar="[=fewest|maximal]",
-    help="When the whole team has no solution, robots step aside: as few as possible, or whoever finds no place.",
-)
-@click.option("--private", is_flag=True, help="Robots do not tell their values, only that they have one.")
-@click.option(
-    "--filter",
-    "filters",
-    multiple=True,
-    metavar="NAME",
-    help="signed or sealed, or an installed filter: messages go through all of them, in this order.",
-)
-@click.option("--gather", "gather_s", type=float, metavar="SECONDS", help="Give up if the team is not complete then.")
-@click.option("--timeout", type=float, metavar="SECONDS", help="Give up so long after the team is complete: status 3.")
-@click.option("--messages", type=click.IntRange(1), metavar="N", help="Give up after (about) so many messages.")
-@click.option(
-    "--patience",
-    "patience_s",
-    type=click.FloatRange(0, min_open=True),
-    default=10.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="How long a robot may be out of reach before it is lost.",
-)
+@withdraw_option
+@click.option("--private", is_flag=True, help="Robots do not report their values, only that they have one.")
+@filter_option
+@click.option("--gather", "gather_s", type=float, metavar="SECONDS", help="Stop if the team is not complete by then.")
+@click.option("--timeout", type=float, metavar="SECONDS", help="Stop this long after the team is complete (status 3).")
+@messages_option
+@patience_option("Time without contact after which a robot is lost.", 10.0)
 @click.option(
     "--on-loss",
     type=click.Choice(["fail", "withdraw"]),
     default="fail",
     show_default=True,
-    help="When a robot is lost. fail: the run ends, exit status 4; withdraw: it leaves with its constraints.",
+    metavar="fail|withdraw",
+    help="If a robot is lost, end the run (status 4), or let the robot leave.",
 )
-@click.option(
-    "--authority",
-    type=InputPath(),
-    metavar="DIR",
-    help="The Authority's folder  [default: robochoc/authority in your data folder]",
-)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
-@click.option(
-    "--journal",
-    type=OutputFile(),
-    metavar="FILE",
-    help="Write down every event while the run goes on, in a compact file (docs/guides/journal.md).",
-)
+@authority_option
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@journal_option
 @click.option(
     "--sniffable",
     is_flag=True,
-    help="Let those follow the run who may (authority enrol --may sniff): they say robochoc sniff --master.",
+    help="Let those who may sniff follow the run ('robochoc sniff --master').",
 )
 @click.pass_context
 def master(
@@ -113,16 +105,19 @@ def master(
     as_json: bool,
     journal: Path | None,
     sniffable: bool,
-    authority: Path | None,
+    folder: Path | None,
     team: Path | None,
     **given: Any,  # noqa: ANN401 - the fields of `Plan` and `NetworkSettings`, by their names
 ) -> None:
-    """Listen for robots, and have them solve their problem together once all are there.
+    """Register robots of other machines, and let them solve their problem together.
 
-    The master never sees a robot's file. It takes robots that its Authority has enrolled, and tells on standard error
-    who comes, and every refusal. Without --robots and --team the team is complete when every neighbour that a robot
-    names has come.
-    """
+    The master never reads a robot's file. It accepts only robots that its Authority has enrolled. It prints
+    registrations and refusals on standard error. Without --robots and --team, the team is complete when all neighbours
+    of all robots have registered.
+
+    \b
+    robochoc master --listen 192.168.1.14:7447 --robots 16
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     if given["number"] and team:
         raise click.UsageError("--robots and --team both say who is expected; drop one")
     if team and (team / "scenario.xml").exists():
@@ -131,7 +126,7 @@ def master(
         if given[option] is not None and not given[option] > 0:
             raise click.UsageError(f"--{option.removesuffix('_s')} takes a number of seconds, more than 0")
     with network_failures_told("master"):
-        plan = _plan(authority, team, given)
+        plan = _plan(folder, team, given)
         with (
             _publication(sniffable=sniffable) as publication,
             recording(journal, lambda: _header(plan), None, [publication.write] if publication else []) as recorder,
@@ -141,7 +136,7 @@ def master(
     context.exit(LIMIT if led.outcome.verdict == "unknown" else 0)
 
 
-def _plan(authority: Path | None, team: Path | None, given: dict[str, Any]) -> Plan:
+def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> Plan:
     from robochoc.authority.authority import default_folder
     from robochoc.communication.filters import UnknownFilterError, filter_named
     from robochoc.communication.network.settings import NetworkSettings
@@ -162,7 +157,7 @@ def _plan(authority: Path | None, team: Path | None, given: dict[str, Any]) -> P
     )
     withdraw = given.pop("withdraw")
     return Plan(
-        authority=authority or default_folder(),
+        authority=folder or default_folder(),
         conditions=conditions,
         settings=protocol_settings(given.pop("settings_given")),
         withdraw=Withdrawal(withdraw) if withdraw else None,

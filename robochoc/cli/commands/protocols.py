@@ -6,12 +6,13 @@ import difflib
 
 import click
 
+from robochoc.cli.options.names import ProtocolName
 from robochoc.cli.reports.failures import USAGE, Failure
 
 
 @click.command()
-@click.argument("name", required=False)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object a protocol.")
+@click.argument("name", required=False, type=ProtocolName())
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per protocol.")
 def protocols(name: str | None, *, as_json: bool) -> None:
     """List the protocols that are installed, of this package and of others, or explain the protocol NAME.
 

@@ -1,4 +1,4 @@
-"""`robochoc replay`: whether a recorded run would go the same way again."""
+"""`robochoc replay`: compare a recorded run with the protocol of today."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from robochoc.cli.options.local_problems import limits, local_options
-from robochoc.cli.options.paths import InputPath
+from robochoc.cli.options.paths import InputPath, TeamFolder
 from robochoc.cli.options.saved import saved_journal
 from robochoc.cli.options.solve import protocol_settings
 from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure, failures_told, invalid_input_fails
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
 @click.option(
     "--team",
     "folder",
-    type=InputPath(),
+    type=TeamFolder(),
     metavar="DIR",
-    help="The team's folder, for a journal that does not say what robots were given: one from across machines.",
+    help="The team's folder, for a journal without the robots' problems (from several machines).",
 )
 @click.option(
     "--set",
     "settings",
     multiple=True,
     metavar="NAME=VALUE",
-    help="What was set of the protocol, for a journal that does not say what robots were given.",
+    help="A parameter of the protocol in that run, for such a journal. Repeatable.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @local_options
 @invalid_input_fails
 def replay(
@@ -48,12 +48,12 @@ def replay(
     always_ace: bool,
     no_cache: bool,
 ) -> int:
-    """Drive the same protocol objects through the packets in JOURNAL, and compare all that they say and do.
+    """Replay the messages in JOURNAL through the protocol, and compare all results with the recorded ones.
 
-    The exit status is 0 if that is the same as was recorded, and 4 if not: then the protocol is another one than it
-    was, or the journal is. The first difference is shown. So is what its header and its outcome claim, where that does
-    not follow from its steps. A journal that ends early is played as far as it goes. One that was altered is played up
-    to there, and is invalid (1), as is one that holds nothing to be compared.
+    The exit status is 0 if they are the same, and 4 if not: then the protocol or the journal has changed. The first
+    difference is printed, and every claim of the header or the outcome that the steps contradict. A journal that ends
+    early is replayed to its end. A journal that was altered is replayed up to that place, and is invalid (status 1), as
+    is one without steps.
     """
     from robochoc.formats import read_team
     from robochoc.replay import Means

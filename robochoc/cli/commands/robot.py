@@ -1,4 +1,4 @@
-"""`robochoc robot`: one robot, on its own machine (Figure 4)."""
+"""`robochoc robot`: one robot on its own machine (Figure 4)."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.local_problems import limits, local_options
-from robochoc.cli.options.network import PlaceType, network_failures_told
+from robochoc.cli.options.network import identity_option, master_option, network_failures_told, patience_option
 from robochoc.cli.options.paths import InputPath
-from robochoc.cli.options.ros import outlets, ros_options
+from robochoc.cli.options.ros import robot_publisher, ros_options
+from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.options.tokens import token_options
 from robochoc.cli.reports.failures import LIMIT, LOST, Failure
 from robochoc.cli.reports.progress import progress_line
@@ -20,34 +21,23 @@ if TYPE_CHECKING:
     from robochoc.run.networked.address import Address
 
 
-@click.command()
+_SECTIONS: Sections = {
+    COMMON: ("--master", "--token-file", "--token", "--identity", "--patience", "--sniff", "--json", "--help"),
+    "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
+    "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale"),
+}
+
+
+@click.command(cls=SectionedCommand, sections=_SECTIONS)
 @click.argument("file", type=InputPath())
-@click.option(
-    "--master", "place", type=PlaceType(), required=True, metavar="HOST:PORT", help="Where the master listens."
-)
+@master_option
 @token_options()
-@click.option(
-    "--identity",
-    type=InputPath(),
-    metavar="DIR",
-    help="Where the robot's key and certificate are  [default: robochoc/identities/NAME in your data folder]",
-)
-@click.option(
-    "--patience",
-    type=click.FloatRange(0, min_open=True),
-    default=30.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="How long the master may be out of reach, at the beginning and later.",
-)
-@click.option(
-    "--sniff",
-    is_flag=True,
-    help="Let the master's journal, and so who may sniff, have all that this robot says and hears.",
-)
+@identity_option
+@patience_option("Time without contact after which the master is given up.", 30.0, "patience")
+@click.option("--sniff", is_flag=True, help="Report all messages of this robot to the master's journal.")
 @local_options
 @ros_options
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.pass_context
 def robot(
     context: click.Context,
@@ -60,11 +50,14 @@ def robot(
     as_json: bool,
     **given: Any,  # noqa: ANN401 - how it takes part and compiles
 ) -> None:
-    """Be the robot of FILE in the next run of the master, until that is over.
+    """Run the robot of FILE on this machine, in the next run of a master.
 
-    The robot knows its own file and nothing else. The first time it needs a token, with which it gets its certificate;
-    afterwards it proves with that who it is, and renews it by itself.
-    """
+    The robot reads its own file and nothing else. The first time it needs a token (robochoc authority enrol), for which
+    it gets a certificate. Later runs use the certificate, and renew it.
+
+    \b
+    robochoc robot Robot3.1.xml --master 192.168.1.14:7447 --token-file token
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     with network_failures_told(file):
         from robochoc.communication.network.manner import Manner
         from robochoc.communication.run_result import Progress
@@ -82,7 +75,7 @@ def robot(
                     progress(Progress(0, _seconds() - began, words))
 
             itself = read_robot(file)  # before its token is spent
-            published = stack.enter_context(outlets(itself, given))
+            published = stack.enter_context(robot_publisher(itself, given))
             stage(f"looking for the master at {place}")
             proof = identity_of(file.stem, place, identity, token, given["patience"])
             manner = Manner(given["patience"], sniffed=given["sniff"], stage=stage)

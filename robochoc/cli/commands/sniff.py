@@ -1,4 +1,4 @@
-"""`robochoc sniff`: the page that explains a run, from its journal."""
+"""`robochoc sniff`: a page that shows and explains the messages of a run."""
 
 from __future__ import annotations
 
@@ -10,30 +10,41 @@ import click
 from robochoc.cli.commands.sniff_master import Page, asks_master, master_options, sniff_master
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.saved import JOURNAL_STEP
+from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure, invalid_input_fails
 
 if TYPE_CHECKING:
     from robochoc.sniffer.session import Session
 
 
-@click.command()
+_SECTIONS: Sections = {
+    COMMON: ("--robots", "--team", "--port", "--open", "--help"),
+    "A run elsewhere": (
+        "--master", "--as", "--token-file", "--token", "--identity", "--patience", "--journal", "--no-page",
+    ),
+}  # fmt: skip
+
+
+@click.command(cls=SectionedCommand, sections=_SECTIONS)
 @click.argument("journal", type=InputPath(), metavar="[JOURNAL]", required=False)
 @master_options
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port of the page; 0 is any free one.")
-@click.option("--open", "open_browser", is_flag=True, help="Show the page in a browser.")
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Port of the page; 0: any free one."
+)
+@click.option("--open", "open_browser", is_flag=True, help="Open the page in a browser.")
 @click.option(
     "--robots",
     "chosen",
     default="",
     metavar="PATTERNS",
-    help="Robots to begin with: names or patterns, such as Robot3.1,Robot2.*.  [default: all]",
+    help="Robots shown first, such as Robot3.1,Robot2.*.  [default: all]",
 )
 @click.option(
     "--team",
     "folder",
     type=InputPath(),
     metavar="DIR",
-    help="The team's folder, for the 3D scene.  [default: what the journal says]",
+    help="The team's folder, for the 3D scene.  [default: the journal's own data]",
 )
 @click.pass_context
 @invalid_input_fails
@@ -48,12 +59,14 @@ def sniff(
     open_browser: bool,
     **asked: Any,  # noqa: ANN401 - who follows a master, and how
 ) -> None:
-    """Show the conversations in JOURNAL on a page of this machine, until Ctrl-C: who said what, and why.
+    """Show all messages of a run on a page of this machine, with their reasons, until Ctrl-C.
 
-    JOURNAL is what 'robochoc solve --journal' writes; while it is still written, the page follows it. With --master
-    it is what a master on another machine gives out of its run, to those who may sniff:
-    docs/guides/several-machines.md.
-    """
+    JOURNAL is a file of 'robochoc solve --journal'; while the run goes on, the page follows it. With --master, the run
+    of a master on another machine is followed (docs/guides/several-machines.md).
+
+    \b
+    robochoc sniff out/run.journal --robots 'Robot2.*' --open
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     elsewhere = asks_master(journal, folder, asked)
     if elsewhere or journal is None:
         from robochoc.sniffer.patterns import patterns_in

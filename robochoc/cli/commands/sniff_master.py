@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from robochoc.cli.options.network import PlaceType, network_failures_told
-from robochoc.cli.options.paths import InputPath, OutputFile
+from robochoc.cli.options.network import PlaceType, identity_option, network_failures_told, patience_option
+from robochoc.cli.options.paths import OutputFile
 from robochoc.cli.options.tokens import token_options
 from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure
 
@@ -32,39 +32,24 @@ _OPTIONS = (
         "place",
         type=PlaceType(),
         metavar="HOST:PORT",
-        help="Follow the run of the master there, which has to be --sniffable.",
+        help="Address of the master, which runs with --sniffable.",
     ),
     click.option(
         "--as",
         "name",
         metavar="NAME",
-        help=f"With --master: who sniffs, a name enrolled with --may sniff.  [default: {NAME}]",
+        help=f"Your name, enrolled with --may sniff.  [default: {NAME}]",
     ),
-    token_options("With --master: enrol"),
-    click.option(
-        "--identity",
-        type=InputPath(),
-        metavar="DIR",
-        help="With --master: where key and certificate are  [default: robochoc/identities/NAME in your data folder]",
-    ),
-    click.option(
-        "--patience",
-        "patience_s",
-        type=click.FloatRange(0, min_open=True),
-        default=10.0,
-        show_default=True,
-        metavar="SECONDS",
-        help="With --master: how long it may be out of reach.",
-    ),
-    click.option(
-        "--journal", "copy", type=OutputFile(), metavar="FILE", help="With --master: keep what comes in FILE."
-    ),
-    click.option("--no-page", is_flag=True, help="With --master and --journal: no page; ends with the run."),
+    token_options(),
+    identity_option,
+    patience_option("Time without contact after which the master is given up.", 10.0),
+    click.option("--journal", "copy", type=OutputFile(), metavar="FILE", help="Keep the journal of the run in FILE."),
+    click.option("--no-page", is_flag=True, help="With --journal: show no page, and end with the run."),
 )
 
 
 def master_options(command: Command) -> Command:
-    """What `sniff` is told of a master."""
+    """Add the options with which `robochoc sniff` follows a master."""
     for option in reversed(_OPTIONS):
         command = option(command)
     return command

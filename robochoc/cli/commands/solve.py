@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.channel import ChannelName, channel_for
+from robochoc.cli.options.channel import CHANNEL_NAME, channel_for
+from robochoc.cli.options.channel import NAMES as CHANNELS
 from robochoc.cli.options.local_problems import limits, local_options
-from robochoc.cli.options.order import GIVEN, OrderName, order_for
-from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places, teams_at
-from robochoc.cli.options.recording import recording, shown_and_flushed
+from robochoc.cli.options.order import GIVEN, ORDER_NAME, order_for
+from robochoc.cli.options.order import NAMES as ORDERS
+from robochoc.cli.options.pages import html_option, serve_option
+from robochoc.cli.options.paths import TeamFolder, refuse_same_places, teams_at
+from robochoc.cli.options.recording import journal_option, recording, shown_and_flushed
 from robochoc.cli.options.ros import (
     check_ros,
     flight_options,
@@ -23,127 +26,112 @@ from robochoc.cli.options.ros import (
     ros_options,
     situation_options,
 )
+from robochoc.cli.options.sections import COMMON, Sections
 from robochoc.cli.options.solve import (
-    WITHDRAWALS,
     Products,
     SolveCommand,
     Wanted,
     check_settings,
+    filter_option,
+    messages_option,
+    protocol_option,
     protocol_settings,
+    settings_option,
+    withdraw_option,
 )
 from robochoc.cli.reports.closed_loop import flight_told, told_of
 from robochoc.cli.reports.failures import LIMIT, Failure, failures_told, worst
 from robochoc.cli.reports.live_sniffer import Watch, check_chosen, watching
-from robochoc.run.defaults import MINIMISES, SATISFIES, default_protocol
+from robochoc.run.defaults import default_protocol
 
 if TYPE_CHECKING:
     from robochoc.journal.journal import Header, Recorder
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
-    from robochoc.ros.closed_loop import Loop
+    from robochoc.ros.closed_loop import ClosedLoop
     from robochoc.run.orchestrator import Options
     from robochoc.verification.objective import Objective
     from robochoc.view.scene import Scene
 
 
-@click.command(cls=SolveCommand)
-@click.argument("paths", nargs=-1, required=True, type=InputPath(), metavar="PATH ...")
-@click.option(
-    "--protocol",
-    metavar="NAME",
-    help=(
-        f"The robots solve it together by this one; by default {SATISFIES}, and {MINIMISES} where there are costs."
-        " central: no robots, one model of all files merged, solved by ACE if it is not small. All that there are:"
-        " robochoc protocols."
+_SECTIONS: Sections = {
+    COMMON: (
+        "--protocol", "--runtime", "--timeout", "--withdraw", "--verify", "--seed",
+        "--json", "--html", "--journal", "--sniff", "--help",
     ),
-)
-@click.option(
-    "--set",
-    "settings_given",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="A setting of the protocol, such as --set cycles=500 for dsa; robochoc protocols NAME shows them.",
-)
+    "Search": ("--order", "--set", "--messages", "--count"),
+    "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience"),
+    "Messages on their way": ("--schedule", "--delay", "--channel", "--filter"),
+    "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
+    "Output": ("--explain", "--serve", "--open"),
+    "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale", "--situation", "--battery"),
+    "Simulated flight (--situation flight)": ("--fail", "--distance", "--wind", "--gusts", "--obstacle"),
+}  # fmt: skip
+
+
+@click.command(cls=SolveCommand, sections=_SECTIONS)
+@click.argument("paths", nargs=-1, required=True, type=TeamFolder(), metavar="PATH ...")
+@protocol_option(central=True)
+@settings_option
 @click.option(
     "--order",
-    type=OrderName(),
+    type=ORDER_NAME,
     default=GIVEN,
     show_default=True,
     metavar="NAME|FILE",
-    help=(
-        "Priority order of the robots: given (the files'), lexicographic, max-degree, min-width, dom-deg, dfs, random"
-        " (from --seed), or a text file with a robot's name a line, the highest priority first."
-    ),
+    help=f"Priority order of the robots: {', '.join(ORDERS)}, or a file with one robot's name a line.",
 )
 @click.option(
     "--runtime",
-    type=click.Choice(["processes", "simulator", "network"]),
+    type=click.Choice(["processes", "simulator", "network"], case_sensitive=False),
     default="processes",
     show_default=True,
-    help=(
-        "processes: one OS process per robot; simulator: one thread, repeatable; network: processes that register with"
-        " a master and talk through it by mutual TLS, on this machine (see robochoc master)."
-    ),
+    metavar="NAME",
+    help="processes: one OS process per robot; simulator: one thread, repeatable; network: processes, TLS, a master.",
 )
 @click.option(
     "--seed",
     type=click.IntRange(0),
     default=0,
     show_default=True,
-    help="Seed of the simulator, of --order random, of protocols that draw lots, and of --gusts.",
+    metavar="N",
+    help="Seed of everything that is random.",
 )
 @click.option(
     "--schedule",
     type=click.Choice(["concurrent", "random"]),
     default="concurrent",
     show_default=True,
-    help="Simulator only. concurrent: time is counted in constraint checks; random: any channel may come next.",
+    metavar="NAME",
+    help="Simulator. concurrent: time counts constraint checks; random: channels take random turns.",
 )
 @click.option(
     "--delay",
     type=click.IntRange(0),
     default=0,
     show_default=True,
-    help="Simulator, concurrent schedule only: the longest delay of a message, in constraint checks.",
+    metavar="CHECKS",
+    help="Simulator: largest delay of a message.",
 )
 @click.option(
     "--channel",
-    type=ChannelName(),
+    type=CHANNEL_NAME,
     metavar="NAME|FILE",
-    help=(
-        "Simulator only, instead of --delay: simulate time in seconds, computing and radio, by a channel model: wlan,"
-        " wpan, wman, wwan, or a TOML file (docs/guides/channels.md)."
-    ),
+    help=f"Simulator: seconds of computing and radio, by a channel model: {', '.join(CHANNELS)} or a TOML file.",
 )
 @click.option(
     "--timeout",
     type=click.FloatRange(0, min_open=True),
     metavar="SECONDS",
-    help="Give up after so long, compiling and the start of the processes included: verdict unknown, exit status 3.",
+    help="Stop after this time: verdict unknown, exit status 3.",
 )
-@click.option(
-    "--withdraw",
-    type=click.Choice(WITHDRAWALS),
-    metavar="[=fewest|maximal]",
-    help=(
-        "When the whole team has no solution, robots step aside. fewest (also without a word): as few as possible, by"
-        " their weights, and proven; maximal: whoever finds no place, in priority order, which is quick: nobody could"
-        " be added, but fewer might do."
-    ),
-)
-@click.option(
-    "--messages",
-    type=click.IntRange(1),
-    metavar="N",
-    help="Give up after (about) so many messages: verdict unknown, exit status 3.",
-)
+@withdraw_option
+@messages_option
 @click.option(
     "--on-loss",
     type=click.Choice(["fail", "withdraw"]),
-    help=(
-        "When a robot's process dies. fail: the run ends, exit status 4 (the default); withdraw: the robot leaves the"
-        " problem with its constraints, the others go on."
-    ),
+    metavar="fail|withdraw",
+    help="If a robot's process dies, end the run (status 4), or let the robot leave.  [default: fail]",
 )
 @click.option(
     "--spare",
@@ -151,52 +139,26 @@ if TYPE_CHECKING:
     type=click.IntRange(0),
     default=0,
     metavar="[=N]",
-    help=(
-        "N robots that die (1, without a number) come back: their files are read again, and they join at the end of"
-        " the order. Implies --on-loss withdraw."
-    ),
+    help="Restart up to N lost robots (1 without a number). Implies --on-loss withdraw.",
 )
-@click.option(
-    "--filter",
-    "filters",
-    multiple=True,
-    metavar="NAME",
-    help="Network only: signed or sealed, or an installed filter; messages go through all of them, in this order.",
-)
-@click.option("--explain", is_flag=True, help="Show the pseudo-tree too, if the robots have built one.")
+@filter_option
+@click.option("--explain", is_flag=True, help="Print the pseudo-tree, if the robots have built one.")
 @click.option("--count", is_flag=True, help="With --protocol central: count all solutions.")
-@click.option(
-    "--verify",
-    is_flag=True,
-    help="Have a no-solution or a least cost confirmed by the central judge, on all files merged: two ways must agree.",
-)
+@click.option("--verify", is_flag=True, help="Confirm a no-solution or an optimum by the central solver.")
 @local_options
 @ros_options
 @situation_options
 @flight_options
-@click.option("--json", "as_json", is_flag=True, help="One JSON object a team, and nothing else, on standard output.")
-@click.option(
-    "--html",
-    type=OutputFile(),
-    metavar="FILE",
-    help="Write the 3D scene: one page that needs no server.",
-)
-@click.option(
-    "--journal",
-    type=OutputFile(),
-    metavar="FILE",
-    help="Write down every message and decision while the run goes on, in a compact file (docs/guides/journal.md).",
-)
-@click.option("--serve", is_flag=True, help="Show the 3D scene live on this machine until Ctrl-C.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per team, and nothing else.")
+@html_option()
+@journal_option
+@serve_option
 @click.option(
     "--sniff",
-    metavar="[=PATTERNS]",
-    help=(
-        "Show who says what, as it is said, on a page of this machine until Ctrl-C; of these robots at first, such as"
-        " Robot3.1,Robot2.* (see robochoc sniff)."
-    ),
+    metavar="[=ROBOTS]",
+    help="Show all messages live on a page of this machine; ROBOTS: those shown first, such as Robot3.1,Robot2.*.",
 )
-@click.option("--open", "open_browser", is_flag=True, help="With --sniff: show the page in a browser, then begin.")
+@click.option("--open", "open_browser", is_flag=True, help="With --sniff: open the page in a browser, then start.")
 @click.pass_context
 def solve(
     context: click.Context,
@@ -210,10 +172,12 @@ def solve(
     explain: bool,
     **settings: Any,  # noqa: ANN401 - the options of `robochoc.run.orchestrator.Options`, by their names
 ) -> None:
-    """Solve every team at PATH or below: by default each robot in its own OS process.
+    """Solve all teams in the folders PATH and below; every solution is checked against all constraints.
 
-    Every solution is held against every constraint of every file before it is told.
-    """
+    \b
+    robochoc solve instances/queens3d-4 --withdraw --html out/page.html
+    robochoc solve instances/ --runtime simulator --protocol dpop --json
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.run.orchestrator import OnLoss, Options, Runtime, ScheduleName, Withdrawal
 
     ros = ros_asked(settings)
@@ -296,11 +260,9 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     for line in told_of(loop) if loop and not wanted.as_json else ():
         click.echo(line, err=True)
     if products.html or products.serve:
-        from robochoc.cli.reports.progress import stages
-        from robochoc.view.scene import scene_of
+        from robochoc.cli.reports.scene import scene_for
 
-        with stages(team.name) as progress:
-            scene = scene_of(outcome, team, mission=flight.mission, flown=flight.flown, progress=progress)
+        scene = scene_for(outcome, team, mission=flight.mission, flown=flight.flown)
         _show(scene, products, quiet=wanted.as_json)
     if outcome.verdict != "unknown":
         return flight.status
@@ -309,17 +271,17 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     return LIMIT
 
 
-def _run(team: Team, options: Options, recorder: Recorder | None, loop: Loop | None) -> Outcome:
+def _run(team: Team, options: Options, recorder: Recorder | None, loop: ClosedLoop | None) -> Outcome:
     """Run with whatever watches, a journal, a line on the terminal, and where decisions go."""
     from robochoc.cli.reports.progress import progress_line, waiting
     from robochoc.run.orchestrator import CENTRAL
     from robochoc.run.orchestrator import solve as run
 
-    told = loop and (loop.senses or (team.dynamic and options.protocol != CENTRAL))
+    told = loop and (loop.feedback or (team.dynamic and options.protocol != CENTRAL))
     with progress_line(team.name) as progress:
         show = shown_and_flushed(recorder, progress)
-        if loop and loop.senses and show:
-            loop.senses.idle = waiting(show)
+        if loop and loop.feedback and show:
+            loop.feedback.idle = waiting(show)
         outcome = run(team, options, observer=recorder, progress=show, field=loop if told else None)
     if recorder:
         recorder.outcome = outcome
@@ -348,7 +310,7 @@ def _objective(team: Team, options: Options) -> Callable[[], Objective] | None:
     from robochoc.run.orchestrator import Withdrawal
     from robochoc.verification.objective import Objective, withdrawal_cost
 
-    fewest = options.withdraw is Withdrawal.FEWEST
+    fewest = options.withdraw is Withdrawal.MINIMUM
     if team.dynamic or not (fewest or team.kind == "DisWCSP"):
         return None
     return lambda: Objective(team, withdrawal_cost(team) if fewest else None)

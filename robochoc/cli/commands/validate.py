@@ -1,4 +1,4 @@
-"""`robochoc validate`: every mistake of every file, in one go."""
+"""`robochoc validate`: all errors of all files at once."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("paths", nargs=-1, type=InputPath(), metavar="[PATH ...]")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object a team.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per team.")
 @click.pass_context
 def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) -> None:
-    """Check every team at PATH or below (default: instances/), or single robots' files.
+    """Check all teams in the folders PATH and below (default: instances/), or single robots' files.
 
-    Four layers: XML, schema, each file's own meaning, the team as a whole. All mistakes of all files are told at
-    once, of each file those of its first layer that has any. Exit status 1 if there are any.
+    Checked are the XML, the schema, the meaning of each file, and the team as a whole. All errors of all files are
+    printed at once, with file and line. The exit status is 1 if there are any.
     """
     from robochoc.formats import InvalidInputError, find_teams
 

@@ -22,7 +22,8 @@ def local_options(command: Command) -> Command:
                 type=click.IntRange(1),
                 default=100_000,
                 show_default=True,
-                help="Most local solutions of a robot, and most groups of them.",
+                metavar="N",
+                help="Limit on the local solutions of one robot, and on their groups.",
             ),
             click.option(
                 "--local-timeout",
@@ -30,18 +31,18 @@ def local_options(command: Command) -> Command:
                 default=60.0,
                 show_default=True,
                 metavar="SECONDS",
-                help="Longest time that ACE may take to compile one robot.",
+                help="Time limit of ACE for one robot.",
             ),
             click.option(
                 "--ace",
                 "always_ace",
                 is_flag=True,
-                help="Have ACE solve small problems too, which are enumerated without it otherwise.",
+                help="Have ACE solve small local problems too; by default they are enumerated.",
             ),
             click.option(
                 "--no-cache",
                 is_flag=True,
-                help="Neither use nor fill the cache of solved local problems (see robochoc cache).",
+                help="Do not use the cache of solved local problems ('robochoc cache').",
             ),
         )
     ):

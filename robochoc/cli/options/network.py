@@ -1,18 +1,20 @@
-"""What `robochoc master`, `robot` and `directory` have in common: places, and failures of runs across machines."""
+"""What `robochoc master`, `robot`, `sniff` and `directory` share: options, addresses and failures on the network."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
+from robochoc.cli.options.paths import InputPath
 from robochoc.cli.reports.failures import INVALID, LIMIT, LOST, USAGE, Failure, failures_told
 
 if TYPE_CHECKING:
     from robochoc.run.networked.address import Address
 
+Command = TypeVar("Command", bound=Callable[..., object])
 _EXTRA = {"cryptography", "zenoh"}
 
 
@@ -31,6 +33,37 @@ class PlaceType(click.ParamType["Address"]):
             return Address.parse(value)
         except AddressError as bad:
             self.fail(str(bad), param, ctx)
+
+
+master_option = click.option(
+    "--master", "place", type=PlaceType(), required=True, metavar="HOST:PORT", help="Address of the master."
+)
+authority_option = click.option(
+    "--authority",
+    "folder",
+    type=InputPath(),
+    metavar="DIR",
+    help="Folder of the Authority.  [default: robochoc/authority in your data folder]",
+)
+identity_option = click.option(
+    "--identity",
+    type=InputPath(),
+    metavar="DIR",
+    help="Folder of the key and the certificate.  [default: robochoc/identities/NAME in your data folder]",
+)
+
+
+def patience_option(text: str, default_s: float, name: str = "patience_s") -> Callable[[Command], Command]:
+    """Return the option `--patience SECONDS`, as the argument `name`, explained by `text`."""
+    return click.option(
+        "--patience",
+        name,
+        type=click.FloatRange(0, min_open=True),
+        default=default_s,
+        show_default=True,
+        metavar="SECONDS",
+        help=text,
+    )
 
 
 @contextmanager

@@ -7,10 +7,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import click
 
 from robochoc.cli.reports.failures import INVALID, Failure
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 PathLike = str | os.PathLike[str]
 
@@ -26,6 +30,16 @@ class InputPath(click.Path):
         if not os.fspath(value):
             self.fail("a path is empty; write '.' for this folder", param, ctx)
         return Path(os.fsdecode(super().convert(value, param, ctx)))
+
+
+class TeamFolder(InputPath):
+    """A path to read at which a team is expected: the shell completes folders."""
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002 - click's
+        """Return the shell's own completion of folders."""
+        from click.shell_completion import CompletionItem
+
+        return [CompletionItem(incomplete, type="dir")]
 
 
 class OutputFile(click.Path):

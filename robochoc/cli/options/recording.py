@@ -1,4 +1,4 @@
-"""The journal that a command is asked to write."""
+"""`--journal`: the journal that a command is asked to write."""
 
 from __future__ import annotations
 
@@ -7,12 +7,23 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import click
+
+from robochoc.cli.options.paths import OutputFile
 from robochoc.cli.reports.failures import INVALID, Failure
 
 if TYPE_CHECKING:
     from robochoc.communication.run_result import Progress
     from robochoc.journal.journal import Header, Recorder, Sink
     from robochoc.verification.objective import Objective
+
+
+journal_option = click.option(
+    "--journal",
+    type=OutputFile(),
+    metavar="FILE",
+    help="Write all messages and decisions to a compact file, during the run ('robochoc journal', 'replay', 'sniff').",
+)
 
 
 @contextmanager

@@ -14,11 +14,11 @@ from robochoc.cli.options.paths import refuse_same_places
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure
 
 if TYPE_CHECKING:
-    from robochoc.flight.flight import Conditions
+    from robochoc.flight.flight import FlightConditions
     from robochoc.flight.mission import Drone, Mission
     from robochoc.model.problem import Assignment, Robot, Team
-    from robochoc.ros.closed_loop import Loop, Senses
-    from robochoc.ros.simulated import Surroundings
+    from robochoc.ros.closed_loop import ClosedLoop, Feedback
+    from robochoc.ros.simulated_feedback import FlightSettings
     from robochoc.ros.sink import Sink
 
 Command = TypeVar("Command", bound=Callable[..., object])
@@ -77,7 +77,7 @@ class FailureType(click.ParamType["tuple[str, float]"]):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, float]:  # noqa: ANN401 - click's signature
         """`Robot3.1@5` as a name and seconds."""
-        from robochoc.ros.simulated import FAILS_S
+        from robochoc.ros.simulated_feedback import FAILS_S
 
         if isinstance(value, tuple):
             return value
@@ -119,15 +119,15 @@ ros_options = _optional(
         metavar="SINK",
         help=(
             "Publish decisions as waypoints: mcap:FILE (for Foxglove), rosbag:FILE, rosbridge://HOST:PORT, rospy, or"
-            " what is installed (docs/guides/ros.md). May be given several times."
+            " an installed sink. Repeatable."
         ),
     ),
-    click.option("--frame", type=FrameType(), metavar="NAME", help=f"The frame of all places.  [default: {FRAME}]"),
+    click.option("--frame", type=FrameType(), metavar="NAME", help=f"Frame of all positions.  [default: {FRAME}]"),
     click.option(
         "--scale",
         type=Finite(1e-6, 1e6),
         metavar="METRES",
-        help="So long is a unit of the topics' x, y and z.  [default: 1, or less for a vast field]",
+        help="Length of one unit of the problem's x, y and z.  [default: 1, less for a vast field]",
     ),
 )
 """`--ros`, `--frame`, `--scale`."""
@@ -139,16 +139,16 @@ flight_options = _optional(
         multiple=True,
         type=FailureType(),
         metavar="ROBOT[@SECONDS]",
-        help="In the simulated flight, a motor of this robot's drone stops (after 2 s). May be given several times.",
+        help="Stop a motor of this robot's drone (after 2 s). Repeatable.",
     ),
     click.option(
         "--distance",
         type=Finite(0, min_open=True),
         metavar="METRES",
-        help="No two drones of the simulated flight come nearer.  [default: 0.5, or less where places are nearer]",
+        help="Minimum distance between drones.  [default: 0.5, or less where places are nearer]",
     ),
-    click.option("--wind", type=WindType(), metavar="X[,Y,Z]", help="Wind in the simulated flight, in m/s."),
-    click.option("--gusts", type=Finite(0), metavar="M/S", help="Gusts in the simulated flight."),
+    click.option("--wind", type=WindType(), metavar="X[,Y,Z]", help="Wind, in m/s."),
+    click.option("--gusts", type=Finite(0), metavar="M/S", help="Strength of gusts, in m/s."),
 )
 """`--fail`, `--distance`, `--wind`, `--gusts`."""
 
@@ -157,9 +157,8 @@ situation_options = _optional(
         "--situation",
         metavar="SOURCE",
         help=(
-            "What robots report changes the problem, and the team solves again: flight (the decisions are flown in a"
-            " simulation), mcap:FILE, rosbag:FILE, rosbridge://HOST:PORT, rospy, or what is installed"
-            " (docs/guides/ros.md)."
+            "Solve again when robots report a change. SOURCE: flight (decisions are flown in a simulation), mcap:FILE,"
+            " rosbag:FILE, rosbridge://HOST:PORT, rospy or an installed source."
         ),
     ),
     click.option(
@@ -167,16 +166,15 @@ situation_options = _optional(
         type=Finite(0, min_open=True),
         metavar="SECONDS",
         help=(
-            "A robot whose process is stopped (SIGSTOP), or on a network out of reach, for so long is lost (see"
-            " --on-loss).  [default: it is waited for; on a network 10]  With --situation: so long robots have to"
-            " report something after each decision; then the run is over.  [default: 10]"
+            "A robot is lost after not answering for this long.  [default: no limit; on a network 10]  With"
+            " --situation: how long to wait for reports after each decision.  [default: 10]"
         ),
     ),
     click.option(
         "--battery",
         type=Finite(0, 1),
         metavar="LEVEL",
-        help="A robot leaves when a battery of its drones holds less (1 is full).  [default: 0.2]",
+        help="A robot leaves when a battery of its drones falls below this (1: full).  [default: 0.2]",
     ),
     click.option(
         "--obstacle",
@@ -184,7 +182,7 @@ situation_options = _optional(
         multiple=True,
         type=PointType(),
         metavar="X,Y,Z",
-        help="Something in the way of the simulated flight, in the problem's units. May be given several times.",
+        help="An obstacle, in the problem's units. Repeatable.",
     ),
 )
 """`--situation`, `--patience`, `--battery`, `--obstacle`."""
@@ -275,7 +273,7 @@ def ros_failures_told() -> Iterator[None]:
 @contextmanager
 def flights_told() -> Iterator[None]:
     """A decision that cannot be flown becomes one line, and `Failure`."""
-    from robochoc.ros.simulated import CannotFlyError
+    from robochoc.ros.simulated_feedback import CannotFlyError
 
     try:
         yield
@@ -290,17 +288,17 @@ def open_sinks(texts: Sequence[str], stack: ExitStack) -> list[Sink]:
     return [stack.enter_context(open_sink(text)) for text in texts]
 
 
-def surroundings_of(given: Mapping[str, Any], seed: int) -> Surroundings:
+def surroundings_of(given: Mapping[str, Any], seed: int) -> FlightSettings:
     """What the options of a simulated flight ask for; those that are not given are left out."""
-    from robochoc.ros.simulated import Surroundings
+    from robochoc.ros.simulated_feedback import FlightSettings
 
-    return Surroundings(seed=seed, **given)
+    return FlightSettings(seed=seed, **given)
 
 
 @contextmanager
 def _surroundings_told() -> Iterator[None]:
     """A drone that is not there, or weather in which nothing flies, is wrong usage."""
-    from robochoc.ros.simulated import UnknownDroneError
+    from robochoc.ros.simulated_feedback import UnknownDroneError
 
     try:
         yield
@@ -310,7 +308,7 @@ def _surroundings_told() -> Iterator[None]:
         raise click.UsageError(str(wrong)) from wrong
 
 
-def conditions_of(given: Mapping[str, Any], mission: Mission) -> Conditions:
+def conditions_of(given: Mapping[str, Any], mission: Mission) -> FlightConditions:
     """What the options of `robochoc fly` ask for. Raises `click.UsageError` for a drone that is not there."""
     asked = {name: given[name] for name in _FLOWN if given[name] not in (None, ())}
     with _surroundings_told():
@@ -318,7 +316,7 @@ def conditions_of(given: Mapping[str, Any], mission: Mission) -> Conditions:
 
 
 @contextmanager
-def looped(ros: Ros, team: Team, seed: int) -> Iterator[Loop | None]:
+def looped(ros: Ros, team: Team, seed: int) -> Iterator[ClosedLoop | None]:
     """The loop of `team`, if there is to be one; what it publishes is complete once the `with` is left without error.
 
     Raises `Failure`, and `click.UsageError` for what does not go with the team, or the source.
@@ -326,37 +324,37 @@ def looped(ros: Ros, team: Team, seed: int) -> Iterator[Loop | None]:
     if not ros:
         yield None
         return
-    from robochoc.ros.closed_loop import Loop, drones_of
+    from robochoc.ros.closed_loop import ClosedLoop, drones_of
     from robochoc.ros.situation import BATTERY
 
     with flights_told() if ros.situation == FLIGHT else nullcontext(), ros_failures_told(), ExitStack() as stack:
-        senses = _senses(ros, drones_of(team), seed, stack) if ros.situation else None
+        feedback = _feedback(ros, drones_of(team), seed, stack) if ros.situation else None
         battery = BATTERY if ros.battery is None else ros.battery
         sinks = open_sinks(ros.sinks, stack)
-        yield Loop(team, sinks, senses, frame=ros.frame, scale=ros.scale, battery=battery)
+        yield ClosedLoop(team, sinks, feedback, frame=ros.frame, scale=ros.scale, battery=battery)
 
 
-def _senses(ros: Ros, drones: Sequence[Drone], seed: int, stack: ExitStack) -> Senses:
+def _feedback(ros: Ros, drones: Sequence[Drone], seed: int, stack: ExitStack) -> Feedback:
     """What `--situation` asks for."""
     if ros.situation == FLIGHT:
-        from robochoc.ros.simulated import Flying
+        from robochoc.ros.simulated_feedback import SimulatedFeedback
 
         surroundings = surroundings_of(ros.surroundings, seed)
         with _surroundings_told():
             surroundings.check(drones)
-        return Flying(surroundings)
-    from robochoc.ros.listening import PATIENCE_S, Listening
-    from robochoc.ros.reading import Reading
+        return SimulatedFeedback(surroundings)
+    from robochoc.ros.report_decoder import ReportDecoder
     from robochoc.ros.sinks import open_source
+    from robochoc.ros.source_feedback import PATIENCE_S, SourceFeedback
 
     source = stack.enter_context(open_source(ros.situation or ""))
     if ros.patience is not None and not source.live:
         raise click.UsageError(f"--patience is for robots that report while we wait; {ros.situation} is a recording")
-    return Listening(source, Reading(drones, ros.frame), ros.patience or PATIENCE_S)
+    return SourceFeedback(source, ReportDecoder(drones, ros.frame), ros.patience or PATIENCE_S)
 
 
 @contextmanager
-def outlets(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assignment], list[str]]]:
+def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assignment], list[str]]]:
     """Takes --ros, --frame and --scale out of `given`: what `robot` alone is to publish, and where.
 
     Gives a function for the run's end, by the master's words, and the robot's own decision: it publishes that, and says
@@ -369,18 +367,18 @@ def outlets(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assi
         return
     import time
 
-    from robochoc.ros.outlet import Outlet
-    from robochoc.ros.single_robot import crew_alone, leg_alone
+    from robochoc.ros.single_robot import drones_of_robot, leg_of_robot
+    from robochoc.ros.sink_publisher import SinkPublisher
 
     refuse_same_places({}, sinks=texts)
     with ros_failures_told(), ExitStack() as stack:
         opened = open_sinks(texts, stack)
-        found = [Outlet(robot.name, crew_alone(robot), sink, frame or FRAME) for sink in opened]
+        found = [SinkPublisher(robot.name, drones_of_robot(robot), sink, frame or FRAME) for sink in opened]
 
         def publish(why: str, assignment: Assignment) -> list[str]:
-            leg = leg_alone(robot, why, assignment, scale)
-            for outlet in found:
-                outlet.decide(leg, time.time_ns())
-            return [f"{outlet.place}: {outlet.told}" for outlet in found]
+            leg = leg_of_robot(robot, why, assignment, scale)
+            for publisher in found:
+                publisher.decide(leg, time.time_ns())
+            return [f"{publisher.place}: {publisher.summary}" for publisher in found]
 
         yield publish

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robochoc.cli.options.paths import InputPath
+from robochoc.cli.options.paths import TeamFolder
 from robochoc.cli.reports.failures import INVALID, Failure
 
 if TYPE_CHECKING:
@@ -23,9 +23,9 @@ _OUTCOME_STEP = "give what 'robochoc solve --json' or '--journal' wrote"
 team_option = click.option(
     "--team",
     "folder",
-    type=InputPath(),
+    type=TeamFolder(),
     metavar="DIR",
-    help="The team's folder: it has the robots' names and topics.  [default: instances/TEAM, if it is there]",
+    help="The team's folder, for names and topics.  [default: instances/TEAM]",
 )
 
 
@@ -87,9 +87,9 @@ def team_of(outcome: Outcome, saved: Path, folder: Path | None) -> Team | None:
 
 def _is_team_of(outcome: Outcome, team: Team) -> bool:
     """Whether all who took part, and all that they decided, are known to `team` or come with its scenario."""
-    from robochoc.flight.mission import everybody
+    from robochoc.flight.mission import all_robots
 
-    robots = everybody(team)
+    robots = all_robots(team)
     names = {robot.name for robot in robots}
     variables = {variable.name for robot in robots for variable in robot.variables}
     epochs = outcome.epochs

@@ -1,47 +1,109 @@
-"""What `robochoc solve` is asked for: how its options are parsed, and which of them do not go together."""
+"""Options that `robochoc solve` and `robochoc master` share, and how those of `solve` are parsed."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
+from robochoc.cli.options.names import ProtocolName
 from robochoc.cli.options.order import GIVEN
 from robochoc.cli.options.ros import Ros
+from robochoc.cli.options.sections import SectionedCommand
 from robochoc.cli.reports.live_sniffer import Watching
+from robochoc.run.defaults import MINIMISES, SATISFIES
 
-WITHDRAWALS = ("fewest", "maximal")
+Command = TypeVar("Command", bound=Callable[..., object])
+WITHDRAWALS = ("minimum", "maximal")
+_FORMER = {"fewest": "minimum"}
+"""Spellings of earlier versions."""
 
 
-class SolveCommand(click.Command):
-    """Lets `--withdraw`, `--spare` and `--sniff` stand alone: a word after one is its value only when it can be."""
+class WithdrawalName(click.Choice[str]):
+    """A name in `WITHDRAWALS`, or what an earlier version called it."""
+
+    def __init__(self) -> None:
+        super().__init__(WITHDRAWALS)
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the name. Fail, as wrong usage, where it is none."""
+        return super().convert(_FORMER.get(value, value), param, ctx)
+
+
+def protocol_option(*, central: bool) -> Callable[[Command], Command]:
+    """Return the option `--protocol NAME`; `central` says that there may also be no protocol, but one model."""
+    alone = "; central: no robots, one model of all files" if central else ""
+    words = f"The protocol, as 'robochoc protocols' lists them{alone}.  [default: {SATISFIES}; with costs {MINIMISES}]"
+    return click.option("--protocol", type=ProtocolName(), metavar="NAME", help=words)
+
+
+settings_option = click.option(
+    "--set",
+    "settings_given",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Set a parameter of the protocol; 'robochoc protocols NAME' lists them. Repeatable.",
+)
+withdraw_option = click.option(
+    "--withdraw",
+    type=WithdrawalName(),
+    metavar="[=KIND]",
+    help=(
+        "If the team has no solution, withdraw robots. minimum (without a word): as few as possible, by weight, proven;"
+        " maximal: nobody can be added, found fast."
+    ),
+)
+messages_option = click.option(
+    "--messages",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Stop after about N messages (unknown, status 3).",
+)
+filter_option = click.option(
+    "--filter",
+    "filters",
+    multiple=True,
+    metavar="NAME",
+    help="Network: pass all messages through this filter: signed, sealed or an installed one. Repeatable, in order.",
+)
+
+
+class SolveCommand(SectionedCommand):
+    """A command whose `--withdraw`, `--spare` and `--sniff` may stand alone.
+
+    The word after one of them is its value if it fits.
+    """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Give a bare option its value."""
+        """Give an option that stands alone its value."""
         plain = args.index("--") if "--" in args else len(args)
         for place, word in enumerate(args[:plain]):
             following = args[place + 1] if place + 1 < len(args) else ""
-            if word == "--withdraw" and following not in WITHDRAWALS:
-                _check_path(following, "kind of withdrawal", WITHDRAWALS)
-                args = [*args[:place], f"--withdraw={WITHDRAWALS[0]}", *args[place + 1 :]]
+            alone = ""
+            if word == "--withdraw" and following not in {*WITHDRAWALS, *_FORMER}:
+                alone = f"--withdraw={WITHDRAWALS[0]}"
+                _check_path(ctx, following, "kind of withdrawal", WITHDRAWALS)
             elif word == "--sniff" and not _names_robots(following):
-                args = [*args[:place], "--sniff=", *args[place + 1 :]]
+                alone = "--sniff="
             elif word == "--spare" and not following.isdecimal():
-                _check_path(following, "number of robots", ())
-                args = [*args[:place], "--spare=1", *args[place + 1 :]]
+                alone = "--spare=1"
+                _check_path(ctx, following, "number of robots", ())
+            if alone:
+                args = [*args[:place], alone, *args[place + 1 :]]
         return super().parse_args(ctx, args)
 
 
-def _check_path(word: str, kind: str, values: Sequence[str]) -> None:
+def _check_path(ctx: click.Context, word: str, kind: str, values: Sequence[str]) -> None:
     """Raise `click.UsageError` unless `word`, behind an option that may stand alone, is an option or a path.
 
-    Else it is one of the option's `values`, misspelt, and the path that it would be taken for is not there.
+    Else it is one of the option's `values`, misspelt, and the path that it would be taken for is not there. The shell
+    completes words that are not finished: then nothing is checked.
     """
-    if not word or word.startswith("-") or os.path.lexists(word):
+    if ctx.resilient_parsing or not word or word.startswith("-") or os.path.lexists(word):
         return
     hint = f": {' or '.join(values)}" if values else ""
     raise click.UsageError(f"{word!r} is no {kind} and no folder{hint}")

@@ -23,8 +23,8 @@ LONGEST = 4096
 _FILE = "robochoc.token_file"
 
 
-def token_options(enrol: str = "Enrol") -> Callable[[Command], Command]:
-    """`--token` and `--token-file`, both as the argument `token`; `enrol` begins their help."""
+def token_options() -> Callable[[Command], Command]:
+    """Return the options `--token` and `--token-file`, both as the argument `token`."""
     options = (
         click.option(
             "--token-file",
@@ -32,14 +32,14 @@ def token_options(enrol: str = "Enrol") -> Callable[[Command], Command]:
             expose_value=False,
             callback=_note_file,
             metavar="FILE",
-            help=f"{enrol} first, with the token in FILE, which none but you may read; '-': standard input.",
+            help="Enrol with the token in FILE, which only you may read; -: standard input.",
         ),
         click.option(
             "--token",
             envvar="ROBOCHOC_TOKEN",
             callback=_token,
             metavar="TOKEN",
-            help=f"{enrol} first, with this token, which others see in the list of processes.",
+            help="Enrol with this token. Other users see it in the list of processes.",
         ),
     )
 

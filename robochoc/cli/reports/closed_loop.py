@@ -10,14 +10,14 @@ from robochoc.cli.options.ros import FLIGHT, Ros
 from robochoc.cli.reports.failures import LOST
 
 if TYPE_CHECKING:
-    from robochoc.flight.flight import Flown
+    from robochoc.flight.flight import FlightLog
     from robochoc.flight.mission import Mission
-    from robochoc.ros.closed_loop import Loop
+    from robochoc.ros.closed_loop import ClosedLoop
 
 
-def told_of(loop: Loop) -> list[str]:
+def told_of(loop: ClosedLoop) -> list[str]:
     """What was published where, and what could not be heeded: a line each."""
-    return [*(f"{outlet.place}: {outlet.told}" for outlet in loop.outlets), *loop.notes]
+    return [*(f"{publisher.place}: {publisher.summary}" for publisher in loop.publishers), *loop.notes]
 
 
 class Flight(NamedTuple):
@@ -25,10 +25,10 @@ class Flight(NamedTuple):
 
     status: int = 0
     mission: Mission | None = None
-    flown: Flown | None = None
+    flown: FlightLog | None = None
 
 
-def flight_told(loop: Loop | None, ros: Ros, *, quiet: bool) -> Flight:
+def flight_told(loop: ClosedLoop | None, ros: Ros, *, quiet: bool) -> Flight:
     """How a simulated flight went, which is told. Whoever fell has left the team: that alone is no failure."""
     if loop is None or ros.situation != FLIGHT:
         return Flight()
@@ -45,9 +45,9 @@ def flight_told(loop: Loop | None, ros: Ros, *, quiet: bool) -> Flight:
     return Flight(0 if as_planned(flown, may_fall=True) else LOST, mission, flown)
 
 
-def _flown_by(loop: Loop) -> tuple[Mission, Flown] | None:
+def _flown_by(loop: ClosedLoop) -> tuple[Mission, FlightLog] | None:
     """What a simulated flight has flown; None where nothing was."""
-    from robochoc.ros.simulated import Flying
+    from robochoc.ros.simulated_feedback import SimulatedFeedback
 
-    flown = loop.senses.flown() if isinstance(loop.senses, Flying) else None
+    flown = loop.feedback.flown() if isinstance(loop.feedback, SimulatedFeedback) else None
     return (loop.mission, flown) if loop.mission and flown else None

@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from robochoc.formats import encodable, on_one_line
-from robochoc.model.problem import Kind, Team
+from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.compile import Compilation, CompileTimeoutError
 from robochoc.solver.domain import TooManySolutionsError
 
@@ -57,7 +57,7 @@ def _row(team: Team, one: Found) -> dict[str, Any]:
     if not isinstance(one, Compilation):
         return {**row, "reason": str(one)}
     known = {"local_solutions": one.domain.total, "groups": len(one.domain.values)}
-    if one.domain.costs and team.kind is Kind.DISWCSP:
+    if one.domain.costs and team.kind is ProblemKind.DISWCSP:
         known |= {"cheapest": int(min(one.domain.costs)), "dearest": int(max(one.domain.costs))}
     return {**row, **known, "seconds": round(one.seconds, 6), "source": str(one.source)}
 
@@ -65,7 +65,7 @@ def _row(team: Team, one: Found) -> dict[str, Any]:
 def _table(team: Team, found: Sequence[Found]) -> Table:
     table = Table(title=escape(on_one_line(team.name)), title_justify="left", box=None, header_style="bold")
     table.add_column("robot", no_wrap=True)
-    costs = ("cost",) if team.kind is Kind.DISWCSP else ()
+    costs = ("cost",) if team.kind is ProblemKind.DISWCSP else ()
     for heading in ("variables", "seen", "private", "local", "groups", *costs, "time"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("how", no_wrap=True)

@@ -7,7 +7,7 @@ from math import isfinite, isnan
 
 import msgspec
 
-from robochoc.flight.flight import Flown, Nearest
+from robochoc.flight.flight import ClosestApproach, FlightLog
 from robochoc.flight.mission import Leg, Mission
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
@@ -17,26 +17,26 @@ ARRIVED_M = 0.1
 _NAMES = 6
 
 
-def as_planned(flown: Flown, *, may_fall: bool = False) -> bool:
+def as_planned(flown: FlightLog, *, may_fall: bool = False) -> bool:
     """Whether everybody has arrived, no two came nearer than the set distance, and nobody has fallen, or may."""
     apart = flown.nearest is None or flown.nearest.distance_m >= flown.distance
     return apart and all(error <= ARRIVED_M or (may_fall and isnan(error)) for error in flown.errors_m)
 
 
-def report(mission: Mission, flown: Flown) -> str:
+def report(mission: Mission, flown: FlightLog) -> str:
     """Leg by leg what was flown, then how it went."""
     return "\n".join(
         [f"{on_one_line(mission.team)}: {_verdict(mission, flown)}", *_legs(mission, flown), how_it_went(flown)]
     )
 
 
-def how_it_went(flown: Flown) -> str:
+def how_it_went(flown: FlightLog) -> str:
     """What happened, who has arrived, how near they came, and how fast it was simulated."""
-    lines = [f"{one.at_s:6.1f} s  {_name(flown, one.drone)}: {one.what}" for one in flown.happenings]
+    lines = [f"{one.at_s:6.1f} s  {_name(flown, one.drone)}: {one.what}" for one in flown.events]
     return "\n".join(f"  {line}" for line in (*lines, _arrival(flown), _apart(flown), _speed(flown)))
 
 
-def too_late(failures: Iterable[tuple[str, float]], flown: Flown) -> list[str]:
+def too_late(failures: Iterable[tuple[str, float]], flown: FlightLog) -> list[str]:
     """Which of the `failures` that were asked for could not happen, as the flight was over: a line each."""
     return [
         f"--fail {on_one_line(name)}@{at_s:g}: the flight was over after {flown.simulated_s:.1f} s"
@@ -45,7 +45,7 @@ def too_late(failures: Iterable[tuple[str, float]], flown: Flown) -> list[str]:
     ]
 
 
-def _verdict(mission: Mission, flown: Flown) -> str:
+def _verdict(mission: Mission, flown: FlightLog) -> str:
     last = mission.legs[-1].goals if mission.legs else {}
     fallen = [number for number, error in enumerate(flown.errors_m) if not isfinite(error)]
     landing = sum(goal.lands for number, goal in last.items() if number not in fallen)
@@ -56,11 +56,11 @@ def _verdict(mission: Mission, flown: Flown) -> str:
     return f"{len(flown.names)} drone{plural}: {told or 'nobody has anywhere to go'}"
 
 
-def _legs(mission: Mission, flown: Flown) -> Iterator[str]:
+def _legs(mission: Mission, flown: FlightLog) -> Iterator[str]:
     rows = [("leg", "opened by", "verdict", "fly", "land", "from s", "to s")]
-    for number, (leg, stage) in enumerate(zip(mission.legs, flown.stages, strict=True)):
+    for number, (leg, times) in enumerate(zip(mission.legs, flown.legs, strict=True)):
         opened = shortened(on_one_line(leg.opened_by))
-        span = f"{stage.begins_s:.1f}", f"{stage.ends_s:.1f}"
+        span = f"{times.begins_s:.1f}", f"{times.ends_s:.1f}"
         rows.append((f"{number}", opened, leg.verdict, *_movers(leg), *span))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     words = {1, 2}
@@ -74,7 +74,7 @@ def _movers(leg: Leg) -> tuple[str, str]:
     return f"{len(leg.goals) - landing}", f"{landing}"
 
 
-def _arrival(flown: Flown) -> str:
+def _arrival(flown: FlightLog) -> str:
     away = [number for number, error in enumerate(flown.errors_m) if isfinite(error) and error > ARRIVED_M]
     fallen = [number for number, error in enumerate(flown.errors_m) if not isfinite(error)]
     whole = max((error for error in flown.errors_m if isfinite(error)), default=0.0)
@@ -87,7 +87,7 @@ def _arrival(flown: Flown) -> str:
     return "; ".join(parts)
 
 
-def _apart(flown: Flown) -> str:
+def _apart(flown: FlightLog) -> str:
     near = flown.nearest
     word = "nearer than set" if near and near.distance_m < flown.distance else "nearest"
     told = [f"{word}: {_pair(flown, near)}" if near else "nobody met anybody"]
@@ -97,13 +97,13 @@ def _apart(flown: Flown) -> str:
     return "; ".join(told)
 
 
-def _speed(flown: Flown) -> str:
+def _speed(flown: FlightLog) -> str:
     seconds = flown.times[-1] if len(flown.times) else 0.0
     times = f", {seconds / flown.wall_s:.0f} times as fast" if flown.wall_s > 0 else ""
     return f"{seconds:.1f} s of flight in {flown.wall_s:.2f} s{times}"
 
 
-def _pair(flown: Flown, nearest: Nearest) -> str:
+def _pair(flown: FlightLog, nearest: ClosestApproach) -> str:
     both = f"{_name(flown, nearest.first)} and {_name(flown, nearest.second)}"
     return f"{_length(nearest.distance_m)} ({both}, at {nearest.at_s:.1f} s)"
 
@@ -112,26 +112,26 @@ def _length(metres: float) -> str:
     return f"{1000 * metres:.1f} mm" if metres < 0.1 else f"{metres:.2f} m"  # noqa: PLR2004 - ten centimetres
 
 
-def _name(flown: Flown, number: int) -> str:
+def _name(flown: FlightLog, number: int) -> str:
     return on_one_line(flown.names[number])
 
 
-def _names(flown: Flown, numbers: Sequence[int]) -> str:
+def _names(flown: FlightLog, numbers: Sequence[int]) -> str:
     more = f" and {len(numbers) - _NAMES} more" if len(numbers) > _NAMES else ""
     return ", ".join(_name(flown, number) for number in numbers[:_NAMES]) + more
 
 
-def flight_json(mission: Mission, flown: Flown) -> bytes:
+def flight_json(mission: Mission, flown: FlightLog) -> bytes:
     """The same as one line of JSON: lengths in metres, times in seconds; null for a drone that fell."""
 
-    def pair(nearest: Nearest | None) -> dict[str, object] | None:
+    def pair(nearest: ClosestApproach | None) -> dict[str, object] | None:
         if nearest is None:
             return None
         drones = [flown.names[nearest.first], flown.names[nearest.second]]
         return {"distance_m": nearest.distance_m, "drones": drones, "at_s": nearest.at_s}
 
     ends = flown.positions[-1] if len(flown.positions) else ()
-    stages = zip(mission.legs, flown.stages, strict=True)
+    legs = zip(mission.legs, flown.legs, strict=True)
     told = {
         "team": mission.team,
         "scale": mission.scale,
@@ -146,12 +146,11 @@ def flight_json(mission: Mission, flown: Flown) -> bytes:
             for name, end, error in zip(flown.names, ends, flown.errors_m, strict=True)
         ],
         "legs": [
-            {"opened_by": leg.opened_by, "verdict": leg.verdict, "begins_s": stage.begins_s, "ends_s": stage.ends_s}
-            for leg, stage in stages
+            {"opened_by": leg.opened_by, "verdict": leg.verdict, "begins_s": times.begins_s, "ends_s": times.ends_s}
+            for leg, times in legs
         ],
         "happenings": [
-            {"at_s": happening.at_s, "drone": flown.names[happening.drone], "what": happening.what}
-            for happening in flown.happenings
+            {"at_s": event.at_s, "drone": flown.names[event.drone], "what": event.what} for event in flown.events
         ],
     }
     return msgspec.json.encode(told)

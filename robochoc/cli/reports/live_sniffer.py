@@ -40,11 +40,11 @@ def check_chosen(watching: Watching | None, team: Team) -> None:
     """Raise `click.UsageError` where a pattern of --sniff fits no robot of `team`, nor any that is to come."""
     if watching is None or not watching.chosen:
         return
-    from robochoc.flight.mission import everybody
+    from robochoc.flight.mission import all_robots
     from robochoc.formats.diagnostics import on_one_line, suggestion
     from robochoc.sniffer.patterns import unmatched
 
-    names = [robot.name for robot in everybody(team)]
+    names = [robot.name for robot in all_robots(team)]
     for pattern in unmatched(names, watching.chosen):
         hint = suggestion(pattern, names, "robots")
         raise click.UsageError(on_one_line(f"--sniff: no robot of {team.name} is called {pattern!r} ({hint})"))

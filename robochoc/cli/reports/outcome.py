@@ -7,10 +7,10 @@ from collections.abc import Mapping
 
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
-from robochoc.model.change import changed_by
+from robochoc.model.change import team_after_events
 from robochoc.model.outcome import ALL_ROBOTS, Metrics, Outcome, Verdict
-from robochoc.model.priorities import natural
-from robochoc.model.problem import Kind, Team
+from robochoc.model.priorities import natural_key
+from robochoc.model.problem import ProblemKind, Team
 
 WIDTH = 100
 _LARGE = 1 << 16
@@ -21,7 +21,7 @@ _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 def report(team: Team, outcome: Outcome) -> str:
     """The verdict, why, where everybody flies, and what it cost, in a few lines."""
     lines = [f"{on_one_line(outcome.team)}: {_verdict(team, outcome)}", *_epochs(outcome)]
-    team = changed_by(team, outcome.events)
+    team = team_after_events(team, outcome.events)
     if outcome.assignment:
         lines += _board(team, outcome.assignment) or _list(team, outcome.assignment)
     if outcome.aside:
@@ -30,7 +30,7 @@ def report(team: Team, outcome: Outcome) -> str:
         lines.append(f"  {flying} {fly}, {aside} {step} aside{_weight(team, outcome)}:")
         lines += _wrapped(outcome.aside)
     if outcome.lost:
-        lost = sorted(outcome.lost, key=natural)
+        lost = sorted(outcome.lost, key=natural_key)
         lines += [f"  {len(lost)} {'was' if len(lost) == 1 else 'were'} lost:", *_wrapped(lost)]
     order = f", order {outcome.order}" if outcome.order else ""
     lines.append(f"  {outcome.protocols}{order}, {_place(team, outcome)}: {_metrics(outcome)}{_simulated(outcome)}")
@@ -116,7 +116,7 @@ def _trusted(outcome: Outcome) -> str:
 
 def _proven(team: Team, outcome: Outcome) -> str:
     """The verdict, and the cost where there are costs."""
-    if team.kind is Kind.DISCSP:
+    if team.kind is ProblemKind.DISCSP:
         return outcome.verdict
     least = "" if outcome.verdict is Verdict.OPTIMAL else ", which may not be the least"
     return f"{outcome.verdict}, cost {_number(outcome.cost)}{least}"
@@ -141,7 +141,7 @@ def _so_far(team: Team, outcome: Outcome) -> str:
         least = f"; at least {_number(bound)} have to" if bound else ""
         step = "steps" if len(outcome.aside) == 1 else "step"
         return f"; in the best answer so far {len(outcome.aside)} {step} aside{_weight(team, outcome)}{least}"
-    if team.kind is Kind.DISCSP:
+    if team.kind is ProblemKind.DISCSP:
         return ""
     known = [f"the best so far costs {_number(outcome.cost)}"] if outcome.assignment else []
     word = ", by all robots' word" if outcome.claimed_by else ""
@@ -200,7 +200,7 @@ def _board(team: Team, assignment: Mapping[str, int]) -> list[str]:
 
 
 def _list(team: Team, assignment: Mapping[str, int]) -> list[str]:
-    owners = sorted({team.owner[name] for name in assignment}, key=natural)
+    owners = sorted({team.owner[name] for name in assignment}, key=natural_key)
     own = {owner: [variable.name for variable in team[owner].variables] for owner in owners}
     values = {owner: ", ".join(f"{name} = {assignment[name]}" for name in names) for owner, names in own.items()}
     return _wrapped([f"{owner}: {values[owner]}" for owner in owners])

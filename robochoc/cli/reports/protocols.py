@@ -25,6 +25,8 @@ WIDE = 150
 """A terminal of fewer columns is not told of papers and privacy: their words would be broken into pieces."""
 UNBROKEN = 1000
 """Where no terminal reads it, a protocol has a line of its own."""
+_KEYS = {"shared_scopes": "everywhere", "writes_to_non_neighbours": "beyond"}
+"""Traits whose keys in `--json` keep their first names."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,7 @@ def _judge() -> Row:
 
 
 def _object(row: Row, *, explain: bool) -> dict[str, object]:
-    traits = asdict(row.traits) if row.traits else {}
+    traits = {_KEYS.get(name, name): value for name, value in asdict(row.traits).items()} if row.traits else {}
     known = {"name": row.name, "place": row.place, "package": row.package, "distributed": row.name != CENTRAL, **traits}
     known["settings"] = msgspec.structs.asdict(row.settings)
     if row.broken:

@@ -11,7 +11,7 @@ from rich.tree import Tree
 
 from robochoc.formats import on_one_line
 from robochoc.model.outcome import Outcome, PseudoTreeNode
-from robochoc.model.priorities import natural
+from robochoc.model.priorities import natural_key
 
 UNBROKEN = 1000
 
@@ -32,7 +32,7 @@ def explained(outcome: Outcome) -> str:
 def _children(places: Mapping[str, PseudoTreeNode]) -> dict[str | None, list[str]]:
     """Who stands right below each robot, in natural order."""
     below: dict[str | None, list[str]] = {}
-    for name in sorted(places, key=natural):
+    for name in sorted(places, key=natural_key):
         below.setdefault(places[name].parent, []).append(name)
     return below
 

@@ -1,13 +1,44 @@
-"""The 3D scene, as a file or live: what `solve` and `animate` share."""
+"""The 3D scene, as a file or live: what `solve`, `fly` and `animate` share."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from robochoc.formats import write_atomically
-from robochoc.view.scene import Scene
+
+if TYPE_CHECKING:
+    from robochoc.flight.log import FlightLog
+    from robochoc.flight.mission import Mission
+    from robochoc.model.outcome import Outcome
+    from robochoc.model.problem import Team
+    from robochoc.view.scene import Scene
+
+
+def scene_for(
+    outcome: Outcome, team: Team | None, *, mission: Mission | None = None, flown: FlightLog | None = None
+) -> Scene:
+    """Return the scene of `outcome`. If it was not flown yet, it is flown here, in calm air.
+
+    Args:
+        outcome: What was decided.
+        team: The team as its files have it, before its scenario. Without it, all that is known are names.
+        mission: What `outcome` asks of the drones, if that is known already.
+        flown: How they flew `mission`.
+    """
+    from robochoc.cli.reports.progress import stages
+    from robochoc.flight.mission import mission_of
+    from robochoc.flight.preview import preview_of
+    from robochoc.view.scene import scene_of
+
+    mission = mission or mission_of(outcome, team)
+    if flown is not None:
+        return scene_of(outcome, mission, flown)
+    with stages(outcome.team) as progress:
+        preview = preview_of(mission, progress)
+    return scene_of(outcome, mission, preview.flown, flown_mission=preview.mission, why_not=preview.why_not)
 
 
 def write_page(scene: Scene, path: Path, *, quiet: bool = False) -> None:

@@ -8,7 +8,7 @@ from contextlib import suppress
 
 from robochoc.communication.network.control_messages import Ask, Told
 from robochoc.communication.network.profile import Profile
-from robochoc.services.communicative_acts import Performative
+from robochoc.model.communicative_acts import Performative
 from robochoc.services.descriptions import MAX_SERVICES, AgentDescription, RequestRefusedError, ServiceDescription
 from robochoc.services.directory import Directory
 from robochoc.services.facilitator import handle, subscribe, told

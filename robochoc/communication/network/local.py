@@ -33,7 +33,7 @@ from robochoc.communication.resources import require_descriptors, signals_held
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.journal.events import Observer
-from robochoc.model.change import still_showing
+from robochoc.model.change import keep_interfaces
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
@@ -86,7 +86,7 @@ class LocalNetwork(Session):
         self._waiting = list(self.compiled.robots.values())
         watched = observer is not None
         profiles = {robot.name: profile_of(robot) for robot in team.robots}
-        ways = reach(profiles, beyond=protocol.traits.beyond)
+        ways = reach(profiles, writes_to_non_neighbours=protocol.traits.writes_to_non_neighbours)
         self._master = self._opened(
             lambda endpoint: Master(
                 self._household,
@@ -124,8 +124,8 @@ class LocalNetwork(Session):
         return self._master
 
     @property
-    def quiet(self) -> bool:
-        """See `Session.quiet`: every search begins anew, so that there is none before."""
+    def lossless(self) -> bool:
+        """See `Session.lossless`: every search begins anew, so that there is none before."""
         return True
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
@@ -144,7 +144,7 @@ class LocalNetwork(Session):
 
     def workable(self, team: Team) -> Team:
         """Return what is left of the team: robots whose values still mean what they meant. See `Session.workable`."""
-        return still_showing(team, self.compiled.team)
+        return keep_interfaces(team, self.compiled.team)
 
     def change(self, epoch: Epoch) -> None:
         """Go on without the robots that were lost: no other change can happen here."""

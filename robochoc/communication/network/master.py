@@ -167,7 +167,7 @@ class Master:
         self.chronicle.begin()
         self._gaps.begin()
         deadline = None if timeout is None else began + timeout
-        self._gate.open_ways(self.members.reach(beyond=traits.beyond))
+        self._gate.open_ways(self.members.reach(writes_to_non_neighbours=traits.writes_to_non_neighbours))
         epoch, declared = self.tally.epoch + 1, self.members.declared(traits)
         tally = self.tally = SearchState(epoch, self.members.order, messages, declared)
         for name, task in self.members.tasks(tally.epoch, protocol, traits, brief).items():

@@ -26,9 +26,9 @@ from robochoc.protocols.traits import Traits
 from robochoc.solver.agent_problem import RunParameters
 
 
-def reach(profiles: Mapping[str, Profile], *, beyond: bool) -> dict[str, tuple[str, ...]]:
+def reach(profiles: Mapping[str, Profile], *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:
     """To whom each of a team may write besides the master. See `Members.reach`."""
-    if beyond:
+    if writes_to_non_neighbours:
         return dict.fromkeys(profiles, (ALL,))
     met = acquaintances(profiles)
     return {name: tuple(sorted(profiles.keys() & others)) for name, others in met.items()}
@@ -249,9 +249,9 @@ class Members:
             return tuple(name for name in self._order if name in self.robots)
         return tuple(in_priority_order(self.profiles))
 
-    def reach(self, *, beyond: bool) -> dict[str, tuple[str, ...]]:
+    def reach(self, *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:
         """To whom each may write: everybody, if the protocol goes beyond those it may share constraints with."""
-        return reach(self.profiles, beyond=beyond)
+        return reach(self.profiles, writes_to_non_neighbours=writes_to_non_neighbours)
 
     def tasks(self, epoch: int, protocol: str, traits: Traits, brief: RunParameters) -> dict[str, Task]:
         """What each robot is told for a search, in priority order."""

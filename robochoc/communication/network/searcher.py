@@ -35,7 +35,7 @@ from robochoc.communication.resources import own_memory
 from robochoc.journal.events import AnyEvent
 from robochoc.model.message import Envelope
 from robochoc.model.outcome import Metrics
-from robochoc.model.problem import INFINITE, Constraint, Kind, Model
+from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, ProblemKind
 from robochoc.protocols.findings import NOTHING, Findings
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import AgentProblem, RunParameters
@@ -114,13 +114,13 @@ class Searcher:
     def prepare(self) -> None:
         """Tell others which constraints they have to know; get ready once all children have told.
 
-        Only protocols whose order changes have more than the lowest robot know a constraint (`Traits.everywhere`).
+        Only protocols whose order changes have more than the lowest robot know a constraint (`Traits.shared_scopes`).
         Raises `UnsupportedError`.
         """
         owners = {name: agent for agent, names in self._task.interfaces.items() for name in names}
         self._refuse_unfit(owners)
-        if self._protocol.traits.everywhere:
-            known = [one for one in held(self._robot) if one.constraint.model is not Model.PKC]
+        if self._protocol.traits.shared_scopes:
+            known = [one for one in held(self._robot) if one.constraint.model is not ConstraintModel.PKC]
             for parent in self._robot.parents:
                 theirs = [one for one in known if parent.name in {owners.get(v) for v in one.constraint.variables}]
                 self._around.send(parent.name, Copies(self.epoch, msgspec.msgpack.encode(list(map(record_of, theirs)))))
@@ -130,11 +130,11 @@ class Searcher:
         """Raise `UnsupportedError` where the own file asks for more than the protocol can do."""
         robot, traits = self._robot, self._protocol.traits
         refused = f", which {self._task.protocol} does not support"
-        if robot.kind is Kind.DISWCSP and not traits.costs:
+        if robot.kind is ProblemKind.DISWCSP and not traits.costs:
             raise UnsupportedError(f"{robot.name} is part of a DisWCSP{refused}")
         parts = [part for child in robot.children for part in child.constraints]
         for constraint in (*robot.shared, *parts):
-            if constraint.model is Model.PKC and not traits.partially_known:
+            if constraint.model is ConstraintModel.PKC and not traits.partially_known:
                 raise UnsupportedError(
                     f"{robot.name} shares a partially known constraint (PKC, {constraint.name}){refused}"
                 )
@@ -152,8 +152,8 @@ class Searcher:
         self._get_ready()
 
     def _get_ready(self) -> None:
-        everywhere = self._protocol.traits.everywhere
-        if self._host or (everywhere and any(child.name not in self._copies for child in self._robot.children)):
+        shared_scopes = self._protocol.traits.shared_scopes
+        if self._host or (shared_scopes and any(child.name not in self._copies for child in self._robot.children)):
             return
         self._host = Host.of(self._protocol, self._part())
         if self._around.observed:
@@ -298,7 +298,9 @@ class Searcher:
         own = robot.private if self.assignment else ()
         held = [one for one in (*own, *robot.shared, *parts) if values.keys() >= set(one.variables)]
         cost = sum(constraint.price(values) for constraint in held)
-        shared = tuple(_judged(robot.name, [one for one in robot.shared if one.model is not Model.PKC], values))
+        shared = tuple(
+            _judged(robot.name, [one for one in robot.shared if one.model is not ConstraintModel.PKC], values)
+        )
         known = [*((child.name, child.copies) for child in robot.children), *self._learnt.items()]
         judged = (one for holder, theirs in known for one in _judged(holder, theirs, values))
         copies = tuple(islice(judged, max(0, MOST_JUDGED - len(shared))))  # others may have told any number

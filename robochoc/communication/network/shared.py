@@ -10,7 +10,7 @@ import msgspec
 from robochoc.formats.diagnostics import shortened
 from robochoc.formats.names import is_name
 from robochoc.model.expression import Expression, ExpressionError, Type, parse, text
-from robochoc.model.problem import Constraint, Model, Predicate, Relation, Semantics, Term
+from robochoc.model.problem import Constraint, ConstraintModel, Predicate, Relation, Semantics, Term
 from robochoc.solver.explanation import Known
 
 MOST_TERMS = 1000
@@ -48,7 +48,7 @@ class SharedRecord(msgspec.Struct, frozen=True, array_like=True):
     definition: RelationRecord | PredicateRecord
     scope: tuple[Term, ...]
     parameters: tuple[Term, ...]
-    model: Model | None
+    model: ConstraintModel | None
     cost: float
 
 

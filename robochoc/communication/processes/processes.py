@@ -89,7 +89,7 @@ class ProcessesRun(Session):
         self._shown = self._looked = 0.0
         self._began = time.monotonic()
         self._number = 0
-        self._quiet = True
+        self._lossless = True
         self._deadline: float | None = None
         self._waiting = Epoch(self.compiled, brief=brief).parts(protocol)
         """Robots that are still to be started."""
@@ -105,9 +105,9 @@ class ProcessesRun(Session):
         self._searching = False
 
     @property
-    def quiet(self) -> bool:
-        """See `Session.quiet`."""
-        return self._quiet
+    def lossless(self) -> bool:
+        """See `Session.lossless`."""
+        return self._lossless
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
         """See `Session.search`. Raises `RobotsLostError` when a robot's process ends or fails.
@@ -122,10 +122,10 @@ class ProcessesRun(Session):
             self._wait_until(lambda: not self._absent or self._broken_off, deadline)
             if not self._absent and self._verdict is None and not self._broken_off:
                 self._enough = messages
-                self._tell_all(Begin(self._began, self._quiet))
+                self._tell_all(Begin(self._began, self._lossless))
                 self._searching = True
                 self._wait_until(lambda: self._verdict is not None or self._broken_off, deadline)
-                self._searching, self._quiet = False, self._counters.quiescent and not self._broken_off
+                self._searching, self._lossless = False, self._counters.quiescent and not self._broken_off
             return self._finish(began, late=over(deadline))
         except RobotsLostError as lost:
             for name, why in lost.robots.items():
@@ -138,8 +138,8 @@ class ProcessesRun(Session):
         self._number += 1
         self._crew.reap()
         given = epoch.parts(self._protocol)
-        gone = [name for name in self._crew.robots if name not in given or name in epoch.fresh]
-        left = sorted({*gone, *epoch.fresh, *self._lost})
+        gone = [name for name in self._crew.robots if name not in given or name in epoch.restarted]
+        left = sorted({*gone, *epoch.restarted, *self._lost})
         for name in gone:
             self._crew.dismiss(name)
         self._enter_epoch(epoch.team.order)

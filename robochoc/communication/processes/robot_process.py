@@ -325,7 +325,7 @@ class _RobotLoop:
         self._began = order.began
         self._searching = True
         self._told = (-1, -1)
-        self._send(self._host.start(quiet=order.quiet))
+        self._send(self._host.start(lossless=order.lossless))
         early, self._early = self._early, []
         self._take_in(early)
 

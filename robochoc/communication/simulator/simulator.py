@@ -48,7 +48,7 @@ class Simulation(Session):
         self._schedule = schedule
         self._observer = observer
         self._progress = progress
-        self._quiet = True
+        self._lossless = True
         self._checks = 0
         self._verdict: Verdict | None = None
         self._witness: str | None = None
@@ -56,9 +56,9 @@ class Simulation(Session):
         self._hosts = {name: self._host(part) for name, part in parts.items()}
 
     @property
-    def quiet(self) -> bool:
-        """See `Session.quiet`."""
-        return self._quiet
+    def lossless(self) -> bool:
+        """See `Session.lossless`."""
+        return self._lossless
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
         """See `Session.search`; a limit on messages is looked at after each packet."""
@@ -85,7 +85,7 @@ class Simulation(Session):
         before = self._hosts
         self._hosts = {}
         for name, part in epoch.parts(self._protocol).items():
-            if name in before and name not in epoch.fresh:
+            if name in before and name not in epoch.restarted:
                 self._hosts[name] = before[name]
                 before[name].change(part, epoch.void)
                 self._note_verdict(before[name])
@@ -103,9 +103,9 @@ class Simulation(Session):
 
     def _play(self, began: float, timeout: float | None, messages: int | None) -> None:
         """Every robot starts before any message arrives; then packet by packet."""
-        quiet, self._quiet = self._quiet, False
+        lossless, self._lossless = self._lossless, False
         for host in self._hosts.values():
-            self._step(host, partial(host.start, quiet=quiet))
+            self._step(host, partial(host.start, lossless=lossless))
         packets = 0
         while self._verdict is None:
             elapsed_s = time.monotonic() - began
@@ -117,7 +117,7 @@ class Simulation(Session):
                 self._progress(Progress(self._sent(), elapsed_s))
             packet = self._schedule.get()
             if not packet:
-                self._verdict, self._quiet = Verdict.SOLUTION, True
+                self._verdict, self._lossless = Verdict.SOLUTION, True
                 return
             host = self._hosts[packet[0].receiver]
             self._step(host, partial(host.handle, packet))

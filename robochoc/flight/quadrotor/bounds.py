@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from robochoc.flight.log import SAMPLE_RATE_HZ
 from robochoc.flight.quadrotor.airframe import Array
-from robochoc.flight.quadrotor.flown import SAMPLES_A_SECOND
 
 MOST_DRONES = 1_000
 """At a time: planning looks at all pairs."""
@@ -60,6 +60,6 @@ def check_ways(names: Sequence[str], starts: Array, places: Array) -> None:
 
 def check_length(drones: int, until_s: float) -> None:
     """That what is noted of a flight up to `until_s` can be kept. Raises `ValueError`."""
-    most_s = _MOST_SAMPLES / drones / SAMPLES_A_SECOND
+    most_s = _MOST_SAMPLES / drones / SAMPLE_RATE_HZ
     if until_s > most_s:
         raise ValueError(f"the flight would last {until_s:,.0f} s; of {drones:,} drones {most_s:,.0f} s are the most")

@@ -16,7 +16,7 @@ LEAST_M = 0.01
 
 
 @dataclass(frozen=True)
-class Failure:
+class MotorFailure:
     """One of `drone`'s motors (0 front, 1 left, 2 back, 3 right) stops `at_s` seconds after the flight's beginning."""
 
     drone: str
@@ -25,7 +25,7 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Conditions:
+class FlightConditions:
     """Of a whole flight. The same conditions give the same flight.
 
     `distance`, in metres between drones' middles, is kept by all plans; None: 0.5, or less where homes or goals are
@@ -37,7 +37,7 @@ class Conditions:
     wind: Point = (0.0, 0.0, 0.0)
     gusts: float = 0.0
     seed: int = 0
-    failures: tuple[Failure, ...] = ()
+    failures: tuple[MotorFailure, ...] = ()
     obstacles: tuple[Point, ...] = ()
 
     def __post_init__(self) -> None:

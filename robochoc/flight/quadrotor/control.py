@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from robochoc.flight.quadrotor.airframe import GRAVITY, Airframe, Array
-from robochoc.flight.quadrotor.bodies import Bodies
+from robochoc.flight.quadrotor.rigid_bodies import RigidBodies
 
 _POSITION, _VELOCITY, _INTEGRAL = 9.0, 5.5, 6.0
 """Gains by the mass: 1/s^2, 1/s, 1/s^2."""
@@ -55,13 +55,13 @@ class Controller:
         self._summing = np.hstack([_ERRORS_PER_VELOCITY * one, one]) * dt
         self._desired = np.zeros((5, 3, number))
         self._wrench = np.zeros((4, number))
-        # Vectors with their first two components once more behind the third: see `Bodies`.
+        # Vectors with their first two components once more behind the third: see `RigidBodies`.
         self._up = np.zeros((5, number))
         self._up[2] = 1
         self._turn = np.zeros((5, number))
         self._rates = np.zeros((5, number))
 
-    def command(self, bodies: Bodies, reference: Array, idle: Array) -> Array:
+    def command(self, bodies: RigidBodies, reference: Array, idle: Array) -> Array:
         """The rotors' thrusts (4, N), N, of all but the `idle`: `reference` (9, N) is place, velocity, acceleration."""
         inputs = self._inputs
         np.subtract(reference[:6], bodies.state, out=inputs[:6])
@@ -94,7 +94,7 @@ class Controller:
         self._inputs[:, drone] = 0
         self._up[:, drone] = [0, 0, 1, 0, 0]
 
-    def _torque_rate(self, up: Array, bodies: Bodies) -> Array:
+    def _torque_rate(self, up: Array, bodies: RigidBodies) -> Array:
         """The angular acceleration (3, N) towards thrust along `up` and a front along x, in the body's frame."""
         x, y, z = up
         desired, axes = self._desired, bodies.wrapped_axes

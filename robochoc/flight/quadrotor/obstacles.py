@@ -7,14 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from robochoc.flight.quadrotor.airframe import Array
-from robochoc.flight.quadrotor.course import Course
+from robochoc.flight.quadrotor.trajectory import Trajectory
 
 _LOOK_S = 0.05
 """How closely a plan is looked at: at 2 m/s a drone flies 0.1 m meanwhile."""
 _LOOK_M = 0.1
 
 
-class Threat(NamedTuple):
+class ObstacleEncounter(NamedTuple):
     """A drone's plan leads it nearer than `keep` to an obstacle, for the last time at second `until` of the plan."""
 
     obstacle: int
@@ -23,16 +23,16 @@ class Threat(NamedTuple):
     keep: float
 
 
-def threats(course: Course, obstacles: dict[int, Array], keep: float) -> list[Threat]:
+def encounters(trajectory: Trajectory, obstacles: dict[int, Array], keep: float) -> list[ObstacleEncounter]:
     """Everybody whom the plan brings nearer than `keep` to one of the `obstacles`, by their numbers."""
     if not obstacles:
         return []
-    times = np.append(np.arange(0.0, course.plan.duration_s, _LOOK_S), course.plan.duration_s)
-    places = np.stack([course.plan.at(float(s)).position for s in times])
+    times = np.append(np.arange(0.0, trajectory.plan.duration_s, _LOOK_S), trajectory.plan.duration_s)
+    places = np.stack([trajectory.plan.at(float(s)).position for s in times])
     found = []
     for number, obstacle in obstacles.items():
         near = np.square(places - obstacle).sum(2) < (keep + _LOOK_M) ** 2
         for place in np.flatnonzero(near.any(0)).tolist():
             until = float(times[np.flatnonzero(near[:, place])[-1]])
-            found.append(Threat(number, int(course.who[place]), until, keep))
+            found.append(ObstacleEncounter(number, int(trajectory.who[place]), until, keep))
     return found

@@ -2,7 +2,7 @@
 
 The step, `DT`, was chosen by measurement. A flight of 4.7 m in a wind of 3 m/s differs by at most 0.5 mm from one with
 ten times as many steps between the same commands, and a body that tumbles freely at one turn a second for 10 s keeps
-the energy of its spin to 3e-5 (`tests/unit/flight/test_bodies.py`). Half the step takes twice the time.
+the energy of its spin to 3e-5 (`tests/unit/flight/test_rigid_bodies.py`). Half the step takes twice the time.
 """
 
 from __future__ import annotations
@@ -12,17 +12,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from robochoc.flight.log import SAMPLE_RATE_HZ, FlightEvent
 from robochoc.flight.quadrotor.airframe import HUMMINGBIRD, Array
-from robochoc.flight.quadrotor.bodies import Bodies, Mask
-from robochoc.flight.quadrotor.conditions import Conditions, Failure
+from robochoc.flight.quadrotor.attitude import quaternions
+from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.flight.quadrotor.control import Controller
-from robochoc.flight.quadrotor.course import Course
-from robochoc.flight.quadrotor.flown import SAMPLES_A_SECOND, Happening, quaternions
-from robochoc.flight.quadrotor.nearest import Watch
+from robochoc.flight.quadrotor.rigid_bodies import Mask, RigidBodies
+from robochoc.flight.quadrotor.separation import SeparationMonitor
+from robochoc.flight.quadrotor.trajectory import Trajectory
 from robochoc.flight.quadrotor.wind import Wind
 
-STEPS_A_SAMPLE = 4
-DT = 1 / (SAMPLES_A_SECOND * STEPS_A_SAMPLE)
+STEPS_PER_SAMPLE = 4
+DT = 1 / (SAMPLE_RATE_HZ * STEPS_PER_SAMPLE)
 _CUT_OFF = math.cos(math.radians(60))
 """A drone whose motor has stopped has the others switched off once it is further over."""
 _PRESS_M = 0.05
@@ -37,33 +38,33 @@ _BOUNDS = 1e6
 """m and m/s: nobody is further away, or faster."""
 
 
-class Simulation:
+class QuadrotorSimulation:
     """N drones, step by step. `reference` (9, N) is what is wanted: place, velocity, acceleration."""
 
-    def __init__(self, names: Sequence[str], homes: Array, ground: float, conditions: Conditions) -> None:
+    def __init__(self, names: Sequence[str], homes: Array, ground: float, conditions: FlightConditions) -> None:
         number = len(names)
         self.reference = np.zeros((9, number))
         self.reference[:3] = homes.T
-        self.happenings: list[Happening] = []
+        self.events: list[FlightEvent] = []
         self.hop_m = _HOP_M[1]
         self.broken: list[tuple[int, str, float]] = []
         """Who cannot fly any more: its number, why, since when."""
-        self.watch = Watch(number)
+        self.separation = SeparationMonitor(number)
         self.lost: Mask = np.zeros(number, dtype=np.bool_)
         """Who falls or has fallen."""
         self._names = names
         self._ground = ground
-        self._bodies = Bodies(homes, ground, HUMMINGBIRD, DT)
+        self._bodies = RigidBodies(homes, ground, HUMMINGBIRD, DT)
         self._controller = Controller(number, HUMMINGBIRD, DT)
         self._wind = Wind(conditions.wind, conditions.gusts, conditions.seed, number, DT)
-        self._due: list[Failure] = sorted(conditions.failures, key=lambda failure: failure.at_s, reverse=True)
+        self._due: list[MotorFailure] = sorted(conditions.failures, key=lambda failure: failure.at_s, reverse=True)
         self._off: Mask = np.zeros(number, dtype=np.bool_)
         self._down: Mask = np.zeros(number, dtype=np.bool_)
         self._steps = 0
         self._places: list[Array] = []
         self._axes: list[Array] = []
         self._note()
-        self.watch.see(self._bodies.state[:3], 0.0)
+        self.separation.observe(self._bodies.state[:3], 0.0)
 
     @property
     def now_s(self) -> float:
@@ -78,7 +79,7 @@ class Simulation:
     @property
     def is_sampled(self) -> bool:
         """Whether what is now has just been noted down."""
-        return self._steps % STEPS_A_SAMPLE == 0
+        return self._steps % STEPS_PER_SAMPLE == 0
 
     @property
     def falling(self) -> Mask:
@@ -93,18 +94,18 @@ class Simulation:
         calm = np.where(low, self._bodies.stands, (gaps < near**2) & (speeds < slow**2)) | self.lost
         return bool(calm.all()) and not self.falling.any()
 
-    def gaps(self) -> Array:
+    def tracking_errors(self) -> Array:
         """(N,): how far everybody is from its reference; 0 for the lost."""
         gaps = np.sqrt(np.square(self.reference[:3] - self._bodies.state[:3]).sum(0))
         return np.where(self.lost, 0.0, gaps)
 
-    def advance(self, course: Course | None = None, *, late: bool = False) -> None:
-        """One step along `course`. Who is to land and is `late` does so where it is."""
+    def advance(self, trajectory: Trajectory | None = None, *, late: bool = False) -> None:
+        """One step along `trajectory`. Who is to land and is `late` does so where it is."""
         while self._due and self._due[-1].at_s <= self.now_s:
             self._fail(self._due.pop())
-        if course is not None:
-            course.refer()
-            course.advance(DT)
+        if trajectory is not None:
+            trajectory.refer()
+            trajectory.advance(DT)
         bodies = self._bodies
         low = self.reference[2] <= self._ground + _TOUCH_M
         moving = np.logical_or.reduce(self.reference[3:6] != 0)
@@ -118,21 +119,21 @@ class Simulation:
             self._rescue()
         if self.broken or bodies.fallen.any():
             self._look_after_the_lost()
-        self.watch.see(bodies.state[:3], self.now_s)
+        self.separation.observe(bodies.state[:3], self.now_s)
         if self.is_sampled:
             self._note()
 
-    def leave(self, spare: float) -> None:
+    def set_spare_distance(self, spare: float) -> None:
         """From now on plans keep `spare` metres besides the distance."""
         self.hop_m = min(max(_HOP * spare, _HOP_M[0]), _HOP_M[1])
 
-    def tell(self, drone: int, what: str) -> None:
+    def log_event(self, drone: int, what: str) -> None:
         """Note a happening now."""
-        self.happenings.append(Happening(self.now_s, drone, what))
+        self.events.append(FlightEvent(self.now_s, drone, what))
 
     def record(self) -> tuple[Array, Array, Array]:
         """Times (T,), positions (T, N, 3) and attitudes (T, N, 4) of all samples."""
-        times = np.arange(len(self._places)) / SAMPLES_A_SECOND
+        times = np.arange(len(self._places)) / SAMPLE_RATE_HZ
         positions = np.ascontiguousarray(np.stack(self._places).transpose(0, 2, 1))
         return times, positions, quaternions(np.stack(self._axes).transpose(0, 3, 1, 2))
 
@@ -148,7 +149,7 @@ class Simulation:
         wanted[2] += self.hop_m * (low & moving) - _PRESS_M * lands
         return wanted
 
-    def _fail(self, failure: Failure) -> None:
+    def _fail(self, failure: MotorFailure) -> None:
         drone = self._names.index(failure.drone)
         self._bodies.stop_motor(drone, failure.motor)
         if not self.lost[drone]:
@@ -158,9 +159,9 @@ class Simulation:
     def _lose(self, drone: int, why: str) -> None:
         self.lost[drone] = True
         self._off |= self._bodies.fallen
-        self.watch.lose(self.lost)
+        self.separation.exclude(self.lost)
         self.broken.append((drone, why, self.now_s))
-        self.tell(drone, why)
+        self.log_event(drone, why)
 
     def _look_after_the_lost(self) -> None:
         bodies = self._bodies
@@ -168,7 +169,7 @@ class Simulation:
         for drone in np.flatnonzero(bodies.fallen & ~self._down).tolist():
             self._down[drone] = self._off[drone] = True
             if self.lost[drone]:
-                self.tell(drone, "hits the ground")
+                self.log_event(drone, "hits the ground")
             else:
                 self._lose(drone, "has hit the ground")
 

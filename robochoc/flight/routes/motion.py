@@ -24,7 +24,7 @@ _TOP_ACCELERATION = 10 / math.sqrt(3)
 
 
 @dataclass(frozen=True)
-class Limits:
+class MotionLimits:
     """What a drone's motion never exceeds: `speed` in m/s, `acceleration` in m/s^2."""
 
     speed: float = 2.0
@@ -54,7 +54,7 @@ class Motion:
 class Route:
     """One drone's way along a path (K + 1, 3), from rest to rest, counted from when it begins."""
 
-    def __init__(self, drone: int, path: Array, limits: Limits) -> None:
+    def __init__(self, drone: int, path: Array, limits: MotionLimits) -> None:
         self.drone = drone
         self.path = path
         self._durations = limits.durations(norms(np.diff(path, axis=0)))
@@ -91,7 +91,7 @@ class _Window:
     along: Array
 
 
-class Plan:
+class RoutePlan:
     """Where everybody is from second 0 to `duration_s`. Made by `robochoc.flight.routes.timetable.plan`."""
 
     def __init__(self, starts: Array, flights: Sequence[tuple[Route, float]]) -> None:

@@ -48,23 +48,23 @@ class Move:
     """Where all others are at rest meanwhile: any other path that is clear of them would do as well."""
 
 
-def moves_between(starts: Array, goals: Array, standing: Array, space: Space, waits: Array) -> list[Move]:
+def moves_between(starts: Array, goals: Array, standing: Array, space: Space, delays: Array) -> list[Move]:
     """The moves, one after the other, that bring all from `starts` to `goals`; raises `NoRouteError`.
 
     `space.sky` is two distances or more above all of them. Who waits less, or hinders fewer, comes first.
     """
-    found = _Direct(starts, goals, standing, space, waits)
+    found = _Direct(starts, goals, standing, space, delays)
     if not found.is_done():
-        found.moves = _Emptied(starts, goals, standing, space, waits).all_moves()
+        found.moves = _Emptied(starts, goals, standing, space, delays).all_moves()
     return found.moves
 
 
 class _Sequence:
     """Where everybody rests between two moves, and the moves until then."""
 
-    def __init__(self, starts: Array, goals: Array, standing: Array, space: Space, waits: Array) -> None:
+    def __init__(self, starts: Array, goals: Array, standing: Array, space: Space, delays: Array) -> None:
         self.goals = goals
-        self.waits = waits
+        self.delays = delays
         self.space = space
         self.count = len(starts)
         self.points = np.vstack((starts, standing))
@@ -125,8 +125,8 @@ class _Sequence:
 class _Direct(_Sequence):
     """Who can goes to its goal; who blocks others steps aside."""
 
-    def __init__(self, starts: Array, goals: Array, standing: Array, space: Space, waits: Array) -> None:
-        super().__init__(starts, goals, standing, space, waits)
+    def __init__(self, starts: Array, goals: Array, standing: Array, space: Space, delays: Array) -> None:
+        super().__init__(starts, goals, standing, space, delays)
         self.away = {int(drone) for drone in np.flatnonzero((starts != goals).any(axis=1))}
         self._aside: set[int] = set()
         self._next_look = [0] * self.count
@@ -179,7 +179,7 @@ class _Direct(_Sequence):
         """Those that are away: first who waits less, would block fewer, and has farther to go."""
         away = sorted(self.away)
         hinders = self._would[away].sum(axis=0)
-        return sorted(away, key=lambda drone: (self.waits[drone], hinders[drone], -self._lengths[drone], drone))
+        return sorted(away, key=lambda drone: (self.delays[drone], hinders[drone], -self._lengths[drone], drone))
 
     def _straight(self) -> bool:
         before = len(self.moves)
@@ -250,7 +250,7 @@ class _Emptied(_Sequence):
     def all_moves(self) -> list[Move]:
         """The moves; raises `NoRouteError`."""
         standing = self.points[self.count :]
-        left = _Emptied(self.goals, self.goals, standing, self.space, self.waits)
+        left = _Emptied(self.goals, self.goals, standing, self.space, self.delays)
         left.empty()
         self.empty()
         for move in reversed(left.moves):

@@ -23,7 +23,7 @@ from itertools import product
 
 import numpy as np
 
-from robochoc.flight.routes.spacing import SLACK_M, Array, Flags, gaps, norms
+from robochoc.flight.routes.spacing import SLACK_M, Array, Flags, norms, segment_distances
 
 Column = Array
 """The x and the y of all points above each other."""
@@ -54,7 +54,7 @@ class Space:
 
     def near(self, origins: Array, ends: Array, points: Array) -> Flags:
         """Whether (K, P) straight lines come too near to `points` (P, 3)."""
-        return gaps(origins, ends, points) < self.least
+        return segment_distances(origins, ends, points) < self.least
 
     def is_clear(self, path: Array, points: Array) -> bool:
         """Whether a path keeps the distance from `points`."""
@@ -155,7 +155,7 @@ class Space:
 
     def _walls(self, first: Column, second: Column, points: Array) -> Array:
         """The intervals of heights (W, 2) in which points block the way across between two columns."""
-        radius = gaps(first[None], second[None], points[:, :2])[0]
+        radius = segment_distances(first[None], second[None], points[:, :2])[0]
         # A little less strict than `is_clear` is, which has the last word: rounding must not make them disagree.
         least = self.distance - SLACK_M / 2
         close = radius < least

@@ -32,7 +32,7 @@ class TooCloseError(ValueError):
         super().__init__(f"the {where}s of drones {first} and {second} are only {distance_m:.3g} m apart")
 
 
-def gaps(origins: Array, ends: Array, points: Array) -> Array:
+def segment_distances(origins: Array, ends: Array, points: Array) -> Array:
     """The distance (K, P) of each straight line `origins` to `ends` (K, 3) from each of `points` (P, 3)."""
     along = ends - origins
     squared = np.einsum("kc,kc->k", along, along)
@@ -50,7 +50,7 @@ def norms(vectors: Array) -> Array:
     return lengths
 
 
-def nearest(apart: Array, later: Array) -> Array:
+def closest_approach(apart: Array, later: Array) -> Array:
     """How near two come that are `apart` first and `later` then, both in even motion (vectors: the last axis)."""
     change = later - apart
     squared = np.einsum("...c,...c->...", change, change)

@@ -22,12 +22,12 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.flight.routes.motion import Limits, Motion, Plan, Route
+from robochoc.flight.routes.motion import Motion, MotionLimits, Route, RoutePlan
 from robochoc.flight.routes.moves import Move, NoRouteError, moves_between
 from robochoc.flight.routes.paths import Space
-from robochoc.flight.routes.spacing import Array, Flags, TooCloseError, check_spacing, nearest, norms
+from robochoc.flight.routes.spacing import Array, Flags, TooCloseError, check_spacing, closest_approach, norms
 
-__all__ = ["Limits", "Motion", "NoRouteError", "Plan", "TooCloseError", "plan"]
+__all__ = ["Motion", "MotionLimits", "NoRouteError", "RoutePlan", "TooCloseError", "plan_routes"]
 
 Steps = NDArray[np.int64]
 
@@ -44,19 +44,19 @@ _LANES = 4
 _FOREVER = 2**62
 
 
-def plan(
+def plan_routes(
     starts: Array,
     goals: Array,
     *,
     distance: float,
     standing: Array | None = None,
-    waits: Array | None = None,
-    limits: Limits | None = None,
+    delays: Array | None = None,
+    limits: MotionLimits | None = None,
     ground: float = 0.0,
-) -> Plan:
+) -> RoutePlan:
     """How N drones fly from `starts` (N, 3) to `goals` (N, 3), never nearer to each other than `distance`.
 
-    They keep it from the `standing` points (M, 3) too. Drone i does not begin before second `waits[i]`; who has the
+    They keep it from the `standing` points (M, 3) too. Drone i does not begin before second `delays[i]`; who has the
     same start and goal stays there, unless `moves.py` finds no other way. Nobody flies below `ground`, but for starts
     and goals that are there. The result is the same each time. Lengths are in metres.
 
@@ -65,19 +65,19 @@ def plan(
     """
     starts, goals = _points(starts, "starts"), _points(goals, "goals")
     standing = np.empty((0, 3)) if standing is None else _points(standing, "standing")
-    waits = np.zeros(len(starts)) if waits is None else np.asarray(waits, dtype=float)
-    if len(goals) != len(starts) or waits.shape != (len(starts),):
+    delays = np.zeros(len(starts)) if delays is None else np.asarray(delays, dtype=float)
+    if len(goals) != len(starts) or delays.shape != (len(starts),):
         raise ValueError(
-            f"{len(starts)} starts, {len(goals)} goals and waits of shape {waits.shape} do not go together"
+            f"{len(starts)} starts, {len(goals)} goals and delays of shape {delays.shape} do not go together"
         )
-    if not (0 < distance < math.inf and math.isfinite(ground) and np.isfinite(waits).all()):
-        raise ValueError(f"distance {distance}, ground {ground} and all waits must be finite, the distance positive")
+    if not (0 < distance < math.inf and math.isfinite(ground) and np.isfinite(delays).all()):
+        raise ValueError(f"distance {distance}, ground {ground} and all delays must be finite, the distance positive")
     check_spacing(starts, standing, distance, "start")
     check_spacing(goals, standing, distance, "goal")
     heights = np.concatenate((starts[:, 2], goals[:, 2], standing[:, 2], [ground]))
     space = Space(distance, ground, float(heights.max()) + 2 * distance)
-    table = _Timetable(starts, space, limits or Limits(), waits)
-    for move in moves_between(starts, goals, standing, space, waits):
+    table = _Timetable(starts, space, limits or MotionLimits(), delays)
+    for move in moves_between(starts, goals, standing, space, delays):
         table.add(move)
     return table.plan()
 
@@ -120,13 +120,13 @@ class _Entry:
 class _Timetable:
     """The moves that are scheduled, and where everybody rests in between."""
 
-    def __init__(self, starts: Array, space: Space, limits: Limits, waits: Array) -> None:
+    def __init__(self, starts: Array, space: Space, limits: MotionLimits, delays: Array) -> None:
         self._starts = starts
         self._space = space
         self._limits = limits
         self._step = min(_STEP_S, math.sqrt(4 * _BULGE * space.distance / limits.acceleration))
         self._enough = space.distance + limits.acceleration * self._step**2 / 4
-        self._first: list[int] = np.ceil(np.maximum(waits, 0) / self._step).astype(int).tolist()
+        self._first: list[int] = np.ceil(np.maximum(delays, 0) / self._step).astype(int).tolist()
         self._entries: list[_Entry] = []
         self._drones = np.empty(0, dtype=np.int64)
         self._latest = 0
@@ -151,9 +151,9 @@ class _Timetable:
                     entry = other
         self._enter(entry)
 
-    def plan(self) -> Plan:
+    def plan(self) -> RoutePlan:
         """All of it, in seconds."""
-        return Plan(self._starts, [(entry.flight, entry.begins * self._step) for entry in self._entries])
+        return RoutePlan(self._starts, [(entry.flight, entry.begins * self._step) for entry in self._entries])
 
     def _entry(self, drone: int, path: Array, earliest: int) -> _Entry:
         """A move along `path`, as early as it can."""
@@ -188,7 +188,7 @@ class _Timetable:
         for rest in np.flatnonzero(near):
             begins, ends = int(self._from[rest]), int(self._to[rest])
             apart = samples - self._places[rest]
-            steps = np.flatnonzero(nearest(apart[:-1], apart[1:]) < self._enough)
+            steps = np.flatnonzero(closest_approach(apart[:-1], apart[1:]) < self._enough)
             for run in np.split(steps, np.flatnonzero(np.diff(steps) > 1) + 1):
                 if len(run):
                     taken[max(0, begins - int(run[-1])) : max(0, ends - int(run[0]))] = True
@@ -202,7 +202,7 @@ class _Timetable:
             path = other.flight.path
             if self._space.near(path[:-1], path[1:], goal).any():
                 apart = other.samples - goal
-                near = np.flatnonzero(nearest(apart[:-1], apart[1:]) < self._enough)
+                near = np.flatnonzero(closest_approach(apart[:-1], apart[1:]) < self._enough)
                 if len(near):
                     taken[: max(0, other.begins + int(near[-1]) + 1 - entry.steps)] = True
 
@@ -216,7 +216,7 @@ class _Timetable:
         apart = _box_gaps(_boxes(mine), _boxes(theirs))
         for pairs in _portions(np.argwhere(apart < self._enough)):
             a, b = mine[pairs[:, 0]], theirs[pairs[:, 1]]
-            gap = nearest(a[:, :-1, None] - b[:, None, :-1], a[:, 1:, None] - b[:, None, 1:])
+            gap = closest_approach(a[:, :-1, None] - b[:, None, :-1], a[:, 1:, None] - b[:, None, 1:])
             pair, my, their = np.nonzero(gap < self._enough)
             steps = begins[pairs[pair, 1]] + their - pairs[pair, 0] * _CHUNK - my
             taken[steps[steps >= 0]] = True

@@ -7,7 +7,7 @@ import time
 from collections import deque
 from typing import NamedTuple
 
-from robochoc.ros.source import Heard
+from robochoc.ros.source import ReceivedMessage
 
 PER_TOPIC = 100
 """Messages of one topic that are kept. The newest are: they tell the situation as it is."""
@@ -17,7 +17,7 @@ WEIGHT = 16_000_000
 
 class _Kept(NamedTuple):
     number: int
-    heard: Heard
+    heard: ReceivedMessage
     weight: int
 
 
@@ -35,7 +35,7 @@ class Inbox:
         self._count = 0
         self._came = threading.Condition()
 
-    def put(self, heard: Heard, weight: int = 1) -> None:
+    def put(self, heard: ReceivedMessage, weight: int = 1) -> None:
         """Keep `heard`, which weighs this many characters and fields."""
         with self._came:
             kept = self._topics.setdefault(heard.topic, deque())
@@ -54,7 +54,7 @@ class Inbox:
         with self._came:
             self._came.notify()
 
-    def get(self, wait_s: float, *, over: threading.Event | None = None) -> Heard | None:
+    def get(self, wait_s: float, *, over: threading.Event | None = None) -> ReceivedMessage | None:
         """The oldest message; None if none comes within `wait_s`, or before it is `over`."""
         until = time.monotonic() + wait_s
         with self._came:

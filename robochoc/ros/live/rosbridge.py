@@ -23,7 +23,7 @@ from urllib.parse import urlsplit
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.ros.live.inbox import Inbox
 from robochoc.ros.sink import Fields, Sink, SinkError
-from robochoc.ros.source import Heard, Source, SourceError
+from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
 PORT = 9090
 """Where rosbridge listens, where nobody says otherwise."""
@@ -380,7 +380,7 @@ class RosbridgeSource(Source):
             topic = self._bridge.topic(name, kind)
             topic.subscribe(partial(self._heard, name, kind))
 
-    def next(self, wait_s: float) -> Heard | None:
+    def next(self, wait_s: float) -> ReceivedMessage | None:
         """The oldest message that is here, or that comes within `wait_s`."""
         heard = self._inbox.get(wait_s, over=self._bridge.over)
         if heard is None:
@@ -396,4 +396,4 @@ class RosbridgeSource(Source):
             fields, weight = incoming(message)
         except MalformedMessageError:
             return
-        self._inbox.put(Heard(topic, kind, fields, time.time_ns()), weight)
+        self._inbox.put(ReceivedMessage(topic, kind, fields, time.time_ns()), weight)

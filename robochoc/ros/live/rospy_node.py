@@ -26,7 +26,7 @@ from xml.parsers.expat import ExpatError
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.ros.live.inbox import Inbox
 from robochoc.ros.sink import Fields, Sink, SinkError
-from robochoc.ros.source import Heard, Source, SourceError
+from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
 MASTER_S = 3.0
 """How long the master may take to answer."""
@@ -323,7 +323,7 @@ class RospySource(Source):
             heard = partial(self._heard, topic, kind)
             self._subscribers.append(self._rospy.Subscriber(topic, type_, heard, queue_size=100))
 
-    def next(self, wait_s: float) -> Heard | None:
+    def next(self, wait_s: float) -> ReceivedMessage | None:
         """The oldest message that is here, or that comes within `wait_s`."""
         heard = self._inbox.get(wait_s)
         if heard is None and time.monotonic() - self._asked > 1:
@@ -337,7 +337,7 @@ class RospySource(Source):
 
     def _heard(self, topic: str, kind: str, message: Any) -> None:  # noqa: ANN401 - messages are untyped
         fields = fields_of(message)
-        self._inbox.put(Heard(topic, kind, fields, time.time_ns()), _weight(fields))
+        self._inbox.put(ReceivedMessage(topic, kind, fields, time.time_ns()), _weight(fields))
 
 
 def _weight(value: object) -> int:

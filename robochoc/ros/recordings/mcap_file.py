@@ -24,16 +24,16 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.mappings import short_kind
-from robochoc.ros.recordings.recorder import Recorder
 from robochoc.ros.recordings.recording import (
     BLOCK_AT_MOST,
     Block,
-    Channel,
+    RecordedChannel,
     Recording,
     RecordingDamagedError,
     as_it_is,
     from_lz4,
 )
+from robochoc.ros.recordings.recording_sink import RecordingSink
 from robochoc.ros.recordings.types import Version, types_of
 from robochoc.ros.sink import Fields, SinkError
 from robochoc.ros.source import SourceError
@@ -57,7 +57,7 @@ _ENCODINGS: dict[tuple[str, str], Version] = {("ros2msg", "cdr"): 2, ("ros1msg",
 T = TypeVar("T")
 
 
-class McapSink(Recorder):
+class McapSink(RecordingSink):
     """Writes an MCAP file. The same messages make the same bytes."""
 
     ending = "mcap:run.mcap"
@@ -68,14 +68,14 @@ class McapSink(Recorder):
         self._schemas: dict[str, int] = {}
         self._channels: dict[tuple[str, str], int] = {}
         self._sequence: dict[int, int] = {}
-        with self.told():
+        with self.sink_errors():
             self._writer = Writer(self.file.stream, _CHUNK_BYTES, CompressionType.ZSTD, enable_data_crcs=True)
             self._writer.start("ros2")
 
     def explain(self, original: Mapping[str, str]) -> None:
         """Keep the table in the file, and each name at its topic."""
         super().explain(original)
-        with self.told():
+        with self.sink_errors():
             self._writer.add_metadata(NAMES, dict(original))
 
     def write(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
@@ -126,7 +126,7 @@ class McapSource(Recording):
 
     def _blocks(self) -> Iterator[Block]:
         self._schemas: dict[int, _Known | None] = {}
-        self._channels: dict[int, Channel | None] = {}
+        self._channels: dict[int, RecordedChannel | None] = {}
         self._faults: dict[tuple[str, str, bytes], str] = {}
         source = self._input
         if source.size < len(MCAP0_MAGIC) or source.take(len(MCAP0_MAGIC), "its beginning") != MCAP0_MAGIC:
@@ -173,7 +173,7 @@ class McapSource(Recording):
         if starts is not None:
             yield Block(starts, at, size, packing, len(body))
 
-    def _messages(self, body: bytes) -> Iterator[tuple[Channel, int, bytes]]:
+    def _messages(self, body: bytes) -> Iterator[tuple[RecordedChannel, int, bytes]]:
         at = 0
         while at < len(body):
             opcode, size = _read(_RECORD.format, body[at : at + _RECORD.size])
@@ -220,15 +220,15 @@ class McapSource(Recording):
             self._faults[defined] = _fault(*defined)
         return _Known(kind, schema.encoding, self._faults[defined])
 
-    def _heard(self, channel: ChannelRecord) -> Channel | None:
+    def _heard(self, channel: ChannelRecord) -> RecordedChannel | None:
         schema = self._schemas.get(channel.schema_id)
         if schema is None or not self._wanted(channel.topic, schema.kind):
             return None
         version = _ENCODINGS.get((schema.encoding, channel.message_encoding))
         if version is None and not schema.fault:
             fault = f"its messages are written as {channel.message_encoding[:40]!r}"
-            return Channel(channel.topic, 2, fault)
-        return Channel(channel.topic, version or 2, schema.fault)
+            return RecordedChannel(channel.topic, 2, fault)
+        return RecordedChannel(channel.topic, version or 2, schema.fault)
 
 
 def _inside(place: str) -> str:

@@ -21,7 +21,7 @@ import lz4.frame  # type: ignore[import-untyped]
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.mappings import short_kind
 from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, Version, types_of
-from robochoc.ros.source import Heard, Source, SourceError
+from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
 BLOCK_AT_MOST = 1 << 26
 """Bytes of a record, and of what a chunk unpacks to. Recorders make chunks of some megabytes."""
@@ -43,7 +43,7 @@ class RecordingDamagedError(Exception):
     """The recording is not what it should be: what is wrong."""
 
 
-class Channel(NamedTuple):
+class RecordedChannel(NamedTuple):
     """A topic that is listened to, as a recording has it; `fault` is why its messages cannot be read."""
 
     topic: str
@@ -67,7 +67,7 @@ class Entry(NamedTuple):
     at_ns: int
     block: int
     number: int
-    channel: Channel
+    channel: RecordedChannel
     content: bytes
 
 
@@ -154,7 +154,7 @@ class Recording(Source):
             blocks = sorted(self._blocks())
         self._entries = self._in_order(blocks)
 
-    def next(self, wait_s: float) -> Heard | None:  # noqa: ARG002 - all has been recorded
+    def next(self, wait_s: float) -> ReceivedMessage | None:  # noqa: ARG002 - all has been recorded
         """The next message; None at the end."""
         with self._told():
             entry = next(self._entries, None)
@@ -166,7 +166,7 @@ class Recording(Source):
                 fields = types_of(channel.version).decode(kind, entry.content)
             except FieldsError as error:
                 raise RecordingDamagedError(f"a message on {channel.topic} cannot be read: {error}") from error
-            return Heard(channel.topic, kind, fields, entry.at_ns)
+            return ReceivedMessage(channel.topic, kind, fields, entry.at_ns)
 
     def close(self) -> None:
         """Leave the file."""
@@ -178,7 +178,7 @@ class Recording(Source):
         """Read all of the file, and find what holds messages that are wanted. Raises `RecordingDamagedError`."""
 
     @abstractmethod
-    def _messages(self, body: bytes) -> Iterator[tuple[Channel, int, bytes]]:
+    def _messages(self, body: bytes) -> Iterator[tuple[RecordedChannel, int, bytes]]:
         """The messages of a block that are wanted: channel, time in nanoseconds, and content.
 
         Raises `RecordingDamagedError`.

@@ -18,8 +18,15 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Writer
 
 from robochoc.ros.mappings import short_kind
-from robochoc.ros.recordings.recorder import Recorder
-from robochoc.ros.recordings.recording import Block, Channel, Recording, RecordingDamagedError, as_it_is, from_lz4
+from robochoc.ros.recordings.recording import (
+    Block,
+    RecordedChannel,
+    Recording,
+    RecordingDamagedError,
+    as_it_is,
+    from_lz4,
+)
+from robochoc.ros.recordings.recording_sink import RecordingSink
 from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sink import Fields
 
@@ -32,7 +39,7 @@ _LAYOUTS = {b"op": "<B", b"conn": "<I", b"size": "<I", b"time": "<II", b"index_p
 _LAYOUTS |= {b"conn_count": "<I", b"chunk_count": "<I"}
 
 
-class RosbagSink(Recorder):
+class RosbagSink(RecordingSink):
     """Writes a bag of ROS 1. The same messages make the same bytes."""
 
     ending = "rosbag:run.bag"
@@ -42,7 +49,7 @@ class RosbagSink(Recorder):
         super().__init__(place)
         self._connections: dict[tuple[str, str], Connection] = {}
         self._sequence: dict[int, int] = {}
-        with self.told():
+        with self.sink_errors():
             self._writer = Writer(Path(place) / "bag")  # what the library opens must not exist
             self._writer.path = cast("Path", _Opened(self.file.stream))
             self._writer.open()
@@ -120,7 +127,7 @@ class RosbagSource(Recording):
     packings = MappingProxyType({"none": as_it_is, "bz2": _from_bz2, "lz4": from_lz4})
 
     def _blocks(self) -> Iterator[Block]:
-        self._channels: dict[int, Channel | None] = {}
+        self._channels: dict[int, RecordedChannel | None] = {}
         source = self._input
         magic = source.take(min(source.size, len(_MAGIC)), "its beginning")
         if magic != _MAGIC:
@@ -174,7 +181,7 @@ class RosbagSource(Recording):
         if starts is not None:
             yield Block(starts, at, size, packing, whole)
 
-    def _messages(self, body: bytes) -> Iterator[tuple[Channel, int, bytes]]:
+    def _messages(self, body: bytes) -> Iterator[tuple[RecordedChannel, int, bytes]]:
         for record in _records(body):
             kind = record.kind
             if kind == _CONNECTION:
@@ -193,7 +200,7 @@ class RosbagSource(Recording):
                         raise RecordingDamagedError(f"what stands on {channel.topic} cannot be read: {channel.fault}")
                     yield channel, record.number(b"time"), body[record.begin : record.end]
 
-    def _heard(self, record: _Record, body: bytes) -> Channel | None:
+    def _heard(self, record: _Record, body: bytes) -> RecordedChannel | None:
         topic = "/" + record.text(b"topic").lstrip("/")
         more = _Record(_fields(body[record.begin : record.end]), 0, 0)
         kind, md5 = more.text(b"type"), more.text(b"md5sum")
@@ -203,7 +210,7 @@ class RosbagSource(Recording):
         fault = (
             f"its {short_kind(kind)} has the MD5 sum {md5[:40]!r}, and that of ROS 1 is {ours}" if md5 != ours else ""
         )
-        return Channel(topic, 1, fault)
+        return RecordedChannel(topic, 1, fault)
 
 
 def _records(body: bytes) -> Iterator[_Record]:

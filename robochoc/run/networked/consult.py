@@ -12,8 +12,8 @@ from robochoc.communication.network.control_messages import Ask, Told
 from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing
 from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.transport import CannotConnectError, Transport
+from robochoc.model.communicative_acts import Performative
 from robochoc.run.networked.address import Address
-from robochoc.services.communicative_acts import Performative
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
 from robochoc.services.sl import Function, descriptions_in, df_on, request, searched_in
 from robochoc.system.plain_text import LONGEST_REASON, on_one_line

@@ -30,7 +30,7 @@ def identity_of(
     """The identity of `name` in `folder`: enrolled now, if there is a `token`; renewed, if half of its life is over.
 
     With a token it waits for a master that does not listen yet, for at most `patience_s` seconds. Raises
-    `InvalidNameError`, `IdentityError`, `TokenError`, `NotTrusted`, `EnrolmentError`, `OSError`.
+    `InvalidNameError`, `IdentityError`, `TokenError`, `NotTrustedError`, `EnrolmentError`, `OSError`.
     """
     check_name(name)
     folder = folder or default_folder(name)

@@ -27,7 +27,7 @@ from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.journal.events import Began, Observer
 from robochoc.model.outcome import ALL_ROBOTS, Outcome, Verdict
-from robochoc.model.problem import Domain, Kind, Team, Variable
+from robochoc.model.problem import Domain, ProblemKind, Team, Variable
 from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import FIRST_FIT, MINIMISES, SATISFIES, default_protocol
 from robochoc.run.incumbent import bound_of, joined, tree_of
@@ -262,7 +262,7 @@ class _Lead:
 
     def _verdict(self, traits: Traits, *, aside: bool) -> Verdict:
         """What the answer of a protocol that has come to its end is."""
-        minimal = traits.costs and traits.complete and (aside or self._team().kind is Kind.DISWCSP)
+        minimal = traits.costs and traits.complete and (aside or self._team().kind is ProblemKind.DISWCSP)
         return Verdict.OPTIMAL if minimal else Verdict.SOLUTION
 
     def _brief(self, *, aside: bool) -> RunParameters:

@@ -29,11 +29,11 @@ from robochoc.authority.frames import (
 from robochoc.authority.identity import Identity, save
 from robochoc.authority.token import Token, TokenError
 from tests.support.authorities import HOUR
+from tests.support.authority_service import SOON_S, AuthorityService, answered, drip, framed, trusting
 from tests.support.clocks import waiting
-from tests.support.desks import SOON_S, Desk, answered, drip, framed, trusting
 
 
-def test_a_robot_enrols_and_renews(desk: Desk, tmp_path: Path) -> None:
+def test_a_robot_enrols_and_renews(desk: AuthorityService, tmp_path: Path) -> None:
     token = str(desk.authority.enrol("Robot3.1"))
     folder = tmp_path / "home" / "Robot3.1"
     robot = enrol(*desk.place, token, folder, "Robot3.1")
@@ -50,7 +50,7 @@ def test_a_robot_enrols_and_renews(desk: Desk, tmp_path: Path) -> None:
     assert all(event.origin.startswith("127.0.0.1:") for event in desk.seen.events)
 
 
-def test_a_whole_team_enrols_at_once(desk: Desk, tmp_path: Path) -> None:
+def test_a_whole_team_enrols_at_once(desk: AuthorityService, tmp_path: Path) -> None:
     """More than are served at a time: the others wait."""
     names = [f"R{number}" for number in range(20)]
     tokens = desk.authority.enrol_all(names)
@@ -60,7 +60,7 @@ def test_a_whole_team_enrols_at_once(desk: Desk, tmp_path: Path) -> None:
     assert not desk.seen.refusals
 
 
-def test_a_token_used_twice(desk: Desk, tmp_path: Path) -> None:
+def test_a_token_used_twice(desk: AuthorityService, tmp_path: Path) -> None:
     token = desk.authority.enrol("A")
     robot = enrol(*desk.place, token, tmp_path / "a", "A")
     with pytest.raises(EnrolmentError, match="used already"):
@@ -70,14 +70,14 @@ def test_a_token_used_twice(desk: Desk, tmp_path: Path) -> None:
     assert desk.seen.refusals[0].origin.startswith("127.0.0.1:")
 
 
-def test_a_token_that_has_expired(desk: Desk, tmp_path: Path) -> None:
+def test_a_token_that_has_expired(desk: AuthorityService, tmp_path: Path) -> None:
     token = desk.authority.enrol("A", ttl=timedelta(seconds=30))
     desk.clock.now += 31
     with pytest.raises(EnrolmentError, match="expired"):
         enrol(*desk.place, token, tmp_path / "a", "A")
 
 
-def test_a_token_of_another_name(desk: Desk, tmp_path: Path) -> None:
+def test_a_token_of_another_name(desk: AuthorityService, tmp_path: Path) -> None:
     token = desk.authority.enrol("A")
     with pytest.raises(EnrolmentError, match="not for this name"):
         enrol(*desk.place, token, tmp_path / "b", "B")
@@ -89,9 +89,9 @@ def test_half_a_token_goes_nowhere(tmp_path: Path) -> None:
         enrol("127.0.0.1", 1, "abc", tmp_path / "a", "A")
 
 
-def test_a_machine_in_the_middle_does_not_see_the_token(desk: Desk, tmp_path: Path) -> None:
+def test_a_machine_in_the_middle_does_not_see_the_token(desk: AuthorityService, tmp_path: Path) -> None:
     """It has an Authority of its own, and answers in the place of the right one."""
-    other = Desk(tmp_path / "middle")
+    other = AuthorityService(tmp_path / "middle")
     token = desk.authority.enrol("A")
     with other.server, pytest.raises(NotTrustedError, match="not shown"):
         enrol(*other.place, token, tmp_path / "a", "A")
@@ -100,10 +100,10 @@ def test_a_machine_in_the_middle_does_not_see_the_token(desk: Desk, tmp_path: Pa
 
 
 def test_a_machine_in_the_middle_that_shows_the_right_certificate_does_not_see_the_token_either(
-    desk: Desk, tmp_path: Path
+    desk: AuthorityService, tmp_path: Path
 ) -> None:
     """The Authority's certificate is no secret; to be the master takes a key that it has certified."""
-    other = Desk(tmp_path / "middle")
+    other = AuthorityService(tmp_path / "middle")
     token = desk.authority.enrol("A")
     other.authority.certificate = desk.authority.certificate
     with other.server:
@@ -112,7 +112,7 @@ def test_a_machine_in_the_middle_that_shows_the_right_certificate_does_not_see_t
         assert "TLS failed" in other.refusal()
 
 
-def test_a_robot_cannot_pose_as_the_master(desk: Desk, tmp_path: Path) -> None:
+def test_a_robot_cannot_pose_as_the_master(desk: AuthorityService, tmp_path: Path) -> None:
     thief = enrol(*desk.place, desk.authority.enrol("Thief"), tmp_path / "thief", "Thief")
     token = desk.authority.enrol("A")
     with EnrolmentServer(desk.authority, thief) as posing, pytest.raises(NotTrustedError, match="not the master"):
@@ -150,7 +150,7 @@ def test_a_service_that_takes_for_ever_is_left(behaviour: Callable[[socket.socke
         server.join()
 
 
-def test_renewal_by_a_revoked_robot(desk: Desk, tmp_path: Path) -> None:
+def test_renewal_by_a_revoked_robot(desk: AuthorityService, tmp_path: Path) -> None:
     robot = enrol(*desk.place, desk.authority.enrol("A"), tmp_path / "a", "A")
     desk.authority.revoke("A")
     with pytest.raises(EnrolmentError, match="revoked"):
@@ -159,7 +159,7 @@ def test_renewal_by_a_revoked_robot(desk: Desk, tmp_path: Path) -> None:
     assert Identity.load(tmp_path / "a").certificate == robot.certificate
 
 
-def test_renewal_in_another_name(desk: Desk, tmp_path: Path) -> None:
+def test_renewal_in_another_name(desk: AuthorityService, tmp_path: Path) -> None:
     robot = enrol(*desk.place, desk.authority.enrol("A"), tmp_path / "a", "A")
     context = trusting(desk)
     context.load_cert_chain(robot.certificate_file, robot.key_file)
@@ -170,14 +170,14 @@ def test_renewal_in_another_name(desk: Desk, tmp_path: Path) -> None:
     assert desk.refusal()
 
 
-def test_renewal_without_a_certificate(desk: Desk) -> None:
+def test_renewal_without_a_certificate(desk: AuthorityService) -> None:
     request = signing_request(new_key(), "A")
     assert isinstance(answered(desk, framed(msgspec.msgpack.encode(Renew(request)))), Denied)
     assert "shows it" in desk.refusal()
 
 
-def test_renewal_with_a_certificate_of_another_authority(desk: Desk, tmp_path: Path) -> None:
-    other = Desk(tmp_path / "other")
+def test_renewal_with_a_certificate_of_another_authority(desk: AuthorityService, tmp_path: Path) -> None:
+    other = AuthorityService(tmp_path / "other")
     with other.server:
         stranger = enrol(*other.place, other.authority.enrol("A"), tmp_path / "a", "A")
     with pytest.raises(NotTrustedError):
@@ -191,7 +191,7 @@ def test_renewal_with_a_certificate_of_another_authority(desk: Desk, tmp_path: P
 
 
 def test_renewal_with_an_expired_certificate(tmp_path: Path) -> None:
-    old = Desk(tmp_path / "authority")
+    old = AuthorityService(tmp_path / "authority")
     old.clock.now = -25 * HOUR
     token = old.authority.enrol("A")
     key = new_key()
@@ -207,7 +207,7 @@ def test_renewal_with_an_expired_certificate(tmp_path: Path) -> None:
         assert old.refusal() == "TLS failed: certificate has expired"
 
 
-def test_the_masters_certificate_is_renewed_while_it_serves(desk: Desk, tmp_path: Path) -> None:
+def test_the_masters_certificate_is_renewed_while_it_serves(desk: AuthorityService, tmp_path: Path) -> None:
     token = desk.authority.enrol("A")
     serial = Identity.load(desk.master.folder).certificate.serial_number
     desk.clock.now += 13 * HOUR
@@ -218,7 +218,7 @@ def test_the_masters_certificate_is_renewed_while_it_serves(desk: Desk, tmp_path
     assert new.hosts == ("127.0.0.1",)
 
 
-def test_a_lost_authority_is_said_and_the_service_goes_on(desk: Desk, tmp_path: Path) -> None:
+def test_a_lost_authority_is_said_and_the_service_goes_on(desk: AuthorityService, tmp_path: Path) -> None:
     token = desk.authority.enrol("A")
     registry = desk.authority.folder / "registry.json"
     content = registry.read_bytes()
@@ -236,7 +236,7 @@ def test_a_lost_authority_is_said_and_the_service_goes_on(desk: Desk, tmp_path: 
     ids=["empty", "long", "other", "denied"],
 )
 def test_a_lying_service_is_not_believed(tmp_path: Path, answer: Answer) -> None:
-    desk = Desk(tmp_path / "authority")
+    desk = AuthorityService(tmp_path / "authority")
 
     def lie(*_any: object) -> Answer:
         return answer
@@ -247,7 +247,7 @@ def test_a_lying_service_is_not_believed(tmp_path: Path, answer: Answer) -> None
 
 
 @pytest.mark.parametrize("kind", ["another key", "another name", "rubbish", "introduction"])
-def test_a_certificate_that_is_not_ours_is_not_taken(desk: Desk, tmp_path: Path, kind: str) -> None:
+def test_a_certificate_that_is_not_ours_is_not_taken(desk: AuthorityService, tmp_path: Path, kind: str) -> None:
     robot = enrol(*desk.place, desk.authority.enrol("A"), tmp_path / "a", "A")
 
     def lie(question: object, *_rest: object) -> Answer:

@@ -27,11 +27,11 @@ from robochoc.authority.frames import (
     Renew,
     decode_question,
 )
+from tests.support.authority_service import SOON_S, AuthorityService, answered, drip, framed, trusting
 from tests.support.clocks import waiting
-from tests.support.desks import SOON_S, Desk, answered, drip, framed, trusting
 
 
-def test_oversized_requests_are_not_even_read(desk: Desk) -> None:
+def test_oversized_requests_are_not_even_read(desk: AuthorityService) -> None:
     for size in (LARGEST_BYTES + 1, 2**31, 2**32 - 1):
         answer = answered(desk, size.to_bytes(4, "big"))
         assert isinstance(answer, Denied)
@@ -58,7 +58,7 @@ DEEP = b"\x82\xa4type\xa6Redeem\xa6secret" + b"\x91" * 16000
         msgspec.msgpack.encode([]),
     ],
 )
-def test_malformed_requests(desk: Desk, content: bytes) -> None:
+def test_malformed_requests(desk: AuthorityService, content: bytes) -> None:
     assert isinstance(answered(desk, framed(content)), Denied)
     assert "no question" in desk.refusal()
 
@@ -72,14 +72,14 @@ def test_no_bytes_make_decoding_fail_otherwise(content: bytes) -> None:
     assert isinstance(question, Introduce | Redeem | Renew)
 
 
-def test_an_unknown_token(desk: Desk) -> None:
+def test_an_unknown_token(desk: AuthorityService) -> None:
     question = Redeem(b"guess", signing_request(new_key(), "A"))
     answer = answered(desk, framed(msgspec.msgpack.encode(question)))
     assert isinstance(answer, Denied)
     assert "unknown" in desk.refusal()
 
 
-def test_plain_tcp_and_old_tls_are_refused(desk: Desk) -> None:
+def test_plain_tcp_and_old_tls_are_refused(desk: AuthorityService) -> None:
     with socket.create_connection(desk.place, SOON_S) as plain:
         plain.sendall(framed(msgspec.msgpack.encode(Introduce())) * 10)
         with pytest.raises((OSError, FrameError)):
@@ -92,7 +92,9 @@ def test_plain_tcp_and_old_tls_are_refused(desk: Desk) -> None:
     assert "TLS failed" in desk.refusal(2)
 
 
-def test_slow_ones_are_hung_up_on_and_others_are_served_meanwhile_and_after(desk: Desk, tmp_path: Path) -> None:
+def test_slow_ones_are_hung_up_on_and_others_are_served_meanwhile_and_after(
+    desk: AuthorityService, tmp_path: Path
+) -> None:
     """One does nothing, one drips bytes of a handshake, one bytes of a request: in time all of them are gone."""
     tokens = desk.authority.enrol_all(["A", "B"])
     with ExitStack() as stack:
@@ -110,7 +112,7 @@ def test_slow_ones_are_hung_up_on_and_others_are_served_meanwhile_and_after(desk
     assert enrol(*desk.place, tokens["B"], tmp_path / "b", "B").name == "B"
 
 
-def test_who_fills_all_places_delays_others_no_longer_than_the_patience(desk: Desk, tmp_path: Path) -> None:
+def test_who_fills_all_places_delays_others_no_longer_than_the_patience(desk: AuthorityService, tmp_path: Path) -> None:
     token = desk.authority.enrol("A")
     with ExitStack() as stack:
         for _ in range(4):
@@ -119,7 +121,7 @@ def test_who_fills_all_places_delays_others_no_longer_than_the_patience(desk: De
 
 
 def test_closing_hangs_up_on_everybody_at_once(tmp_path: Path) -> None:
-    desk = Desk(tmp_path / "authority")
+    desk = AuthorityService(tmp_path / "authority")
     desk.server = EnrolmentServer(desk.authority, desk.master, connections=2)
     before = threading.active_count()
     with ExitStack() as stack:

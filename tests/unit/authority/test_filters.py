@@ -32,7 +32,7 @@ from robochoc.communication.filters import (
 from robochoc.communication.sealed import Sealed
 from robochoc.communication.signed import Signed
 from tests.support.authorities import HOUR, START, Clock, identity_of
-from tests.support.offered import offered
+from tests.support.installed_packages import install_entry_points
 from tests.support.program import ROOT
 
 CONTEXT = b"run 7, A to B, 1"
@@ -321,7 +321,7 @@ def test_the_filter_in_the_docs_works(three: dict[str, KeyRing], tmp_path: Path)
 
 def test_the_package_offers_the_two(monkeypatch: pytest.MonkeyPatch) -> None:
     ours = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"][filters.GROUP]
-    offered(monkeypatch, filters.GROUP, **ours)
+    install_entry_points(monkeypatch, filters.GROUP, **ours)
     assert [(offer.name, offer.filter) for offer in filter_offers()] == [("sealed", Sealed), ("signed", Signed)]
     assert filter_named("sealed") is Sealed
     with pytest.raises(UnknownFilterError, match="only: sealed, signed; did you mean 'signed'"):
@@ -329,14 +329,14 @@ def test_the_package_offers_the_two(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_what_others_offer_may_be_broken(monkeypatch: pytest.MonkeyPatch) -> None:
-    offered(
+    install_entry_points(
         monkeypatch,
         filters.GROUP,
-        backwards="test_filters:Backwards",
-        half="test_filters:Half",
+        backwards="tests.unit.authority.test_filters:Backwards",
+        half="tests.unit.authority.test_filters:Half",
         gone="nowhere.to:Find",
-        function="offered:offered",
-        twice=["test_filters:Backwards", "test_filters:Half"],
+        function="tests.support.installed_packages:install_entry_points",
+        twice=["tests.unit.authority.test_filters:Backwards", "tests.unit.authority.test_filters:Half"],
     )
     assert filter_named("backwards").__name__ == "Backwards"
     for name, why in {

@@ -365,7 +365,7 @@ def test_too_few_open_files_for_robots_that_talk(tmp_path: Path) -> None:
     with running(faulty("CROWD", "TalksToAll"), tmp_path / "run", open_files=96) as run:
         run.end()
         assert run.status() == 1
-        assert re.search(r"Unsupported: .*ulimit -n", run.errors())
+        assert re.search(r"UnsupportedError: .*ulimit -n", run.errors())
         assert run.left_behind() == []
 
 

@@ -21,7 +21,7 @@ from tests.support.problems import ON_ONE_MACHINE
 @pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_the_largest_message_is_the_largest_that_was_sent(runtime: Runtime) -> None:
     events: list[AnyEvent] = []
-    options = Options(protocol="sfb", runtime=runtime, withdraw=Withdrawal.FEWEST, cache=False)
+    options = Options(protocol="sfb", runtime=runtime, withdraw=Withdrawal.MINIMUM, cache=False)
     outcome = solve(queens3d(3), options, observer=events.append)
     largest = max(event.bytes for event in events if isinstance(event, Sent))
     assert outcome.metrics.largest == largest > 100

@@ -10,12 +10,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robochoc.flight.flight import Conditions, Failure, Flight, Flown, fly
+from robochoc.flight.flight import Flight, FlightConditions, FlightLog, MotorFailure, fly
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Goal, Mission, mission_of
 from robochoc.flight.quadrotor.airframe import GRAVITY
 from robochoc.flight.quadrotor.bounds import check_length
-from robochoc.flight.quadrotor.simulation import DT, Simulation
+from robochoc.flight.quadrotor.simulation import DT, QuadrotorSimulation
 from robochoc.flight.reports import Blocked, OutOfOrder
 from robochoc.flight.routes.timetable import NoRouteError, TooCloseError
 from robochoc.generators.queens3d import queens3d
@@ -41,12 +41,12 @@ def planar(n: int, *away: str) -> Mission:
     return mission_of(Outcome(team.name, "abt", "simulator", 0, Verdict.SOLUTION, values, withdrawn=away), team)
 
 
-def least(flown: Flown) -> float:
+def least(flown: FlightLog) -> float:
     assert flown.nearest is not None
     return flown.nearest.distance_m
 
 
-def same(one: Flown, other: Flown) -> bool:
+def same(one: FlightLog, other: FlightLog) -> bool:
     """Whether two flights are equal to the last bit."""
     arrays = [(mine, yours) for mine, yours in zip(vars(one).values(), vars(other).values(), strict=True)]
     return all(
@@ -56,8 +56,8 @@ def same(one: Flown, other: Flown) -> bool:
     )
 
 
-def whats(flown: Flown) -> list[tuple[int, str]]:
-    return [(happening.drone, happening.what) for happening in flown.happenings]
+def whats(flown: FlightLog) -> list[tuple[int, str]]:
+    return [(event.drone, event.what) for event in flown.events]
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def four() -> Mission:
 
 
 @pytest.fixture(scope="module")
-def calm(four: Mission) -> Flown:
+def calm(four: Mission) -> FlightLog:
     return fly(four)
 
 
@@ -83,25 +83,25 @@ def test_it_says_how_far_it_is() -> None:
     assert float(begin[1]) < 0.1 < float(end[1]) == float(end[2]) < flown.times[-1]
 
 
-def test_all_reach_their_places_and_keep_their_distance(four: Mission, calm: Flown) -> None:
+def test_all_reach_their_places_and_keep_their_distance(four: Mission, calm: FlightLog) -> None:
     assert len(four.legs[0].goals) == 16
     assert calm.errors_m.max() < 0.01
     assert least(calm) >= calm.distance == 0.5
-    assert (calm.happenings, calm.nearest_fallen) == ((), None)
+    assert (calm.events, calm.nearest_fallen) == ((), None)
     assert calm.positions.shape == (len(calm.times), 16, 3)
     assert np.abs(np.linalg.norm(calm.attitudes, axis=2) - 1).max() < 1e-12
     assert np.array_equal(calm.positions[0], [drone.home for drone in four.drones])
     assert np.array_equal(calm.positions[:30], np.broadcast_to(calm.positions[0], (30, 16, 3)))
-    assert [stage.title for stage in calm.stages] == ["the start"]
-    assert calm.stages[0].begins_s == 1
-    assert calm.stages[0].ends_s == pytest.approx(calm.times[-1] - 1)
+    assert [leg.title for leg in calm.legs] == ["the start"]
+    assert calm.legs[0].begins_s == 1
+    assert calm.legs[0].ends_s == pytest.approx(calm.times[-1] - 1)
     assert calm.positions[:, :, 2].min() >= four.ground
     for number, goal in four.legs[0].goals.items():
         if goal.lands:
             assert calm.positions[-1, number, 2] == four.ground
 
 
-def test_samples_agree_with_the_nearest(calm: Flown) -> None:
+def test_samples_agree_with_the_nearest(calm: FlightLog) -> None:
     first, second = np.triu_indices(16, 1)
     apart = np.linalg.norm(calm.positions[:, first] - calm.positions[:, second], axis=2)
     assert least(calm) <= apart.min() <= least(calm) + 0.01
@@ -118,9 +118,9 @@ def test_larger_fields_are_flown_faster_than_in_real_time(n: int) -> None:
     assert flown.wall_s > 0
 
 
-def test_the_same_flight_is_the_same_to_the_last_bit(four: Mission, calm: Flown) -> None:
+def test_the_same_flight_is_the_same_to_the_last_bit(four: Mission, calm: FlightLog) -> None:
     short = replace(four, drones=four.drones[:4], legs=(replace(four.legs[0], goals={3: four.legs[0].goals[3]}),))
-    conditions = Conditions(wind=IN_THE_WIND, gusts=0.5, seed=3, failures=(Failure("Robot1.4", 3.0),))
+    conditions = FlightConditions(wind=IN_THE_WIND, gusts=0.5, seed=3, failures=(MotorFailure("Robot1.4", 3.0),))
     first = fly(short, conditions)
     assert same(first, fly(short, conditions))
     assert not same(first, fly(short, replace(conditions, seed=4)))
@@ -128,32 +128,32 @@ def test_the_same_flight_is_the_same_to_the_last_bit(four: Mission, calm: Flown)
 
 
 def test_wind_and_gusts_are_withstood(four: Mission) -> None:
-    steady = fly(four, Conditions(wind=IN_THE_WIND))
+    steady = fly(four, FlightConditions(wind=IN_THE_WIND))
     assert steady.errors_m.max() < 0.01
     assert least(steady) >= steady.distance
-    gusty = fly(four, Conditions(wind=IN_THE_WIND, gusts=1.0))
+    gusty = fly(four, FlightConditions(wind=IN_THE_WIND, gusts=1.0))
     assert 0.001 < gusty.errors_m.max() < 0.1
     assert least(gusty) >= gusty.distance
 
 
 @pytest.mark.parametrize("wind", [60.0, 200.0])
 def test_a_storm_ends_and_is_told(wind: float) -> None:
-    flight = Flight(["a", "b"], PAIR, Conditions(wind=(wind, 0.0, 0.0), gusts=wind))
+    flight = Flight(["a", "b"], PAIR, FlightConditions(wind=(wind, 0.0, 0.0), gusts=wind))
     assert flight.fly("storm", UP) == ()
     flown = flight.flown()
     assert np.isfinite(flown.positions).all()
     assert np.isfinite(flown.attitudes).all()
-    assert flown.happenings
+    assert flown.events
     assert not (flown.errors_m < 0.1).any()
     assert flown.times[-1] < 15
 
 
 def test_who_is_out_of_all_bounds_is_given_up() -> None:
-    flight = Flight(["a", "b"], PAIR, Conditions())
+    flight = Flight(["a", "b"], PAIR, FlightConditions())
     simulation = flight._simulation  # noqa: SLF001 - nothing that can be asked for gets it there
     flight.fly("up", UP)
     simulation._bodies.rates[:, 0] = math.nan  # noqa: SLF001
-    (report,) = flight.fly("and on", {1: Goal((2.0, 0.0, 1.0))}, heed=True)
+    (report,) = flight.fly("and on", {1: Goal((2.0, 0.0, 1.0))}, stop_on_report=True)
     assert isinstance(report, OutOfOrder)
     assert (report.drone, report.why) == ("a", "has got out of all bounds")
     flight.fly("at last", {1: Goal((2.0, 0.0, 1.0))})
@@ -169,9 +169,9 @@ def test_who_is_out_of_all_bounds_is_given_up() -> None:
 def test_a_drone_whose_motor_stops_falls_and_the_others_go_on(four: Mission) -> None:
     drone = next(number for number, goal in four.legs[0].goals.items() if goal.at[2] == 4)
     name = four.drones[drone].name
-    flown = fly(four, Conditions(failures=(Failure(name, 4.0, 2), Failure(name, 1e6))))
+    flown = fly(four, FlightConditions(failures=(MotorFailure(name, 4.0, 2), MotorFailure(name, 1e6))))
     assert whats(flown) == [(drone, "motor 2 has stopped"), (drone, "hits the ground")]
-    failed, hit = (happening.at_s for happening in flown.happenings)
+    failed, hit = (event.at_s for event in flown.events)
     assert failed == pytest.approx(4, abs=DT)
     assert 0.5 < hit - failed < 3
     assert np.flatnonzero(np.isnan(flown.errors_m)).tolist() == [drone]
@@ -190,8 +190,10 @@ def test_a_drone_whose_motor_stops_falls_and_the_others_go_on(four: Mission) -> 
 def test_a_failure_is_reported_and_the_next_leg_keeps_away() -> None:
     homes = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
     goals = {number: Goal((number, 0.0, 2.0)) for number in range(3)}
-    flight = Flight(["a", "b", "c"], homes, Conditions(failures=(Failure("b", 2.0, 3), Failure("c", 900.0))))
-    (report,) = flight.fly("up", goals, heed=True)
+    flight = Flight(
+        ["a", "b", "c"], homes, FlightConditions(failures=(MotorFailure("b", 2.0, 3), MotorFailure("c", 900.0)))
+    )
+    (report,) = flight.fly("up", goals, stop_on_report=True)
     assert isinstance(report, OutOfOrder)
     assert (report.drone, report.why) == ("b", "motor 3 has stopped")
     assert report.at_s == pytest.approx(2, abs=DT)
@@ -200,7 +202,7 @@ def test_a_failure_is_reported_and_the_next_leg_keeps_away() -> None:
     assert stopped.times[-1] < 6
     lies = stopped.positions[-1, 1]
     spot = (float(lies[0]), float(lies[1]) + 0.1, 0.0)
-    assert flight.fly("down", {0: Goal(spot, lands=True), 1: Goal((1.0, 0.0, 3.0))}, heed=True) == ()
+    assert flight.fly("down", {0: Goal(spot, lands=True), 1: Goal((1.0, 0.0, 3.0))}, stop_on_report=True) == ()
     flown = flight.flown()
     assert math.isnan(flown.errors_m[1])
     assert 0.3 < flown.errors_m[0] < 2
@@ -210,7 +212,7 @@ def test_a_failure_is_reported_and_the_next_leg_keeps_away() -> None:
 
 
 def test_nobody_slides_along_the_ground() -> None:
-    simulation = Simulation(["a"], np.zeros((1, 3)), 0.0, Conditions())
+    simulation = QuadrotorSimulation(["a"], np.zeros((1, 3)), 0.0, FlightConditions())
     for _ in range(60):
         simulation.reference[3] = 0.5
         simulation.reference[0] += 0.5 * DT
@@ -224,7 +226,7 @@ def test_nobody_slides_along_the_ground() -> None:
 
 
 def test_a_motor_that_stops_on_the_ground_keeps_its_drone_there() -> None:
-    flight = Flight(["a", "b"], PAIR, Conditions(failures=(Failure("a", 0.5),)))
+    flight = Flight(["a", "b"], PAIR, FlightConditions(failures=(MotorFailure("a", 0.5),)))
     flight.fly("up", UP)
     flown = flight.flown()
     assert (flown.positions[:, 0] == PAIR[0]).all()
@@ -239,25 +241,25 @@ def test_a_motor_that_stops_on_the_ground_keeps_its_drone_there() -> None:
 def test_an_obstacle_is_seen_reported_and_kept_away_from(obstacle: Point, start: tuple[float, float]) -> None:
     homes = np.array([[*start, 0.0], [2, 0, 0]])
     goals = {0: Goal((0.0, 0.0, 3.0)), 1: Goal((2.0, 0.0, 3.0))}
-    flight = Flight(["a", "b"], homes, Conditions(obstacles=(obstacle,)))
-    (report,) = flight.fly("up", goals, heed=True)
+    flight = Flight(["a", "b"], homes, FlightConditions(obstacles=(obstacle,)))
+    (report,) = flight.fly("up", goals, stop_on_report=True)
     assert isinstance(report, Blocked)
     assert (report.drone, report.place) == ("a", obstacle)
     stopped = flight.flown()
     assert stopped.errors_m[0] > 0.1
-    assert flight.fly("again", goals, heed=True) == ()
+    assert flight.fly("again", goals, stop_on_report=True) == ()
     flown = flight.flown()
     assert np.linalg.norm(flown.positions - obstacle, axis=2).min() >= 0.5
     assert flown.errors_m[1] < 0.01
     assert flown.errors_m[0] < 1.1
-    assert [stage.title for stage in flown.stages] == ["up", "again"]
+    assert [leg.title for leg in flown.legs] == ["up", "again"]
 
 
 def test_without_heed_a_blocked_drone_hovers_where_it_stopped_and_the_others_go_on() -> None:
     obstacles = ((0.1, 0.0, 3.0), (1.0, 0.0, 1.5))
-    flown_by: dict[bool, Flown] = {}
+    flown_by: dict[bool, FlightLog] = {}
     for blocked in (True, False):
-        flight = Flight(["a", "b"], PAIR, Conditions(obstacles=obstacles[not blocked :]))
+        flight = Flight(["a", "b"], PAIR, FlightConditions(obstacles=obstacles[not blocked :]))
         assert flight.fly("up", {0: Goal((0.0, 0.0, 3.0)), 1: Goal((0.0, 0.0, 1.5))}) == ()
         flown_by[blocked] = flight.flown()
     flown = flown_by[True]
@@ -275,7 +277,7 @@ def test_without_heed_a_blocked_drone_hovers_where_it_stopped_and_the_others_go_
 
 
 def test_legs_follow_each_other_and_who_has_no_goal_stays() -> None:
-    flight = Flight(["a", "b"], PAIR, Conditions())
+    flight = Flight(["a", "b"], PAIR, FlightConditions())
     flight.fly("one", {0: Goal((0.0, 0.0, 2.0))})
     middle = flight.flown()
     assert middle.errors_m.tolist() == [pytest.approx(0, abs=0.01), 0]
@@ -287,14 +289,14 @@ def test_legs_follow_each_other_and_who_has_no_goal_stays() -> None:
     flown = flight.flown()
     assert flown.errors_m.max() < 0.01
     assert least(flown) >= 0.5
-    ends = [stage.ends_s for stage in flown.stages]
-    assert [stage.begins_s for stage in flown.stages] == [1, ends[0] + 1, ends[1]]
+    ends = [leg.ends_s for leg in flown.legs]
+    assert [leg.begins_s for leg in flown.legs] == [1, ends[0] + 1, ends[1]]
     assert np.array_equal(flown.positions[: len(middle.times)], middle.positions)
 
 
 def test_the_distance_is_less_where_places_are_nearer() -> None:
     homes = np.array([[0.0, 0, 0], [0.4, 0, 0]])
-    flight = Flight(["a", "b"], homes, Conditions())
+    flight = Flight(["a", "b"], homes, FlightConditions())
     flight.fly("up", {0: Goal((0.0, 0.0, 1.0)), 1: Goal((0.3, 0.0, 1.0))})
     flown = flight.flown()
     assert flown.distance == pytest.approx(0.24)
@@ -303,21 +305,21 @@ def test_the_distance_is_less_where_places_are_nearer() -> None:
 
 
 def test_goals_that_are_too_near_are_refused() -> None:
-    flight = Flight(["a", "b"], PAIR, Conditions(distance=1.0))
+    flight = Flight(["a", "b"], PAIR, FlightConditions(distance=1.0))
     with pytest.raises(ValueError, match=r"the goals of a and b are 0\.50 m apart, and 1 m are to be kept"):
         flight.fly("up", {0: Goal((0.0, 0.0, 1.0)), 1: Goal((0.5, 0.0, 1.0))})
     with pytest.raises(ValueError, match=r"the homes of a and b are 2\.00 m apart"):
-        Flight(["a", "b"], PAIR, Conditions(distance=2.5))
+        Flight(["a", "b"], PAIR, FlightConditions(distance=2.5))
     with pytest.raises(ValueError, match="no number 2"):
         flight.fly("up", {2: Goal((0.0, 0.0, 1.0))})
     with pytest.raises(ValueError, match="no drones"):
-        Flight([], np.zeros((0, 3)), Conditions())
+        Flight([], np.zeros((0, 3)), FlightConditions())
     with pytest.raises(ValueError, match="no drone is called 'c'; there are: a, b"):
-        Flight(["a", "b"], PAIR, Conditions(failures=(Failure("c", 1.0),)))
+        Flight(["a", "b"], PAIR, FlightConditions(failures=(MotorFailure("c", 1.0),)))
 
 
 def test_who_has_no_goal_gives_way_to_goals_that_leave_no_room() -> None:
-    flight = Flight(["a", "b"], np.array([[0.0, 0, 0], [2, 0, 0]]), Conditions())
+    flight = Flight(["a", "b"], np.array([[0.0, 0, 0], [2, 0, 0]]), FlightConditions())
     flight.fly("up", {0: Goal((0.0, 0.0, 2.0))})
     flight.fly("beside", {1: Goal((0.5, 0.0, 2.0))})
     flown = flight.flown()
@@ -326,16 +328,16 @@ def test_who_has_no_goal_gives_way_to_goals_that_leave_no_room() -> None:
 
 
 def test_who_is_wanted_along_the_ground_keeps_away_from_who_is_above() -> None:
-    simulation = Simulation(["a"], np.zeros((1, 3)), 0.0, Conditions())
+    simulation = QuadrotorSimulation(["a"], np.zeros((1, 3)), 0.0, FlightConditions())
     heights = []
     for spare in (0.1, 0.05, 0.0):
-        simulation.leave(spare)
+        simulation.set_spare_distance(spare)
         heights.append(simulation.hop_m)
     assert heights == pytest.approx([0.08, 0.04, 0.01])
 
 
 def test_refusals_of_the_plan_name_drones() -> None:
-    flight = Flight(["a", "b"], PAIR, Conditions())
+    flight = Flight(["a", "b"], PAIR, FlightConditions())
     everybody = np.arange(2)
     assert flight._told(TooCloseError(1, 2, 0.1234, "goal"), everybody) == (  # noqa: SLF001 - places are checked before
         "b and something that is in the way are to end only 0.123 m from each other"
@@ -345,14 +347,14 @@ def test_refusals_of_the_plan_name_drones() -> None:
 
 def test_what_is_too_much_is_refused_before_it_takes_minutes() -> None:
     with pytest.raises(ValueError, match=r"1,001 drones are more than can be flown at a time \(1,000\)"):
-        Flight(["a"] * 1001, np.zeros((1001, 3)), Conditions())
+        Flight(["a"] * 1001, np.zeros((1001, 3)), FlightConditions())
     with pytest.raises(ValueError, match=r"the homes of a and b are 1e-11 m apart, and 0\.01 m .* a larger scale$"):
-        Flight(["a", "b"], PAIR * 5e-12, Conditions())
+        Flight(["a", "b"], PAIR * 5e-12, FlightConditions())
     with pytest.raises(ValueError, match=r"b: the place \(inf, 0, 0\) m is more than"):
-        Flight(["a", "b"], np.array([[0.0, 0, 0], [math.inf, 0, 0]]), Conditions())
+        Flight(["a", "b"], np.array([[0.0, 0, 0], [math.inf, 0, 0]]), FlightConditions())
     with pytest.raises(ValueError, match="an obstacle: the place"):
-        Flight(["a", "b"], PAIR, Conditions(obstacles=((0.0, 0.0, 1e200),)))
-    flight = Flight(["a", "b"], PAIR, Conditions())
+        Flight(["a", "b"], PAIR, FlightConditions(obstacles=((0.0, 0.0, 1e200),)))
+    flight = Flight(["a", "b"], PAIR, FlightConditions())
     with pytest.raises(ValueError, match=r"b would have 5,000 m to fly, and 2,000 m is the most"):
         flight.fly("up", {1: Goal((2.0, 0.0, 5000.0))})
     with pytest.raises(ValueError, match=r"of 1,000 drones 100 s are the most"):
@@ -363,7 +365,7 @@ def test_what_is_too_much_is_refused_before_it_takes_minutes() -> None:
 
 def test_far_from_the_origin_drones_fly_as_near_it() -> None:
     away = np.array([4e5, 5.5e6, 100.0])
-    near, far = (Flight(["a", "b"], PAIR + shift, Conditions()) for shift in (0 * away, away))
+    near, far = (Flight(["a", "b"], PAIR + shift, FlightConditions()) for shift in (0 * away, away))
     near.fly("up", UP)
     places = [(number, goal.at) for number, goal in UP.items()]
     far.fly("up", {number: Goal((x + 4e5, y + 5.5e6, z + 100)) for number, (x, y, z) in places})
@@ -383,10 +385,10 @@ def test_far_from_the_origin_drones_fly_as_near_it() -> None:
         ({"wind": (1e9, 0.0, 0.0)}, "faster"),
         ({"obstacles": ((0.0, 0.0, math.inf),)}, "finite"),
         ({"seed": -1}, "seed"),
-        ({"failures": (Failure("a", -1.0),)}, "second 0"),
-        ({"failures": (Failure("a", 1.0, 4),)}, "no motor 4"),
+        ({"failures": (MotorFailure("a", -1.0),)}, "second 0"),
+        ({"failures": (MotorFailure("a", 1.0, 4),)}, "no motor 4"),
     ],
 )
 def test_conditions_that_make_no_sense_are_refused(wrong: dict[str, object], why: str) -> None:
     with pytest.raises(ValueError, match=why):
-        replace(Conditions(), **wrong)  # type: ignore[arg-type]
+        replace(FlightConditions(), **wrong)  # type: ignore[arg-type]

@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.flight.crafts import Craft, crafts_of
-from robochoc.flight.layout import Axis, field_of
+from robochoc.flight.layout import Axis, layout_of
 from robochoc.flight.mission import VAST_M, Mission, mission_of
 from robochoc.model.expression import Apply, Constant, Name
-from robochoc.model.outcome import Epoch, Outcome, Verdict
-from robochoc.model.problem import AddAgent, Domain, Event, Robot, Team, Topic, Variable
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.problem import AddAgent, Domain, Robot, ScenarioEvent, Team, Topic, Variable
 
 
 def robot(name: str, z: str, x: int, y: int, *, times: int = 1) -> Robot:
@@ -62,12 +62,12 @@ def test_without_a_solution_everybody_stays() -> None:
 
 def test_each_epoch_is_a_leg() -> None:
     late = robot("C", "c", 2, 2)
-    team = Team("trio", TEAM.robots, (Event((AddAgent(late),)),))
+    team = Team("trio", TEAM.robots, (ScenarioEvent((AddAgent(late),)),))
     epochs = (
-        Epoch(Verdict.SOLUTION, ("A", "B"), assignment={"a": 1, "b": 2}),
-        Epoch(Verdict.SOLUTION, ("A", "B", "C"), "+C", {"a": 1, "b": 3, "c": 2}),
-        Epoch(Verdict.NO_SOLUTION, ("A", "B", "C"), "fog"),
-        Epoch(Verdict.SOLUTION, ("B", "C"), "-A", {"b": 4, "c": 1}),
+        EpochOutcome(Verdict.SOLUTION, ("A", "B"), assignment={"a": 1, "b": 2}),
+        EpochOutcome(Verdict.SOLUTION, ("A", "B", "C"), "+C", {"a": 1, "b": 3, "c": 2}),
+        EpochOutcome(Verdict.NO_SOLUTION, ("A", "B", "C"), "fog"),
+        EpochOutcome(Verdict.SOLUTION, ("B", "C"), "-A", {"b": 4, "c": 1}),
     )
     outcome = Outcome("trio", "dynabt", "simulator", 0, Verdict.SOLUTION, {"b": 4, "c": 1}, epochs=epochs)
     mission = mission_of(outcome, team)
@@ -141,7 +141,7 @@ def test_an_axis_goes_both_ways(values: list[int], most: int, scaled: int, cell:
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 3), st.integers(0, 2)), min_size=1, max_size=30))
 def test_places_of_a_field_are_apart(cells: list[tuple[int, int, int]]) -> None:
     crew = [Craft(f"c{number}", (x, y), z) for number, (x, y, z) in enumerate(cells)]
-    field = field_of(crew)
+    field = layout_of(crew)
     places = [place for place in field.places(crew) if place]
     assert len(places) == len(crew)
     for spots in (places, field.homes):

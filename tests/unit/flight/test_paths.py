@@ -10,16 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robochoc.flight.routes.paths import Space
-from robochoc.flight.routes.spacing import Array, gaps, norms
-from robochoc.flight.routes.timetable import Limits, Motion, NoRouteError, Plan, TooCloseError, plan
+from robochoc.flight.routes.spacing import Array, norms, segment_distances
+from robochoc.flight.routes.timetable import Motion, MotionLimits, NoRouteError, RoutePlan, TooCloseError, plan_routes
 
 HZ = 100
-LIMITS = Limits()
+LIMITS = MotionLimits()
 GRID = np.array([(x, y, 0.0) for x in range(7) for y in range(7)])
 NOBODY = np.empty((0, 3))
 
 
-def motions(planned: Plan) -> Motion:
+def motions(planned: RoutePlan) -> Motion:
     """Everybody's motion at 100 Hz: arrays (T, N, 3)."""
     times = np.append(np.arange(0, planned.duration_s, 1 / HZ), planned.duration_s)
     found = [planned.at(s) for s in times.tolist()]
@@ -43,10 +43,10 @@ def fly(
     distance: float,
     standing: Array = NOBODY,
     waits: Array | None = None,
-    limits: Limits = LIMITS,
+    limits: MotionLimits = LIMITS,
 ) -> Motion:
     """Plan, and check all that holds of any plan."""
-    planned = plan(starts, goals, distance=distance, standing=standing, waits=waits, limits=limits)
+    planned = plan_routes(starts, goals, distance=distance, standing=standing, delays=waits, limits=limits)
     flown = motions(planned)
     assert nearest(flown.position, standing) >= distance - 1e-9
     assert (flown.position[0] == starts).all()
@@ -100,7 +100,7 @@ def test_anywhere_all_keep_their_distance(seed: int, count: int, standing: int, 
     chance = np.random.default_rng(seed)
     obstacles = apart(chance, standing, NOBODY, distance)
     starts = apart(chance, count, obstacles, distance)
-    limits = Limits(speed=float(chance.uniform(0.5, 4)), acceleration=float(chance.uniform(0.5, 8)))
+    limits = MotionLimits(speed=float(chance.uniform(0.5, 4)), acceleration=float(chance.uniform(0.5, 8)))
     fly(starts, apart(chance, count, obstacles, distance), distance, obstacles, limits=limits)
 
 
@@ -111,7 +111,7 @@ def test_rows_that_rise_go_straight_up_and_only_wait_as_they_are_told() -> None:
     flown = fly(GRID, goals, 0.5, waits=waits)
     assert (flown.position[..., :2] == GRID[:, :2]).all()
     ends = waits + LIMITS.durations(levels.astype(float))
-    assert plan(GRID, goals, distance=0.5, waits=waits).duration_s == pytest.approx(ends.max(), abs=0.05)
+    assert plan_routes(GRID, goals, distance=0.5, delays=waits).duration_s == pytest.approx(ends.max(), abs=0.05)
 
 
 def test_a_team_changes_its_columns_and_levels() -> None:
@@ -181,13 +181,13 @@ def test_what_would_make_no_distance_possible_is_refused() -> None:
     goals = places + np.array((0.0, 0.0, 2.0))
     goals[2] = (1.0, 0.0, 2.3)
     with pytest.raises(TooCloseError, match=r"goals of drones 1 and 2 are only 0\.3 m apart") as found:
-        plan(places, goals, distance=0.5)
+        plan_routes(places, goals, distance=0.5)
     assert (found.value.first, found.value.second, found.value.where) == (1, 2, "goal")
     assert found.value.distance_m == pytest.approx(0.3)
     with pytest.raises(TooCloseError) as found:
-        plan(places, places, distance=0.5, standing=np.array([(0.0, 9.0, 0.0), (2.0, 0.4, 0.0)]))
+        plan_routes(places, places, distance=0.5, standing=np.array([(0.0, 9.0, 0.0), (2.0, 0.4, 0.0)]))
     assert (found.value.first, found.value.second, found.value.where) == (2, 4, "start")
-    assert plan(places, places, distance=1.0).duration_s == 0
+    assert plan_routes(places, places, distance=1.0).duration_s == 0
 
 
 def test_who_is_walled_in_finds_no_way() -> None:
@@ -195,15 +195,15 @@ def test_who_is_walled_in_finds_no_way() -> None:
     walls = walls / norms(walls)[:, None] * 0.6 + np.array((0, 0, 5))
     starts = np.array([(0.0, 0.0, 5.0), (5.0, 5.0, 5.0)])
     with pytest.raises(NoRouteError, match="no way was found for drones 0") as found:
-        plan(starts, starts + 4, distance=0.5, standing=walls)
+        plan_routes(starts, starts + 4, distance=0.5, standing=walls)
     assert found.value.drones == (0,)
 
 
 def test_a_plan_is_the_same_each_time_and_at_any_time() -> None:
     chance = np.random.default_rng(3)
     starts = apart(chance, 9, NOBODY, 0.6)
-    planned = plan(starts, starts[::-1].copy(), distance=0.6)
-    again = plan(starts, starts[::-1].copy(), distance=0.6)
+    planned = plan_routes(starts, starts[::-1].copy(), distance=0.6)
+    again = plan_routes(starts, starts[::-1].copy(), distance=0.6)
     times = chance.permutation(np.linspace(-1, planned.duration_s + 1, 300)).tolist()
     assert all((planned.at(s).position == again.at(s).position).all() for s in sorted(times))
     assert all((planned.at(s).velocity == again.at(s).velocity).all() for s in times)
@@ -221,24 +221,26 @@ def test_velocity_and_acceleration_are_those_of_the_positions() -> None:
 
 
 def test_a_team_of_nobody_flies_nowhere() -> None:
-    planned = plan(NOBODY, NOBODY, distance=1.0)
+    planned = plan_routes(NOBODY, NOBODY, distance=1.0)
     assert planned.duration_s == 0
     assert planned.at(0).position.shape == (0, 3)
 
 
-@pytest.mark.parametrize("wrong", [{"distance": 0.0}, {"distance": np.nan}, {"waits": np.zeros(2)}, {"ground": np.inf}])
+@pytest.mark.parametrize(
+    "wrong", [{"distance": 0.0}, {"distance": np.nan}, {"delays": np.zeros(2)}, {"ground": np.inf}]
+)
 def test_arguments_without_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must be finite|do not go together"):
-        plan(GRID[:1], GRID[:1], **{"distance": 1.0, **wrong})  # type: ignore[arg-type]
+        plan_routes(GRID[:1], GRID[:1], **{"distance": 1.0, **wrong})  # type: ignore[arg-type]
 
 
 def test_points_and_limits_without_sense_are_refused() -> None:
     with pytest.raises(ValueError, match="goals are rows of three finite numbers"):
-        plan(GRID[:1], GRID[:1] * np.nan, distance=1)
+        plan_routes(GRID[:1], GRID[:1] * np.nan, distance=1)
     with pytest.raises(ValueError, match="starts are rows of three finite numbers"):
-        plan(GRID[0], GRID[0], distance=1)
+        plan_routes(GRID[0], GRID[0], distance=1)
     with pytest.raises(ValueError, match="limits are positive numbers"):
-        Limits(speed=0)
+        MotionLimits(speed=0)
 
 
 @given(st.integers(0, 10**6))
@@ -248,8 +250,8 @@ def test_the_gap_between_a_line_and_a_point_is_the_least_distance_on_it(seed: in
     ends[0] = origins[0]
     line = origins[None] + np.linspace(0, 1, 401)[:, None, None] * (ends - origins)
     sampled = norms(line[:, :, None] - points).min(axis=0)
-    assert gaps(origins, ends, points) == pytest.approx(sampled, abs=0.01)
-    assert (gaps(origins, ends, points) <= sampled + 1e-12).all()
+    assert segment_distances(origins, ends, points) == pytest.approx(sampled, abs=0.01)
+    assert (segment_distances(origins, ends, points) <= sampled + 1e-12).all()
 
 
 @given(st.integers(0, 10**6))
@@ -261,4 +263,4 @@ def test_lanes_are_best_first_and_clear(seed: int) -> None:
     paths = [*space.lanes(start, goal, points)]
     lengths = [float(norms(np.diff(path, axis=0)).sum()) for path in paths]
     assert np.diff(lengths).min(initial=0) >= -1e-8
-    assert all(gaps(path[:-1], path[1:], points).min() >= 0.5 - 1e-9 for path in paths)
+    assert all(segment_distances(path[:-1], path[1:], points).min() >= 0.5 - 1e-9 for path in paths)

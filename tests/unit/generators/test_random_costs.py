@@ -11,27 +11,27 @@ import pytest
 from robochoc.formats import read_team, write_team
 from robochoc.generators.coloring import coloring
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.orders import neighbours
-from robochoc.model.problem import INFINITE, Kind, Semantics, Team
+from robochoc.model.orders import constraint_graph
+from robochoc.model.problem import INFINITE, ProblemKind, Semantics, Team
+from tests.support.binary_problems import edges_of, relation_of, shared_constraints
 from tests.support.program import robochoc
-from tests.unit.generators.test_random_csp import constraints, edges, relation
 
 
 def test_the_graph_is_model_bs() -> None:
     for seed in range(5):
         team = random_csp(12, 3, 0.4, 0, seed, max_cost=9)
-        assert team.kind is Kind.DISWCSP
+        assert team.kind is ProblemKind.DISWCSP
         assert team.name == f"random-12-3-0.4-0.0-cost9-{seed}"
-        assert len(edges(team)) == len(constraints(team)) == round(0.4 * 66)
-        assert {relation(one).semantics for one in constraints(team)} == {Semantics.SOFT}
+        assert len(edges_of(team)) == len(shared_constraints(team)) == round(0.4 * 66)
+        assert {relation_of(one).semantics for one in shared_constraints(team)} == {Semantics.SOFT}
     linked = random_csp(12, 3, 0.2, 0, 1, connected=True, max_cost=9)
-    assert all(neighbours(linked).values())
+    assert all(constraint_graph(linked).values())
 
 
 def test_so_many_pairs_are_forbidden_all_others_cost_something() -> None:
     team = random_csp(9, 5, 0.5, 0.36, 3, max_cost=4)
-    for one in constraints(team):
-        prices = [relation(one).cost((a, b)) for a in range(1, 6) for b in range(1, 6)]
+    for one in shared_constraints(team):
+        prices = [relation_of(one).cost((a, b)) for a in range(1, 6) for b in range(1, 6)]
         assert prices.count(INFINITE) == 9
         assert {price for price in prices if price < INFINITE} <= {0, 1, 2, 3, 4}
 
@@ -39,8 +39,8 @@ def test_so_many_pairs_are_forbidden_all_others_cost_something() -> None:
 def test_every_cost_is_as_likely_as_any_other() -> None:
     seen: Counter[float] = Counter()
     for seed in range(20):
-        for one in constraints(random_csp(10, 5, 0.5, 0, seed, max_cost=9)):
-            seen.update(relation(one).cost((a, b)) for a in range(1, 6) for b in range(1, 6))
+        for one in shared_constraints(random_csp(10, 5, 0.5, 0, seed, max_cost=9)):
+            seen.update(relation_of(one).cost((a, b)) for a in range(1, 6) for b in range(1, 6))
     expected = sum(seen.values()) / 10
     assert sorted(seen) == list(range(10))
     assert sum((count - expected) ** 2 / expected for count in seen.values()) < 28  # chi-square, 9 degrees
@@ -49,20 +49,20 @@ def test_every_cost_is_as_likely_as_any_other() -> None:
 def test_a_seed_is_one_problem_everywhere() -> None:
     """Fixed for good: who publishes figures names seeds."""
     said = [
-        (one.scope, relation(one).tuples, relation(one).costs)
-        for one in constraints(random_csp(10, 5, 0.4, 0.1, 42, max_cost=100))
+        (one.scope, relation_of(one).tuples, relation_of(one).costs)
+        for one in shared_constraints(random_csp(10, 5, 0.4, 0.1, 42, max_cost=100))
     ]
     assert sha256(repr(said).encode()).hexdigest()[:16] == "73f3803ff545085f"
-    assert sha256(repr(sorted(edges(coloring(20, 3, 4, 42)))).encode()).hexdigest()[:16] == "60db1280f43b4712"
+    assert sha256(repr(sorted(edges_of(coloring(20, 3, 4, 42)))).encode()).hexdigest()[:16] == "60db1280f43b4712"
 
 
 def test_a_graph_to_be_coloured_has_the_degree_that_was_asked_for() -> None:
     team = coloring(15, 3, 4, 7)
     assert team.name == "coloring-15-3-4.0-7"
-    assert len(edges(team)) == 30
-    assert {one.cost for one in constraints(team)} == {1}
+    assert len(edges_of(team)) == 30
+    assert {one.cost for one in shared_constraints(team)} == {1}
     assert all(list(one.domain) == [1, 2, 3] for one in team.variables.values())
-    assert all(neighbours(coloring(15, 3, 3, 7, connected=True)).values())
+    assert all(constraint_graph(coloring(15, 3, 3, 7, connected=True)).values())
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,9 @@ import pytest
 
 from robochoc.formats import read_team, write_team
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.orders import neighbours
-from robochoc.model.problem import Constraint, Relation, Robot, Semantics, Team
+from robochoc.model.orders import constraint_graph
+from robochoc.model.problem import Robot, Semantics
+from tests.support.binary_problems import edges_of, relation_of, shared_constraints
 from tests.support.program import robochoc
 
 SIZES = [
@@ -24,19 +25,6 @@ SIZES = [
 ]
 
 
-def constraints(team: Team) -> list[Constraint]:
-    return [constraint for robot in team.robots for constraint in robot.shared]
-
-
-def relation(constraint: Constraint) -> Relation:
-    assert isinstance(constraint.definition, Relation)
-    return constraint.definition
-
-
-def edges(team: Team) -> frozenset[tuple[int, int]]:
-    return frozenset((int(a[1:]), int(b[1:])) for a, b in (one.variables for one in constraints(team)))
-
-
 @pytest.mark.parametrize(("agents", "domain", "density", "tightness", "count", "forbidden"), SIZES)
 def test_the_numbers_are_exact(
     agents: int, domain: int, density: float, tightness: float, count: int, forbidden: int
@@ -45,12 +33,12 @@ def test_the_numbers_are_exact(
         team = random_csp(agents, domain, density, tightness, seed)
         assert team.order == tuple(f"Robot{number}" for number in range(1, agents + 1))
         assert [list(one.domain) for one in team.variables.values()] == [list(range(1, domain + 1))] * agents
-        found = constraints(team)
-        assert len(found) == len(edges(team)) == count
+        found = shared_constraints(team)
+        assert len(found) == len(edges_of(team)) == count
         for one in found:
-            assert relation(one).semantics is Semantics.CONFLICTS
-            assert len(relation(one).tuples) == len(set(relation(one).tuples)) == forbidden
-            assert all(1 <= value <= domain for row in relation(one).tuples for value in row)
+            assert relation_of(one).semantics is Semantics.CONFLICTS
+            assert len(relation_of(one).tuples) == len(set(relation_of(one).tuples)) == forbidden
+            assert all(1 <= value <= domain for row in relation_of(one).tuples for value in row)
 
 
 def test_a_constraint_stands_with_the_lower_robot() -> None:
@@ -74,11 +62,11 @@ def test_the_team_is_what_its_files_say(
 def test_a_seed_is_one_problem_everywhere() -> None:
     """Fixed for good: who publishes figures names seeds. Python 3.11, 3.12 and 3.13 agree on them."""
     team = random_csp(5, 3, 0.5, 0.4, 0)
-    assert sorted(edges(team)) == [(1, 3), (1, 5), (2, 5), (3, 4), (3, 5)]
-    said = [(one.scope, relation(one).tuples) for one in constraints(random_csp(20, 10, 0.2, 0.6, 42))]
+    assert sorted(edges_of(team)) == [(1, 3), (1, 5), (2, 5), (3, 4), (3, 5)]
+    said = [(one.scope, relation_of(one).tuples) for one in shared_constraints(random_csp(20, 10, 0.2, 0.6, 42))]
     assert sha256(repr(said).encode()).hexdigest()[:16] == "416e7a52e72a25a4"
     assert random_csp(5, 3, 0.5, 0.4, 0) == team
-    assert constraints(team) != constraints(random_csp(5, 3, 0.5, 0.4, 1))
+    assert shared_constraints(team) != shared_constraints(random_csp(5, 3, 0.5, 0.4, 1))
 
 
 def test_every_graph_and_every_pair_of_values_is_as_likely_as_any_other() -> None:
@@ -86,8 +74,8 @@ def test_every_graph_and_every_pair_of_values_is_as_likely_as_any_other() -> Non
     tables: Counter[object] = Counter()
     for seed in range(3000):
         team = random_csp(4, 2, 0.5, 0.5, seed)
-        graphs[edges(team)] += 1
-        tables[relation(constraints(team)[0]).tuples] += 1
+        graphs[edges_of(team)] += 1
+        tables[relation_of(shared_constraints(team)[0]).tuples] += 1
     for seen, number in ((graphs, 20), (tables, 6)):  # 3 of 6 edges; 2 of 4 pairs
         expected = 3000 / number
         assert len(seen) == number
@@ -98,8 +86,8 @@ def test_connected_draws_connected_graphs_alone_all_alike() -> None:
     graphs: Counter[object] = Counter()
     for seed in range(3000):
         team = random_csp(4, 1, 0.5, 0, seed, connected=True)
-        graphs[edges(team)] += 1
-        assert all(neighbours(team).values())
+        graphs[edges_of(team)] += 1
+        assert all(constraint_graph(team).values())
     assert len(graphs) == 16  # Cayley: the trees on 4 labelled nodes
     assert max(graphs.values()) < 1.4 * min(graphs.values())
 
@@ -150,7 +138,7 @@ def test_generate_random_writes_where_it_says(tmp_path: Path) -> None:
     assert "--force" in again.stderr
     assert robochoc(*words, "--force", folder=tmp_path).returncode == 0
     assert robochoc(*words, "--connected", "-o", tmp_path / "linked").returncode == 0
-    assert all(neighbours(read_team(tmp_path / "linked")).values())
+    assert all(constraint_graph(read_team(tmp_path / "linked")).values())
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.run.orchestrator import Options, Runtime, solve
-from robochoc.view.scene import scene_of
+from tests.support.flights import scene_of
 from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import robochoc
 
@@ -73,6 +73,6 @@ def test_the_scene_counts_drones_and_not_the_robots_that_fly_several() -> None:
     aside = ("Robot2", "Robot3", "Robot4")
     told = Outcome("four", "abt", "simulator", 0, Verdict.SOLUTION, placed, withdrawn=aside, metrics=Metrics())
     scene = scene_of(told, queens3d(4, robots="rows"))
-    assert scene.title == "four: 4 fly, 12 withdrew"
-    assert scene.facts[0] == ("verdict", "no solution for all 16; 4 placed")
+    assert scene.title == "four: 4 of 16 fly (not proven to be the maximum)"
+    assert scene.facts[0] == ("verdict", "no solution for all 16")
     assert len(scene.drones) == 16

@@ -16,9 +16,9 @@ from robochoc.sniffer.cache import Cache
 from robochoc.sniffer.following import Following, by_time
 from robochoc.sniffer.trace import Trace
 from robochoc.sniffer.window import NoFileError, Window
-from tests.support.sniffed import header, journal_of, told
+from tests.support.sniffer_server import header, journal_of, run_events
 
-EVENTS, OUTCOME = told()
+EVENTS, OUTCOME = run_events()
 QUICK = settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 

@@ -2,38 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from random import Random
 
 from robochoc.formats import read_robot, read_team, write_team
-from robochoc.model.change import ChangeError, rejoined, without
-from robochoc.model.problem import Constraint, Domain, Robot, Team
-from tests.protocols.test_abt import triangle
-from tests.support.changes import random_journey, stages
-from tests.support.complex_changes import random_complex_journey
-from tests.support.problems import solutions
-
-
-def writable(team: Team) -> Team:
-    """`team` with a name of its own for each definition."""
-    numbers = itertools.count()
-
-    def apart(constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
-        return tuple(replace(one, definition=replace(one.definition, name=f"d{next(numbers)}")) for one in constraints)
-
-    robots = (
-        replace(
-            robot,
-            private=tuple(replace(one, model=None) for one in apart(robot.private)),
-            parents=tuple(replace(parent, constraints=apart(parent.constraints)) for parent in robot.parents),
-        )
-        for robot in team.robots
-    )
-    return replace(team, robots=tuple(robots))
+from robochoc.model.change import ChangeError, rejoin, without_robots
+from robochoc.model.problem import Domain, Robot, Team
+from tests.support.complex_changes import random_complex_changing_team
+from tests.support.problems import solutions, with_unique_definitions
+from tests.support.random_changes import random_changing_team, stages
+from tests.support.small_teams import triangle
 
 
 def plain(robot: Robot) -> Robot:
@@ -48,7 +28,7 @@ def check_files(team: Team, folder: Path) -> None:
     """What is written is valid, and is read back as the same problem."""
     if any(not len(variable.domain) for variable in team.variables.values()):
         return  # files have no empty domains
-    team = writable(team)
+    team = with_unique_definitions(team)
     write_team(team, folder, replace=True)
     read = read_team(folder)
     assert sorted(read.order) == sorted(team.order)
@@ -63,7 +43,7 @@ def check_files(team: Team, folder: Path) -> None:
 def test_a_changed_team_could_stand_in_files(tmp_path: Path) -> None:
     chance = Random("files")
     for _ in range(6):
-        for journey in (random_journey(chance, 6), random_complex_journey(chance, 6)):
+        for journey in (random_changing_team(chance, 6), random_complex_changing_team(chance, 6)):
             for team in stages(journey):
                 check_files(team, tmp_path / "team")
 
@@ -72,14 +52,14 @@ def test_a_team_that_a_robot_rejoined_could_stand_in_files(tmp_path: Path) -> No
     chance = Random("rejoined")
     came = 0
     for _ in range(40):
-        first, *_, last = stages(random_complex_journey(chance, 4))
+        first, *_, last = stages(random_complex_changing_team(chance, 4))
         gone = chance.sample(last.order, chance.choice((0, 0, 1)))
-        last = without(last, gone)
+        last = without_robots(last, gone)
         for name in first.order:
             if name not in last:
                 continue
             try:
-                back = rejoined(last, first[name])
+                back = rejoin(last, first[name])
             except ChangeError:
                 continue
             came += 1
@@ -90,8 +70,8 @@ def test_a_team_that_a_robot_rejoined_could_stand_in_files(tmp_path: Path) -> No
 def test_a_robot_whose_file_leaves_out_what_children_are_told_rejoins(tmp_path: Path) -> None:
     folder = tmp_path / "team"
     team = triangle()
-    write_team(writable(team), folder)
+    write_team(with_unique_definitions(team), folder)
     file = folder / "RA.xml"
     file.write_text(file.read_text().replace(' variable="A"', ""))
     assert all(not child.variables for child in read_robot(file).children)
-    assert rejoined(read_team(folder), read_robot(file)) == read_team(folder)
+    assert rejoin(read_team(folder), read_robot(file)) == read_team(folder)

@@ -40,10 +40,18 @@ from robochoc.solver.compiled_team import CompiledTeam
 from tests.support.golden import odd_team
 from tests.support.problems import random_team
 from tests.support.program import ROOT
-from tests.support.replays import as_told, in_binary, in_text, random_run, recorded, with_events
+from tests.support.replays import (
+    in_binary,
+    in_text,
+    random_run,
+    recorded,
+    with_events,
+    with_events_as_observed,
+    without_given,
+)
 
 FEW, MANY = 2, 100
-FOUR = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.FEWEST)
+FOUR = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MINIMUM)
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +101,9 @@ def test_a_network_of_processes_is_one_more_runtime() -> None:
 
 
 def test_events_that_never_were_in_a_file_will_do() -> None:
-    journal, told = as_told(random_team(Random(5)), Options(protocol="adopt", runtime=Runtime.SIMULATOR))
+    journal, told = with_events_as_observed(
+        random_team(Random(5)), Options(protocol="adopt", runtime=Runtime.SIMULATOR)
+    )
     assert identical(replay(with_events(journal, told)))
     assert identical(replay(with_events(journal, in_binary(told))))
 
@@ -288,10 +298,6 @@ def test_delays_are_the_simulators_only() -> None:
 
 
 # What cannot be played
-
-
-def without_given(journal: Journal) -> Journal:
-    return with_events(journal, [event for event in journal.events if not isinstance(event, Given)])
 
 
 def test_files_help_where_the_journal_does_not_say_what_robots_were_given() -> None:

@@ -17,10 +17,10 @@ from robochoc.model.outcome import Outcome, Verdict
 from robochoc.run.networked.address import AddressError
 from robochoc.run.registry import UnknownProtocolError, offers
 from robochoc.solver.encoding import UnsupportedError
-from tests.conformance.test_epochs import differ
-from tests.support.machines import Site
+from tests.support.deployments import Deployment
 from tests.support.problems import team_of
 from tests.support.program import ROOT
+from tests.support.small_teams import differ
 
 FOUR = ROOT / "instances" / "queens3d-4"
 SCOUTS = ROOT / "docs" / "examples" / "scouts"
@@ -178,12 +178,12 @@ for name, ending in container.run().items():
 
 
 @pytest.fixture
-def site(tmp_path: Path) -> Iterator[Site]:
-    with Site(tmp_path) as site:
+def site(tmp_path: Path) -> Iterator[Deployment]:
+    with Deployment(tmp_path) as site:
         yield site
 
 
-def test_figures_3_and_4(site: Site) -> None:
+def test_figures_3_and_4(site: Deployment) -> None:
     files = site.folder / "files"
     write_team(PAIR, files)
     tokens = site.enrol("--team", files)
@@ -209,7 +209,7 @@ def test_figures_3_and_4(site: Site) -> None:
     assert sniffed == "RA"
 
 
-def test_one_container_holds_several_robots(site: Site) -> None:
+def test_one_container_holds_several_robots(site: Deployment) -> None:
     tokens = site.enrol("--team", SCOUTS)
     settings = f'main_container.set_listen("{site.place}")\nmain_container.set_authority("{site.authority_folder}")'
     robots = ROBOT.format(

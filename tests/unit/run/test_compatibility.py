@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from robochoc.model.problem import Constraint, Kind, Model, Relation, Semantics, Team
+from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind, Relation, Semantics, Team
 from robochoc.run import compatibility as refusals
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.orchestrator import solve
@@ -28,7 +28,9 @@ def dear(cost: int, pairs: str = "AB BC") -> Team:
 
 def partly_known(cost: int) -> Team:
     """The same, and a partially known constraint."""
-    part = Constraint("P", Relation("N", 2, Semantics.CONFLICTS, ((0, 0),)), ("A", "C"), ("A", "C"), Model.PKC)
+    part = Constraint(
+        "P", Relation("N", 2, Semantics.CONFLICTS, ((0, 0),)), ("A", "C"), ("A", "C"), ConstraintModel.PKC
+    )
     team = dear(cost)
     last = team["RC"]
     parents = (*last.parents, replace(last.parents[0], name="RA", constraints=(part,)))
@@ -54,7 +56,7 @@ def named(refusal: str) -> list[str]:
 
 
 @pytest.mark.parametrize("name", ["dpop", "sfb"])
-@pytest.mark.parametrize("withdraw", [None, Withdrawal.FEWEST])
+@pytest.mark.parametrize("withdraw", [None, Withdrawal.MINIMUM])
 def test_whoever_is_named_takes_costs_that_tables_do_not_hold(name: str, withdraw: Withdrawal | None) -> None:
     team = dear(EXACT)
     said = refused(team, options_for(name, withdraw))
@@ -77,7 +79,7 @@ def test_what_both_refuse_is_told_of_by_both(monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.mark.parametrize("team", [dear(3), partly_known(3)], ids=["costs", "partly known"])
-@pytest.mark.parametrize("withdraw", [None, Withdrawal.FEWEST])
+@pytest.mark.parametrize("withdraw", [None, Withdrawal.MINIMUM])
 def test_whoever_is_named_in_any_refusal_takes_the_team(withdraw: Withdrawal | None, team: Team) -> None:
     sent_to: set[str] = set()
     for offer in offers():
@@ -92,7 +94,7 @@ def test_whoever_is_named_in_any_refusal_takes_the_team(withdraw: Withdrawal | N
 
 
 def test_where_no_protocol_does_the_judge_may() -> None:
-    for kind, asked in ((Kind.DISWCSP, "sfb"), (Kind.DISWCSP, "abt")):
+    for kind, asked in ((ProblemKind.DISWCSP, "sfb"), (ProblemKind.DISWCSP, "abt")):
         team = replace(partly_known(3), robots=tuple(replace(one, kind=kind) for one in partly_known(3).robots))
         said = refused(team, Options(protocol=asked))
         assert said.endswith("; no protocol does, but the central judge (--protocol central)")

@@ -11,7 +11,7 @@ import pytest
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.formats import PREDEFINED, read_team, write_team
-from robochoc.model.change import changed, changed_by, without
+from robochoc.model.change import apply_changes, team_after_events, without_robots
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import (
     AddAgent,
@@ -19,17 +19,15 @@ from robochoc.model.problem import (
     AddValue,
     Change,
     Constraint,
-    Event,
     RemoveAgent,
     RemoveConstraint,
     RemoveValue,
+    ScenarioEvent,
     Team,
 )
 from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
-from tests.protocols.test_abt import triangle
-from tests.unit.model.test_change import named
-from tests.unit.model.test_changed_files import writable
+from tests.support.small_teams import named_constraint, triangle
 
 
 class Losing(Session):
@@ -41,7 +39,7 @@ class Losing(Session):
         self.epochs: list[Epoch] = []
 
     @property
-    def quiet(self) -> bool:
+    def lossless(self) -> bool:
         return True
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
@@ -62,14 +60,14 @@ CHANGES: list[Change] = [
     RemoveConstraint("RC", "RB", "C"),
     RemoveValue("C", 1),
     AddValue("C", 7),
-    AddConstraint("RC", "RB", named("N", "B", "C")),
-    AddConstraint("RD", "RC", named("M", "C", "D")),
+    AddConstraint("RC", "RB", named_constraint("N", "B", "C")),
+    AddConstraint("RD", "RC", named_constraint("M", "C", "D")),
 ]
 
 
 @pytest.fixture
 def team(tmp_path: Path) -> Team:
-    write_team(writable(triangle()), tmp_path / "team")
+    write_team(triangle(), tmp_path / "team")
     return read_team(tmp_path / "team")
 
 
@@ -81,9 +79,9 @@ def travel(team: Team, losses: Sequence[str], spares: int = 0) -> tuple[Scenario
 
 def test_who_is_lost_leaves(team: Team) -> None:
     journey, session, teams = travel(team, ["RB"])
-    assert teams == [team, without(team, ["RB"])]
+    assert teams == [team, without_robots(team, ["RB"])]
     assert journey.withdrawn == ["RB"]
-    assert session.epochs[0].fresh == frozenset()
+    assert session.epochs[0].restarted == frozenset()
 
 
 def test_who_comes_back_has_the_same_problem_and_the_lowest_priority(team: Team) -> None:
@@ -92,7 +90,7 @@ def test_who_comes_back_has_the_same_problem_and_the_lowest_priority(team: Team)
     assert journey.withdrawn == []
     (epoch,) = session.epochs
     assert epoch.team.order == ("RA", "RC", "RD", "RB")
-    assert epoch.fresh == frozenset({"RB"})
+    assert epoch.restarted == frozenset({"RB"})
     assert "RB" in epoch.void.agents
 
 
@@ -104,21 +102,24 @@ def test_so_many_come_back_as_there_are_spares(team: Team) -> None:
 
 @pytest.mark.parametrize("name", ["RA", "RB", "RC", "RD"])
 def test_who_comes_back_after_changes_has_them_too(team: Team, name: str) -> None:
-    scenario = (Event(tuple(CHANGES)),)
+    scenario = (ScenarioEvent(tuple(CHANGES)),)
     *_, last = travel(replace(team, scenario=scenario), ["", name], spares=1)[2]
-    now = changed_by(replace(team, scenario=scenario), 1)
+    now = team_after_events(replace(team, scenario=scenario), 1)
     assert {robot.name: robot for robot in last.robots} == {robot.name: robot for robot in now.robots}
 
 
 def test_changes_of_one_who_left_do_not_concern_who_comes_under_its_name(team: Team) -> None:
     again = replace(team["RD"], parents=team["RD"].parents)
-    events = (Event((AddValue("D", 7),)), Event((RemoveAgent("RD"), AddAgent(again))))
+    events = (ScenarioEvent((AddValue("D", 7),)), ScenarioEvent((RemoveAgent("RD"), AddAgent(again))))
     *_, last = travel(replace(team, scenario=events), ["", "", "RD"], spares=1)[2]
     assert list(last.variables["D"].domain) == [1, 2]
 
 
 def test_what_the_scenario_says_of_those_who_are_lost_is_passed_over(team: Team) -> None:
-    events = (Event((AddValue("D", 7), AddValue("C", 7))), Event((RemoveAgent("RD"), RemoveValue("C", 1))))
+    events = (
+        ScenarioEvent((AddValue("D", 7), AddValue("C", 7))),
+        ScenarioEvent((RemoveAgent("RD"), RemoveValue("C", 1))),
+    )
     journey, _, teams = travel(replace(team, scenario=events), ["RD"])
     assert list(teams[-1].variables["C"].domain) == [2, 7]
     assert journey.withdrawn == [], "it would have left by now"
@@ -132,9 +133,9 @@ def test_a_file_that_cannot_be_read_keeps_its_robot_away(team: Team) -> None:
 
 
 def test_a_file_that_has_lost_a_variable_meanwhile_does_not_stop_the_scenario(team: Team) -> None:
-    alone = without(team, ["RA", "RB", "RC"])
+    alone = without_robots(team, ["RA", "RB", "RC"])
     file = Path(alone["RD"].file)
-    events = (Event((AddValue("D", 7),)),)
+    events = (ScenarioEvent((AddValue("D", 7),)),)
     text = file.read_text()
     start, end = text.index("<agents_neighbours>"), text.index("</agents_neighbours>")
     bare = text[:start] + text[end:].replace("</agents_neighbours>", "<agents_neighbours/>")
@@ -152,6 +153,6 @@ def test_nobody_is_left(team: Team) -> None:
 
 def test_definitions_of_added_constraints_stay(team: Team) -> None:
     less = Constraint("L", PREDEFINED["lt"], ("B", "C"), ("B", "C"))
-    events = (Event((AddConstraint("RC", "RB", less),)),)
+    events = (ScenarioEvent((AddConstraint("RC", "RB", less),)),)
     *_, last = travel(replace(team, scenario=events), ["", "RC"], spares=1)[2]
-    assert changed(team, events[0].changes)["RC"].shared == last["RC"].shared
+    assert apply_changes(team, events[0].changes)["RC"].shared == last["RC"].shared

@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robochoc.sniffer.acl
+from robochoc.model.communicative_acts import Performative
+from robochoc.model.message import Message
 from robochoc.run.registry import protocol_named
-from robochoc.services.communicative_acts import Performative
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
 from robochoc.services.directory import Directory
 from robochoc.services.facilitator import handle
@@ -19,48 +20,42 @@ from robochoc.services.identifier import AgentIdentifier
 from robochoc.services.sl import REQUEST_CAPS, Function, df_on, request
 from robochoc.services.symbolic import Expression, read
 from robochoc.sniffer.acl import ACLError, ACLMessage, parse, text
-from robochoc.sniffer.performatives import ACTS, OTHERWISE, act_of
-from tests.support.program import ROOT
-from tests.support.talks import (
+from tests.support.acl_conversations import (
+    BUNDLED_PROTOCOLS,
     OK,
-    OURS,
     PLATFORM,
     assert_others_read,
     conversation,
     types_of,
 )
+from tests.support.program import ROOT
 
 DOCS = (ROOT / "docs" / "guides" / "acl.md").read_text()
 
 
-# The table
+# The acts
+
+ACTS = {kind.__name__: kind.act for name in BUNDLED_PROTOCOLS for kind in types_of(protocol_named(name))}
 
 
-def table() -> str:
-    speakers: dict[str, list[str]] = {}
-    for protocol in OURS:
-        for kind in types_of(protocol_named(protocol)):
-            speakers.setdefault(kind.__name__, []).append(protocol)
-    rows = [
-        f"| {kind} | {act.performative.upper()} | {act.why} | {', '.join(speakers[kind])} |"
-        for kind, act in ACTS.items()
-    ]
-    return "\n".join(["| message | performative | why | protocols |", "| --- | --- | --- | --- |", *rows])
+def test_types_of_one_name_do_the_same_in_all_of_our_protocols() -> None:
+    for name in BUNDLED_PROTOCOLS:
+        for kind in types_of(protocol_named(name)):
+            assert kind.act == ACTS[kind.__name__], kind
 
 
-def test_the_table_is_complete_and_has_nothing_else() -> None:
-    ours = {kind.__name__ for name in OURS for kind in types_of(protocol_named(name))}
-    assert set(ACTS) == ours
-    assert list(ACTS) == sorted(ACTS)
+def test_the_documented_examples_are_what_the_messages_declare() -> None:
+    rows = re.findall(r"^\| `(\w+)` \| ([A-Z-]+) \| (.*) \|$", DOCS, re.MULTILINE)
+    assert len(rows) > 5
+    for kind, performative, why in rows:
+        assert (performative, why) == (ACTS[kind].performative.upper(), ACTS[kind].why)
 
 
-def test_the_documented_table_is_the_table() -> None:
-    assert table() in DOCS
+def test_a_message_that_declares_no_act_informs() -> None:
+    class Bid(Message, frozen=True):
+        price: int
 
-
-def test_types_that_are_not_ours_inform() -> None:
-    assert act_of("Breakout") is OTHERWISE
-    assert OTHERWISE.performative is Performative.INFORM
+    assert Bid.act.performative is Performative.INFORM
 
 
 # "inf" and its like are words of FIPA's, and numbers for sexpdata.

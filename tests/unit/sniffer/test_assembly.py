@@ -23,7 +23,7 @@ from robochoc.sniffer.moves import Stage, whole_scene
 from robochoc.sniffer.page import page
 from robochoc.sniffer.trace import Trace
 from tests.support.program import ROOT
-from tests.support.sniffed import header, journal_of, told
+from tests.support.sniffer_server import header, journal_of, run_events
 
 HOSTILE = "</script></title><img src=x onerror=alert(1)>"
 
@@ -61,9 +61,9 @@ def test_the_policy_stands_before_any_script() -> None:
 def test_the_model_comes_first_and_whatever_begins_last() -> None:
     scripts = scripts_of(page("embedded", {}).decode())
     assert "window.Sniffer = {}" in scripts[0]
-    names = [path.name for path in (ROOT / "robochoc/view/sniffer/assets").glob("*.js")]
+    names = [path.name for path in (ROOT / "robochoc/sniffer/assets").glob("*.js")]
     assert len(scripts) == len(names)
-    assert scripts[-1] == (ROOT / "robochoc/view/sniffer/assets/main.js").read_text()
+    assert scripts[-1] == (ROOT / "robochoc/sniffer/assets/main.js").read_text()
 
 
 def test_titles_and_answers_of_strangers_stay_text() -> None:
@@ -82,8 +82,8 @@ def test_the_same_answers_make_the_same_page() -> None:
 def test_assets_are_in_the_wheel(tmp_path: Path) -> None:
     (wheel,) = WheelBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
     with zipfile.ZipFile(wheel) as packed:
-        names = {name.rpartition("/")[2] for name in packed.namelist() if "view/sniffer/assets/" in name}
-    assert names == {path.name for path in (ROOT / "robochoc/view/sniffer/assets").iterdir()}
+        names = {name.rpartition("/")[2] for name in packed.namelist() if "robochoc/sniffer/assets/" in name}
+    assert names == {path.name for path in (ROOT / "robochoc/sniffer/assets").iterdir()}
     assert {"index.html", "style.css", "main.js", "scene.js", "counters.js"} <= names
 
 
@@ -129,7 +129,7 @@ def test_all_land_when_another_run_begins() -> None:
 
 
 def test_meshcats_commands_hold_every_drone_and_no_animation() -> None:
-    events, outcome = told()
+    events, outcome = run_events()
     scene = msgspec.json.decode(whole_scene(trace_of(events, outcome)))
     commands = [umsgpack.unpackb(base64.b64decode(command)) for command in scene["commands"]]
     assert {command["type"] for command in commands} == {"set_transform", "set_property", "set_object"}

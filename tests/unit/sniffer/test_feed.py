@@ -12,7 +12,7 @@ import pytest
 
 from robochoc.journal.events import AnyEvent, Began, Concluded, Given, Improved, Lost, Refused, Sent, Settled
 from robochoc.journal.journal import Header, Journal
-from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.sniffer.acl import parse
 from robochoc.sniffer.columns import NOT_YET
@@ -21,7 +21,7 @@ from robochoc.sniffer.feed import DETAILS, MOST_EPOCHS, MOST_NOTES, MOST_ROWS, B
 from robochoc.sniffer.packed import packed_feed
 from robochoc.sniffer.speech import PLATFORM
 from robochoc.sniffer.trace import Trace
-from tests.support.recorded import fed, recorded
+from tests.support.recorded_journals import feed_of, recorded
 
 OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
 HOSTILE = '</script>"); DROP\n\x1b[2J\N{RIGHT-TO-LEFT OVERRIDE}'
@@ -42,7 +42,7 @@ def of_strangers(*contents: dict[str, Any], protocol: str = "a-protocol-that-is-
 
 
 def test_about_says_what_was_run_and_how_it_ended() -> None:
-    about = told(fed("abt").about())
+    about = told(feed_of("abt").about())
     journal = recorded("abt")
     assert {key: about[key] for key in ("format", "generation", "team", "protocol", "runtime", "seed", "live")} == {
         "format": 1, "generation": 0, "team": "queens3d-3", "protocol": "abt", "runtime": "simulator", "seed": 0,
@@ -63,7 +63,7 @@ def test_about_says_what_was_run_and_how_it_ended() -> None:
 
 
 def test_decisions_are_those_of_the_journal() -> None:
-    feed = fed("abt")
+    feed = feed_of("abt")
     count = told(feed.about())["decisions"]
     decisions = told(feed.decisions(0, count))
     assert len(decisions) == count
@@ -72,7 +72,7 @@ def test_decisions_are_those_of_the_journal() -> None:
 
 @pytest.mark.parametrize("name", ["columns", "steps", "decisions"])
 def test_rows_that_are_not_there_or_too_many_are_refused(name: str) -> None:
-    feed = fed("abt")
+    feed = feed_of("abt")
     for first, end in ((0, 1 << 40), (5, 4), (-1, 3), (1 << 40, 1 << 41)):
         with pytest.raises(BadRequestError, match="there are no rows"):
             getattr(feed, name)(first, end)
@@ -105,7 +105,7 @@ def test_notes_are_bounded_and_losses_are_not_crowded_out() -> None:
 @pytest.mark.parametrize("protocol", OURS)
 def test_each_message_is_the_acl_message_of_its_conversation(protocol: str) -> None:
     """What comes back through `Conversation` is what the journal holds."""
-    feed = fed(protocol)
+    feed = feed_of(protocol)
     trace, of = feed.trace, feed.trace.messages
     talk = Conversation(protocol_named(protocol), protocol, PLATFORM, "run-1")
     for message in range(0, len(of.t), max(1, len(of.t) // 150)):
@@ -184,7 +184,7 @@ def test_a_nameless_robot_breaks_nothing() -> None:
 
 
 def test_a_page_without_a_server_gets_all_answers_at_once() -> None:
-    feed, journal = fed("abt"), recorded("abt")
+    feed, journal = feed_of("abt"), recorded("abt")
     answers = {name: zlib.decompress(content) for name, content in packed_feed(feed, journal).items()}
     count, steps = len(feed.trace.messages.t), len(feed.trace.steps.t)
     assert answers["columns"] == feed.columns(0, count)
@@ -217,8 +217,8 @@ def test_the_end_is_told_as_the_report_tells_it() -> None:
     assert gave_up == "No verdict: R1 gave up, as its protocol has it."
     best = ended(verdict=Verdict.OPTIMAL, withdrawn=("R1", "R2"), lost=("R1",))
     assert best == "No solution for all. 1 fly, no better team could; aside: R2; lost: R1."
-    epochs = [Epoch(verdict, ("R1",)) for verdict in (Verdict.SOLUTION, Verdict.NO_SOLUTION)]
-    epochs += [Epoch(Verdict.UNKNOWN, ("R1",), lost=("R2",))]
+    epochs = [EpochOutcome(verdict, ("R1",)) for verdict in (Verdict.SOLUTION, Verdict.NO_SOLUTION)]
+    epochs += [EpochOutcome(Verdict.UNKNOWN, ("R1",), lost=("R2",))]
     assert ended(epochs=(epochs[0],)) == "A solution."
     assert ended(epochs=tuple(epochs)) == "3 epochs: a solution, no solution, R2 lost. The last: A solution."
     many = ended(epochs=(epochs[0],) * 1000)

@@ -26,7 +26,7 @@ from robochoc.sniffer.trace import Trace
 from robochoc.solver.ace import AceProcess
 from tests.support.replays import random_run, recorded
 
-FEWEST = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.FEWEST)
+FEWEST = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MINIMUM)
 MAXIMAL = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL)
 
 

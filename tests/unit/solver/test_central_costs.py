@@ -27,13 +27,13 @@ from robochoc.solver.ace_words import Solved
 from robochoc.solver.central import CentralSolver, Judgement
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.failures import SolverLostError
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 from robochoc.verification.objective import withdrawal_cost
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import (
     cost_of,
-    fewest_aside,
     least_cost,
+    minimum_withdrawal,
     random_complex_cost_team,
     random_cost_team,
     with_costs,
@@ -43,7 +43,7 @@ from tests.support.problems import random_team, team_of
 from tests.support.program import robochoc
 
 CENTRAL = Options(protocol="central")
-FEWEST = replace(CENTRAL, withdraw=Withdrawal.FEWEST)
+FEWEST = replace(CENTRAL, withdraw=Withdrawal.MINIMUM)
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 21))]
 
 
@@ -173,9 +173,9 @@ def test_as_few_as_possible_step_aside_by_weight(batch: int, solver: AceProcess)
     for _ in range(60 if batch else 30):
         team = weighed(random_team(chance) if chance.random() < 0.7 else random_complex_team(chance), chance)
         outcome = solve(team, FEWEST, solver=solver)
-        assert sum(team[name].weight for name in outcome.withdrawn) == fewest_aside(team)
+        assert sum(team[name].weight for name in outcome.withdrawn) == minimum_withdrawal(team)
         assert outcome.verdict is (Verdict.OPTIMAL if outcome.withdrawn else Verdict.SOLUTION)
-        assert not list(objections(team, outcome.assignment, outcome.withdrawn))
+        assert not list(violations(team, outcome.assignment, outcome.withdrawn))
         aside += bool(outcome.withdrawn)
     assert (10 if batch else 5) < aside < (50 if batch else 25)
 
@@ -281,9 +281,9 @@ def test_more_aside_than_need_be_is_refuted(monkeypatch: pytest.MonkeyPatch) -> 
     pairs = [("A", name) for name in ("B", "C", "D")]
     star = team_of(dict.fromkeys("ABCD", (1,)), [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in pairs])
     with pytest.raises(RefutedError, match=r"the least cost, 3, and a judge has found one that costs 1$"):
-        claimed(OnlyTheFirst, star, monkeypatch, withdraw=Withdrawal.FEWEST)
+        claimed(OnlyTheFirst, star, monkeypatch, withdraw=Withdrawal.MINIMUM)
     heavy = replace(star, robots=(replace(star.robots[0], weight=3), *star.robots[1:]))
-    outcome = claimed(OnlyTheFirst, heavy, monkeypatch, withdraw=Withdrawal.FEWEST)
+    outcome = claimed(OnlyTheFirst, heavy, monkeypatch, withdraw=Withdrawal.MINIMUM)
     assert (outcome.withdrawn, outcome.confirmed) == (("RB", "RC", "RD"), True)
 
 

@@ -21,7 +21,7 @@ from robochoc.solver.central import CentralSolver, Judgement
 from robochoc.solver.encoding import Codes, Network, Table
 from robochoc.solver.failures import SolverTimeoutError
 from robochoc.solver.weighted import priced
-from robochoc.verification.checker import cost, objections
+from robochoc.verification.checker import assignment_cost, violations
 from tests.support.clocks import once, waiting
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of
@@ -48,7 +48,7 @@ def test_when_the_time_is_over_the_best_so_far_is_told(warm: AceProcess) -> None
     outcome = once(lambda outcome: bool(outcome.assignment), solved)
     assert outcome.verdict is Verdict.UNKNOWN
     assert outcome.bound is not None
-    assert outcome.cost == cost(team, outcome.assignment) > outcome.bound
+    assert outcome.cost == assignment_cost(team, outcome.assignment) > outcome.bound
     assert outcome.verified
 
 
@@ -85,7 +85,7 @@ def test_a_task_that_is_given_up_has_a_best_once_ace_has_one(warm: AceProcess) -
 
     best = once(lambda best: best is not None, best_of)
     assert best is not None
-    assert part.cost(best) == cost(team, part.decoded(best))
+    assert part.cost(best) == assignment_cost(team, part.decoded(best))
 
 
 def test_when_the_time_is_over_those_who_stay_so_far_are_told(warm: AceProcess) -> None:
@@ -97,4 +97,4 @@ def test_when_the_time_is_over_those_who_stay_so_far_are_told(warm: AceProcess) 
     away = absent(team, judgement.assignment)
     assert judgement.verdict is Verdict.UNKNOWN
     assert judgement.cost == len(away) == 36 - len(judgement.assignment)
-    assert not list(objections(team, judgement.assignment, away))
+    assert not list(violations(team, judgement.assignment, away))

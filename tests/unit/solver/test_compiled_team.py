@@ -15,9 +15,9 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats import PREDEFINED
 from robochoc.journal.events import Began, Decided, Improved, Lost
 from robochoc.journal.journal import Header, Recorder, read_journal
-from robochoc.model.change import still_showing, without
-from robochoc.model.orders import favourable, reordered
-from robochoc.model.problem import AddConstraint, Child, Constraint, Event, Parent, Robot, Team
+from robochoc.model.change import keep_interfaces, without_robots
+from robochoc.model.orders import with_dom_deg_order, with_priorities
+from robochoc.model.problem import AddConstraint, Child, Constraint, Parent, Robot, ScenarioEvent, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.traits import Traits
 from robochoc.replay.rebuild import Cast, Means
@@ -48,7 +48,7 @@ def lined_up(compiled: CompiledTeam) -> bool:
 
 def test_the_turned_team_has_domains_of_its_own() -> None:
     team = turned_interface()
-    turned = reordered(team, ("C", "A", "B"))
+    turned = with_priorities(team, ("C", "A", "B"))
     assert (team["A"].interface, turned["A"].interface) == (("x", "y"), ("y",))
     assert len(CompiledTeam(team)["A"].values) == 6
     assert CompiledTeam(turned)["A"].values == ((7,), (8,))
@@ -63,15 +63,15 @@ def test_every_form_of_a_team_lines_up_with_its_domains() -> None:
             journey = ScenarioRun(team, order if isinstance(order, tuple) else None, CompiledTeam, lambda: None)
             assert lined_up(journey.compiled())
             assert journey.compiled().team == journey.arranged()
-        assert lined_up(CompiledTeam(favourable(team)))
-        left = without(team, chance.sample(team.order, len(team.order) - 1))
+        assert lined_up(CompiledTeam(with_dom_deg_order(team)))
+        left = without_robots(team, chance.sample(team.order, len(team.order) - 1))
         assert lined_up(CompiledTeam(left))
-        assert lined_up(CompiledTeam(still_showing(left, team)))
+        assert lined_up(CompiledTeam(keep_interfaces(left, team)))
 
 
 def test_a_robot_cannot_get_another_ones_domain() -> None:
     own = CompiledRobot(turned_interface()["A"])
-    other = reordered(turned_interface(), ("C", "A", "B"))["A"]
+    other = with_priorities(turned_interface(), ("C", "A", "B"))["A"]
     with pytest.raises(TypeError):
         replace(own, robot=other)
     with pytest.raises(AttributeError):
@@ -110,7 +110,7 @@ def test_only_those_who_are_asked_for_are_compiled() -> None:
 
 
 def test_a_session_says_what_its_robots_work_on() -> None:
-    turned = CompiledTeam(reordered(turned_interface(), ("C", "A", "B")))
+    turned = CompiledTeam(with_priorities(turned_interface(), ("C", "A", "B")))
     assert Simulation(turned, ABT, SCHEDULE).compiled is turned
 
 
@@ -174,7 +174,7 @@ def test_who_is_left_shows_what_it_showed_and_keeps_its_place() -> None:
         before = members.order
         members.remove(gone)
         assert members.order == tuple(name for name in before if name not in gone)
-        left = still_showing(without(team, gone), team)
+        left = keep_interfaces(without_robots(team, gone), team)
         for name, task in members.tasks(2, "abt", Traits(), NO_BRIEF).items():
             assert task.interfaces == {robot.name: robot.interface for robot in left.robots}
             assert among(team[name], task.interfaces).interface == left[name].interface
@@ -216,4 +216,6 @@ def test_costs_that_come_later_must_fit_as_well() -> None:
         for number in range(5)
     ]
     with pytest.raises(UnsupportedError, match="scale them down"):
-        solve(replace(team, scenario=(Event(tuple(dear)),)), Options(protocol="dpop", runtime=Runtime.SIMULATOR))
+        solve(
+            replace(team, scenario=(ScenarioEvent(tuple(dear)),)), Options(protocol="dpop", runtime=Runtime.SIMULATOR)
+        )

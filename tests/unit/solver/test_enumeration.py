@@ -31,7 +31,7 @@ from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.meetings import meetings
 from tests.support.program import robochoc
-from tests.unit.solver.test_ace import queens, random_network, tried
+from tests.support.solver_networks import brute_force, queens_network, random_network
 
 ENOUGH = 10**9
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 11))]
@@ -65,7 +65,7 @@ def pair_of_five(body: str = "lt") -> Team:
 
 def least(network: Network, costs: Codes) -> int | None:
     """The least sum of the codes at `costs`, by trying everything."""
-    return min((sum(codes[place] for place in costs) for codes in tried(network)), default=None)
+    return min((sum(codes[place] for place in costs) for codes in brute_force(network)), default=None)
 
 
 # The search
@@ -76,7 +76,7 @@ def test_what_is_enumerated_is_what_brute_force_finds() -> None:
     several = 0
     for _ in range(600):
         network = propagated(random_network(chance))
-        every = tried(network)
+        every = brute_force(network)
         if network.impossible:
             continue
         found = enumerated(network, Budget(ENOUGH), limit=None, count_only=False)
@@ -115,7 +115,7 @@ def test_the_cheapest_is_brute_forces() -> None:
             best = cheapest(network, Budget(ENOUGH), part.costs)
             expected = least(network, part.costs)
             assert (best and sum(best[place] for place in part.costs)) == expected, (network, part.costs)
-            assert best is None or best in tried(network)
+            assert best is None or best in brute_force(network)
             seen += 1
 
 
@@ -182,7 +182,7 @@ def test_ace_has_nothing_cheaper(batch: int, ace: AceProcess) -> None:
 
 
 def test_the_same_steps_are_taken_every_time() -> None:
-    network = propagated(queens(7))
+    network = propagated(queens_network(7))
     used = []
     for _ in range(3):
         budget = Budget(ENOUGH)
@@ -200,29 +200,29 @@ def test_a_task_that_takes_too_many_steps_goes_to_ace(monkeypatch: pytest.Monkey
     monkeypatch.setattr(front, "STEPS_BEFORE_ACE", 0)
     monkeypatch.setattr(front, "STEPS_EACH", 20_000)
     with AceProcess() as solver:
-        assert solver.solve(queens(6)).means is Means.ENUMERATION
-        handed_over = solver.solve(queens(8), strategy="static")
+        assert solver.solve(queens_network(6)).means is Means.ENUMERATION
+        handed_over = solver.solve(queens_network(8), strategy="static")
         assert (handed_over.means, handed_over.found) == (Means.ACE, 92)
         assert solver.pid is not None
-        assert solver.solve(queens(6)).means is Means.ENUMERATION
+        assert solver.solve(queens_network(6)).means is Means.ENUMERATION
     with AceProcess(always=True) as always:
-        assert always.solve(queens(6)).means is Means.ACE
+        assert always.solve(queens_network(6)).means is Means.ACE
 
 
 @pytest.mark.usefixtures("no_process")
 def test_what_all_tasks_may_take_together_is_used_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Many tasks that are each not quite small would take longer than to start ACE."""
     budget = Budget(ENOUGH)
-    enumerated(propagated(queens(7)), budget, limit=None, count_only=True)
+    enumerated(propagated(queens_network(7)), budget, limit=None, count_only=True)
     monkeypatch.setattr(front, "STEPS_EACH", budget.used // 2)
     monkeypatch.setattr(front, "STEPS_BEFORE_ACE", 2 * budget.used)
     with AceProcess() as solver:
         for _ in range(3):
-            assert solver.solve(queens(7)).found == 40
+            assert solver.solve(queens_network(7)).found == 40
         for _ in range(3):
-            assert solver.solve(queens(4)).found == 2
+            assert solver.solve(queens_network(4)).found == 2
         with pytest.raises(AssertionError, match="is started"):
-            solver.solve(queens(7))
+            solver.solve(queens_network(7))
 
 
 @pytest.mark.parametrize("width", [20_000, 60_000])

@@ -20,7 +20,7 @@ from tests.support.complex_problems import complex_team
 from tests.support.cost_problems import least_cost, random_complex_cost_team, random_cost_team, with_costs
 from tests.support.problems import team_of
 from tests.support.program import robochoc
-from tests.unit.solver.test_central import bundled, java, span
+from tests.support.xcsp3_solvers import integers, rows_of, run_java, solver_jar
 
 
 def least_exported(document: bytes) -> float:
@@ -32,18 +32,14 @@ def least_exported(document: bytes) -> float:
     paid = (root.findtext("objectives/minimize/list") or "").split()
     assert root.find("objectives/minimize").get("type") == "sum"  # type: ignore[union-attr]
     free = [name for name in names if name not in paid]
-    domains = {
-        name: [value for part in (element.text or "").split() for value in span(part)]
-        for name, element in zip(names, elements, strict=True)
-    }
+    domains = {name: integers(element.text or "") for name, element in zip(names, elements, strict=True)}
     hard: list[tuple[list[str], set[tuple[int, ...]], bool]] = []
     charged: dict[str, tuple[list[str], dict[tuple[int, ...], int]]] = {}
     for element in root.findall("constraints/extension"):
         scope = (element.findtext("list") or "").split()
         positive = element.find("supports") is not None
         text = element.findtext("supports" if positive else "conflicts") or ""
-        rows = {tuple(map(int, row.split(","))) for row in re.findall(r"\(([^)]*)\)", text)}
-        rows |= {(value,) for part in text.split() if "(" not in text for value in span(part)}
+        rows = rows_of(text)
         if scope[-1] in paid:
             charged[scope[-1]] = scope[:-1], {row[:-1]: row[-1] for row in rows}
         else:
@@ -76,8 +72,8 @@ def test_ace_and_choco_find_the_least_cost_of_what_is_exported(tmp_path: Path) -
     for team, least in ((coloring(4, 3, 3), 1), (charged_in_any_case(), 9), (spared(), 0)):
         path = tmp_path / "team.xml"
         path.write_bytes(xcsp3(team))
-        ace = java(bundled("ace"), "main.Head", str(path), "-npc")
-        choco = java(bundled("choco"), "org.chocosolver.parser.xcsp.ChocoXCSP", str(path), "-limit=[50s]")
+        ace = run_java(solver_jar("ace"), "main.Head", str(path), "-npc")
+        choco = run_java(solver_jar("choco"), "org.chocosolver.parser.xcsp.ChocoXCSP", str(path), "-limit=[50s]")
         assert least_cost(team) == least
         assert re.search(rf"d BOUND\s+{least}\b", ace), ace
         assert re.findall(r"^o (\d+)", choco, re.MULTILINE)[-1] == str(least), choco

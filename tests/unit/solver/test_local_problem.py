@@ -59,7 +59,7 @@ def test_conflicts_are_those_of_the_files(batch: int) -> None:
         team = random_team(chance)
         given = {name: chance.choice(sorted(v.domain)) for name, v in team.variables.items()}
         shared = [c for r in team.robots for parent in r.parents for c in parent.constraints]
-        for name, part in agent_problems(team, everywhere=True).items():
+        for name, part in agent_problems(team, shared_scopes=True).items():
             problem = LocalProblem(part)
             if not team[name].interface:
                 continue
@@ -97,7 +97,7 @@ def test_burdens_are_costs_where_nothing_is_broken(batch: int) -> None:
     for _ in range(40):
         team = random_cost_team(chance)
         given = {name: chance.choice(sorted(v.domain)) for name, v in team.variables.items()}
-        for part in agent_problems(team, everywhere=True).values():
+        for part in agent_problems(team, shared_scopes=True).values():
             problem = LocalProblem(part)
             view = {name: value for name, value in _view(team, given).items() if chance.random() < 0.8}
             costs = problem.costs(view)
@@ -117,7 +117,7 @@ def test_the_first_conflict_is_the_one_that_is_explained(batch: int, monkeypatch
     chance = Random(f"explained {batch}")
     for _ in range(30):
         team = random_complex_team(chance)
-        for part in agent_problems(_any_domains(team, chance), everywhere=True).values():
+        for part in agent_problems(_any_domains(team, chance), shared_scopes=True).values():
             monkeypatch.setattr(compiled, "LARGE", chance.choice((1, 1000)))
             _compare(part, chance)
 
@@ -129,7 +129,7 @@ def test_what_a_robot_adds_is_the_difference_that_it_makes(batch: int) -> None:
     seen = Counter[str]()
     for _ in range(40):
         team = random_complex_cost_team(chance)
-        for part in agent_problems(_any_domains(team, chance), everywhere=True).values():
+        for part in agent_problems(_any_domains(team, chance), shared_scopes=True).values():
             problem, again = LocalProblem(part), LocalProblem(part)
             view: dict[str, Value] = {}
             costs = problem.costs(view)
@@ -157,7 +157,7 @@ def test_the_least_is_what_the_cheapest_values_of_the_others_cost(batch: int, mo
         team = random_cost_team(chance)
         shared = [c for robot in team.robots for parent in robot.parents for c in parent.constraints]
         robots = {name for name in team.order if chance.random() < 0.6}
-        for name, part in agent_problems(team, everywhere=True).items():
+        for name, part in agent_problems(team, shared_scopes=True).items():
             problem = LocalProblem(part)
             (own,) = (variable.name for variable in team[name].variables)
             least = problem.least(robots - {name})
@@ -185,8 +185,8 @@ def test_the_least_is_what_the_cheapest_values_of_the_others_cost(batch: int, mo
 
 def test_nothing_is_sure_to_be_charged_where_robots_may_step_aside() -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [Constraint("C", ONE, ("A", "B"), ("A", "B"))])
-    assert LocalProblem(agent_problems(team, everywhere=True)["RA"]).least({"RB"}) == [0, INFINITE]
-    assert LocalProblem(agent_problems(team, brief=RunParameters(aside=1), everywhere=True)["RA"]).least({"RB"}) == [
+    assert LocalProblem(agent_problems(team, shared_scopes=True)["RA"]).least({"RB"}) == [0, INFINITE]
+    assert LocalProblem(agent_problems(team, brief=RunParameters(aside=1), shared_scopes=True)["RA"]).least({"RB"}) == [
         0,
         0,
         0,

@@ -17,21 +17,22 @@ import umsgpack
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robochoc.flight import preview as previews
 from robochoc.flight.flight import fly
+from robochoc.flight.log import FlightEvent
 from robochoc.flight.mission import mission_of
-from robochoc.flight.quadrotor.conditions import Conditions, Failure
-from robochoc.flight.quadrotor.flown import Happening
+from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.formats import write_team
 from robochoc.formats.result import result_json
 from robochoc.model.outcome import Outcome, Verdict
-from robochoc.view import scene as scenes
-from robochoc.view.film import Look
 from robochoc.view.keyframes import angle, attitude_keys, position_keys, slerp
 from robochoc.view.page import page
 from robochoc.view.palette import GREY, RED, web
+from robochoc.view.playback import DroneState
 from robochoc.view.scene import Scene, scene_of
 from tests.support.clocks import working
 from tests.support.flights import FPS, LEG_S, TILT, epochs_of_three, five, straight
+from tests.support.flights import scene_of as flown_scene_of
 from tests.support.program import robochoc
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"
@@ -44,11 +45,11 @@ def commands_of(html: bytes) -> list[dict[str, Any]]:
     return [umsgpack.unpackb(base64.b64decode(line)) for line in block[1].split()]
 
 
-def film_in(html: bytes) -> dict[str, Any]:
-    block = re.search(rb'<script id="film"[^>]*>([^<]*)</script>', html)
+def playback_in(html: bytes) -> dict[str, Any]:
+    block = re.search(rb'<script id="playback"[^>]*>([^<]*)</script>', html)
     assert block
-    film: dict[str, Any] = json.loads(block[1])
-    return film
+    playback: dict[str, Any] = json.loads(block[1])
+    return playback
 
 
 def tracks_of(html: bytes) -> dict[str, list[tuple[float, list[float]]]]:
@@ -66,7 +67,7 @@ def tracks_of(html: bytes) -> dict[str, list[tuple[float, list[float]]]]:
 def shown(outcome: Outcome | None = None, **how: Any) -> Scene:  # noqa: ANN401 - `straight`'s
     mission = mission_of(outcome) if outcome else mission_of(epochs_of_three(), five())
     outcome = outcome or epochs_of_three()
-    return scene_of(outcome, mission=mission, flown=straight(mission, **how))
+    return scene_of(outcome, mission, straight(mission, **how))
 
 
 # Key frames
@@ -118,15 +119,15 @@ def test_the_angle_between_attitudes() -> None:
 
 def test_the_page_plays_what_was_flown() -> None:
     scene = shown()
-    film = scene.film
-    assert film
+    playback = scene.playback
+    assert playback
     tracks = tracks_of(page(scene))
-    frames = FPS * film.times
+    frames = FPS * playback.times
     for number, drone in enumerate(scene.drones):
         path = f"{number + 1} {drone.name}"
         keys, values = zip(*tracks[f"{path}.position"], strict=True)
         played = np.stack([np.interp(frames, keys, part) for part in np.array(values).T], axis=1)
-        assert np.abs(played - film.positions[:, number]).max() < 0.0021
+        assert np.abs(played - playback.positions[:, number]).max() < 0.0021
         leans = 2 * np.arcsin([value[0] for _, value in tracks[f"{path}/body.quaternion"]])
         assert max(leans) == pytest.approx(TILT, abs=0.001)
 
@@ -134,10 +135,10 @@ def test_the_page_plays_what_was_flown() -> None:
 def test_metres_are_shown_in_cells() -> None:
     outcome = Outcome("vast", "abt", "simulator", 0, Verdict.SOLUTION, {"V1.1": 1, "V1.2": 10**9, "V2.1": 5 * 10**8})
     mission = mission_of(outcome)
-    scene = scene_of(outcome, mission=mission, flown=straight(mission))
-    assert scene.film
+    scene = scene_of(outcome, mission, straight(mission))
+    assert scene.playback
     assert mission.scale < 1e-6
-    for drone, begin, end in zip(scene.drones, scene.film.positions[0], scene.film.positions[-1], strict=True):
+    for drone, begin, end in zip(scene.drones, scene.playback.positions[0], scene.playback.positions[-1], strict=True):
         assert begin == pytest.approx(drone.home)
         assert end == pytest.approx(drone.end)
     assert [drone.place and drone.place[2] for drone in scene.drones] == pytest.approx([1, 4, 2.5], abs=0.1)
@@ -146,9 +147,9 @@ def test_metres_are_shown_in_cells() -> None:
 def test_vast_numbers_are_flown_as_they_are_drawn() -> None:
     outcome = Outcome("vast", "abt", "simulator", 0, Verdict.SOLUTION, {"V1.1": -1000, "V1.2": 10**12})
     with working(5):
-        scene = scene_of(outcome)
-    assert scene.film
-    for drone, end in zip(scene.drones, scene.film.positions[-1], strict=True):
+        scene = flown_scene_of(outcome)
+    assert scene.playback
+    for drone, end in zip(scene.drones, scene.playback.positions[-1], strict=True):
         assert end == pytest.approx(drone.end, abs=0.1)
     assert (scene.axes[2].first, scene.axes[2].last) == (-1000, 10**12)
 
@@ -157,38 +158,38 @@ def test_vast_numbers_are_flown_as_they_are_drawn() -> None:
 
 
 def test_each_epoch_says_what_opened_it_and_what_came_of_it() -> None:
-    film = film_in(page(shown()))
-    assert film["chapters"] == [
+    playback = playback_in(page(shown()))
+    assert playback["chapters"] == [
         {"at": 0, "opened": "the start", "says": "solution, 4 fly"},
         {"at": LEG_S, "opened": "-R5.1", "says": "no solution, 3 hover on"},
         {"at": 2 * LEG_S, "opened": "V2.1 without <2>", "says": "solution, 4 fly"},
     ]
-    assert film["duration"] == 3 * LEG_S
+    assert playback["duration"] == 3 * LEG_S
 
 
 def test_nobody_flies_where_there_never_was_a_solution() -> None:
     outcome = Outcome("t", "abt", "simulator", 0, Verdict.NO_SOLUTION, {})
-    assert film_in(page(shown(outcome)))["chapters"] == [
+    assert playback_in(page(shown(outcome)))["chapters"] == [
         {"at": 0, "opened": "the start", "says": "no solution, nobody flies"}
     ]
-    alone = scene_of(outcome, five())
-    assert alone.film is None
+    alone = flown_scene_of(outcome, five())
+    assert alone.playback is None
     assert not {"flown", "flight"} & dict(alone.facts).keys()
 
 
 def test_who_leaves_turns_grey_when_it_leaves() -> None:
     scene = shown()
-    assert scene.film
-    assert [len(looks) for looks in scene.film.looks] == [0, 0, 0, 0, 1]
-    assert [*scene.film.looks[4]] == [(LEG_S, Look.ASIDE)]
+    assert scene.playback
+    assert [len(states) for states in scene.playback.states] == [0, 0, 0, 0, 1]
+    assert [*scene.playback.states[4]] == [(LEG_S, DroneState.WITHDRAWN)]
     gone = scene.drones[4]
-    assert gone.aside
+    assert gone.landing
     assert gone.place is None
     html = page(scene)
     colours = tracks_of(html)["5 R5.1/body/<object>.material.color"]
     assert [frame for frame, _ in colours] == [0, FPS * LEG_S, FPS * LEG_S + 25]
     assert colours[-1][1] == pytest.approx(GREY)
-    assert film_in(html)["drones"][4]["looks"] == [[LEG_S, "aside", web(GREY)]]
+    assert playback_in(html)["drones"][4]["states"] == [[LEG_S, "withdrawn", web(GREY)]]
 
 
 def test_who_comes_back_has_its_colour_again() -> None:
@@ -197,18 +198,18 @@ def test_who_comes_back_has_its_colour_again() -> None:
     third = replace(third, robots=first.robots, assignment={**third.assignment, "V5.1": 2})
     outcome = replace(outcome, epochs=(first, second, third), assignment=third.assignment)
     mission = mission_of(outcome, five())
-    scene = scene_of(outcome, mission=mission, flown=straight(mission))
-    assert scene.film
-    assert [*scene.film.looks[4]] == [(LEG_S, Look.ASIDE), (2 * LEG_S, Look.FLIES)]
+    scene = scene_of(outcome, mission, straight(mission))
+    assert scene.playback
+    assert [*scene.playback.states[4]] == [(LEG_S, DroneState.WITHDRAWN), (2 * LEG_S, DroneState.FLIES)]
     colours = tracks_of(page(scene))["5 R5.1/body/<object>.material.color"]
     assert colours[-1][1] == pytest.approx(colours[0][1])
 
 
 def test_the_flight_of_a_scenario_is_flown_here_if_need_be() -> None:
-    scene = scene_of(epochs_of_three(), five())
-    assert scene.film
-    assert len(scene.film.chapters) == 3
-    assert scene.film.duration_s > 3
+    scene = flown_scene_of(epochs_of_three(), five())
+    assert scene.playback
+    assert len(scene.playback.chapters) == 3
+    assert scene.playback.duration_s > 3
     assert "flown" in dict(scene.facts)
 
 
@@ -217,10 +218,10 @@ def test_the_flight_of_a_scenario_is_flown_here_if_need_be() -> None:
 
 def test_who_falls_turns_red_and_stays_where_it_lies() -> None:
     scene = shown(falls={1: 3.0})
-    assert scene.film
-    assert scene.film.looks[1] == ((3.0, Look.FALLEN),)
+    assert scene.playback
+    assert scene.playback.states[1] == ((3.0, DroneState.FALLEN),)
     html = page(scene)
-    assert film_in(html)["marks"] == [{"at": 3.0, "drone": 1, "says": "motor 2 stopped"}]
+    assert playback_in(html)["marks"] == [{"at": 3.0, "drone": 1, "says": "motor 2 stopped"}]
     tracks = tracks_of(html)
     assert tracks["2 R2.1/body/<object>.material.color"][-1][1] == pytest.approx(RED, abs=1e-6)
     assert tracks["2 R2.1.position"][-1][1][2] == pytest.approx(scene.ground)
@@ -230,19 +231,19 @@ def test_who_falls_turns_red_and_stays_where_it_lies() -> None:
 def test_what_the_flight_tells_of_one_that_falls_is_understood() -> None:
     outcome = epochs_of_three()
     mission = mission_of(outcome, five())
-    failure = Failure(mission.drones[1].name, 3.0, 1)
-    scene = scene_of(outcome, mission=mission, flown=fly(mission, Conditions(failures=(failure,))))
-    assert scene.film
-    ((at_s, look),) = scene.film.looks[1]
+    failure = MotorFailure(mission.drones[1].name, 3.0, 1)
+    scene = scene_of(outcome, mission, fly(mission, FlightConditions(failures=(failure,))))
+    assert scene.playback
+    ((at_s, look),) = scene.playback.states[1]
     assert at_s == pytest.approx(3.0, abs=0.05)
-    assert look is Look.FALLEN
+    assert look is DroneState.FALLEN
     assert "motor" in dict(scene.facts)["fallen"]
 
 
 def test_who_has_fallen_does_not_turn_grey_later() -> None:
     scene = shown(falls={4: 1.0})
-    assert scene.film
-    assert scene.film.looks[4] == ((1.0, Look.FALLEN),)
+    assert scene.playback
+    assert scene.playback.states[4] == ((1.0, DroneState.FALLEN),)
 
 
 def test_obstacles_are_boxes_in_their_cells() -> None:
@@ -258,7 +259,7 @@ def test_obstacles_are_boxes_in_their_cells() -> None:
 def test_obstacles_appear_when_they_are_seen() -> None:
     mission = mission_of(epochs_of_three(), five())
     flight = straight(mission, obstacles=((2.0, 3.0, 4.0), (1.0, 1.0, 1.0)))
-    html = page(scene_of(epochs_of_three(), mission=mission, flown=replace(flight, seen_s=(0.0, 1.5))))
+    html = page(scene_of(epochs_of_three(), mission, replace(flight, seen_s=(0.0, 1.5))))
     (animation,) = (command for command in commands_of(html) if command["type"] == "set_animation")
     appearing = {
         clip["path"]: track["keys"]
@@ -275,9 +276,9 @@ def test_obstacles_appear_when_they_are_seen() -> None:
 def test_what_happened_is_told_in_its_order() -> None:
     outcome = epochs_of_three()
     mission = mission_of(outcome)
-    seen = (Happening(4.0, 0, "second"), Happening(1.0, 2, "first"))
-    scene = scene_of(outcome, mission=mission, flown=replace(straight(mission), happenings=seen))
-    assert [mark["says"] for mark in film_in(page(scene))["marks"]] == ["first", "second"]
+    seen = (FlightEvent(4.0, 0, "second"), FlightEvent(1.0, 2, "first"))
+    scene = scene_of(outcome, mission, replace(straight(mission), events=seen))
+    assert [mark["says"] for mark in playback_in(page(scene))["marks"]] == ["first", "second"]
 
 
 def test_the_caption_tells_of_the_flight() -> None:
@@ -295,9 +296,9 @@ def test_drones_that_cannot_fly_are_where_they_would_be(error: Exception, monkey
     def fails(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr(scenes, "fly", fails)
-    scene = scene_of(epochs_of_three(), five())
-    assert scene.film is None
+    monkeypatch.setattr(previews, "fly", fails)
+    scene = flown_scene_of(epochs_of_three(), five())
+    assert scene.playback is None
     assert ("flight", f"none: {str(error) or 'FloatingPointError'}") in scene.facts
     commands = commands_of(page(scene))
     assert not any(command["type"] == "set_animation" for command in commands)
@@ -313,9 +314,9 @@ def test_drones_that_cannot_fly_are_where_they_would_be(error: Exception, monkey
 
 
 def test_too_many_are_not_flown(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(scenes, "_MOST_FLIGHTS", 14)
-    scene = scene_of(epochs_of_three(), five())
-    assert scene.film is None
+    monkeypatch.setattr(previews, "_FLIGHTS_MAX", 14)
+    scene = flown_scene_of(epochs_of_three(), five())
+    assert scene.playback is None
     assert dict(scene.facts)["flight"].startswith("none: 5 drones in 3 epochs are more than")
 
 
@@ -323,8 +324,8 @@ def test_a_flight_whose_legs_are_others_still_plays() -> None:
     outcome = epochs_of_three()
     mission = mission_of(outcome)
     flown = straight(mission)
-    html = page(scene_of(outcome, mission=mission, flown=replace(flown, stages=flown.stages[:1])))
-    assert len(film_in(html)["chapters"]) == 1
+    html = page(scene_of(outcome, mission, replace(flown, legs=flown.legs[:1])))
+    assert len(playback_in(html)["chapters"]) == 1
 
 
 # The page
@@ -333,13 +334,13 @@ def test_a_flight_whose_legs_are_others_still_plays() -> None:
 def test_hostile_names_and_words_stay_text() -> None:
     outcome = Outcome(HOSTILE, HOSTILE, "processes", 0, Verdict.SOLUTION, {HOSTILE: 1, "__proto__": 2, "\ud800": 3})
     mission = mission_of(outcome)
-    seen = (Happening(1.0, 0, HOSTILE),)
-    html = page(scene_of(outcome, mission=mission, flown=replace(straight(mission), happenings=seen)))
+    seen = (FlightEvent(1.0, 0, HOSTILE),)
+    html = page(scene_of(outcome, mission, replace(straight(mission), events=seen)))
     assert b"<img" not in html
     assert html.count(b"</script>") == 4
-    film = film_in(html)
-    assert film["marks"][0]["says"] == HOSTILE
-    assert {"__proto__", HOSTILE} < {drone["name"] for drone in film["drones"]}
+    playback = playback_in(html)
+    assert playback["marks"][0]["says"] == HOSTILE
+    assert {"__proto__", HOSTILE} < {drone["name"] for drone in playback["drones"]}
 
 
 def test_equal_flights_make_equal_pages() -> None:
@@ -349,7 +350,7 @@ def test_equal_flights_make_equal_pages() -> None:
 @pytest.mark.parametrize(("n", "most"), [(4, 1_200_000), (11, 2_500_000)])
 def test_pages_of_large_teams_are_small_and_soon_made(n: int, most: int) -> None:
     places = {f"V{i}.{j}": (3 * i + 5 * j) % n + 1 for i in range(1, n + 1) for j in range(1, n + 1)}
-    scene = scene_of(Outcome("t", "abt", "simulator", 0, Verdict.SOLUTION, places))
+    scene = flown_scene_of(Outcome("t", "abt", "simulator", 0, Verdict.SOLUTION, places))
     with working(3):
         html = page(scene)
     assert len(html) < most
@@ -367,7 +368,7 @@ def test_animate_shows_all_epochs_whoever_opened_them(tmp_path: Path) -> None:
     (tmp_path / "result.json").write_bytes(result_json(outcome))
     told = robochoc("animate", "result.json", "--team", "watch", "-o", "page.html", folder=tmp_path)
     assert (told.returncode, told.stderr.count("\n")) == (0, 1)
-    chapters = film_in((tmp_path / "page.html").read_bytes())["chapters"]
+    chapters = playback_in((tmp_path / "page.html").read_bytes())["chapters"]
     assert [chapter["opened"] for chapter in chapters] == ["the start", "-R5.1", "obstacle at (2, 1, 5)"]
 
 

@@ -21,15 +21,15 @@ from urllib.request import Request, urlopen
 import pytest
 import umsgpack
 
+from robochoc.flight import preview as previews
 from robochoc.flight.layout import Point
 from robochoc.model.expression import Apply, Constant, Expression, Name
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Team, Topic, Variable
-from robochoc.view import scene as scenes
 from robochoc.view.live import serve
 from robochoc.view.page import page
-from robochoc.view.scene import Drone, Scene, scene_of
-from tests.support.flights import straight
+from robochoc.view.scene import DrawnDrone, Scene
+from tests.support.flights import scene_of, straight
 
 HOSTILE = "</script><img src=x onerror=alert(1)>/../__proto__"
 
@@ -37,7 +37,7 @@ HOSTILE = "</script><img src=x onerror=alert(1)>/../__proto__"
 @pytest.fixture(autouse=True)
 def flown_straight(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where drones are placed, no simulation has to tell."""
-    monkeypatch.setattr(scenes, "fly", lambda mission, progress: straight(mission))  # noqa: ARG005
+    monkeypatch.setattr(previews, "fly", lambda mission, progress: straight(mission))  # noqa: ARG005
 
 
 def outcome(assignment: Mapping[str, int], verdict: Verdict = Verdict.SOLUTION, *withdrawn: str) -> Outcome:
@@ -58,7 +58,7 @@ def queens(n: int) -> dict[str, int]:
     return {f"V{i}.{j}": (3 * i + 5 * j) % n + 1 for i in range(1, n + 1) for j in range(1, n + 1)}
 
 
-def by_name(scene: Scene) -> dict[str, Drone]:
+def by_name(scene: Scene) -> dict[str, DrawnDrone]:
     return {drone.name: drone for drone in scene.drones}
 
 
@@ -102,7 +102,7 @@ def test_a_withdrawn_robot_stands_where_its_topic_says_if_that_is_constant() -> 
     team = Team("t", (robot("A", "V1", topics=topics[0]), robot("B", "V2", topics=topics[1])))
     drone = by_name(scene_of(outcome({"V1": 1}, Verdict.SOLUTION, "B"), team))["B"]
     assert (drone.home[:2], drone.place) == ((2, 1), None)
-    assert drone.aside
+    assert drone.landing
 
 
 @pytest.mark.parametrize("x", [Apply("div", (Constant(1), Constant(0))), Name("elsewhere")])
@@ -183,7 +183,7 @@ def test_nobody_flies_without_a_solution() -> None:
     team = Team("t", (robot("Robot1.1", "V1.1"), robot("Robot1.2", "V1.2")))
     scene = scene_of(outcome({}, Verdict.NO_SOLUTION), team)
     assert "no solution" in scene.title
-    assert [(drone.place, drone.aside, drone.home[2]) for drone in scene.drones] == [(None, None, scene.ground)] * 2
+    assert [(drone.place, drone.landing, drone.home[2]) for drone in scene.drones] == [(None, None, scene.ground)] * 2
     assert not any(command["type"] == "set_animation" for command in commands_of(page(scene)))
 
 
@@ -207,18 +207,19 @@ def test_no_two_drones_coincide() -> None:
 
 def test_withdrawn_drones_line_up_on_the_ground_outside_the_box() -> None:
     scene = four()
-    asides = [drone.aside for drone in scene.drones if drone.aside]
-    assert len(set(asides)) == 6
-    assert {aside[1] for aside in asides} == {scene.axes[1].low - 2}
-    assert {aside[2] for aside in asides} == {scene.ground}
-    assert scene.title == "a team: 10 fly, no better team could"
+    landings = [drone.landing for drone in scene.drones if drone.landing]
+    assert len(set(landings)) == 6
+    assert {landing[1] for landing in landings} == {scene.axes[1].low - 2}
+    assert {landing[2] for landing in landings} == {scene.ground}
+    assert scene.title == "a team: 10 of 16 fly (proven maximum)"
 
 
 def test_the_caption_says_what_happened() -> None:
     assert (
         dict(four().facts).items()
         >= {
-            "verdict": "no solution for all 16; 10 placed",
+            "verdict": "no solution for all 16",
+            "withdrawn": "6",
             "protocol": "abt",
             "messages": "1,234",
         }.items()
@@ -238,7 +239,7 @@ def test_key_frames_begin_at_home_and_end_at_the_place() -> None:
         assert keys[0][0] == 0
         assert keys[0][1] == pytest.approx(drone.home, abs=0.05)
         assert keys[-1][1] == pytest.approx(drone.end, abs=0.1)
-        assert drone.end == (drone.place or drone.aside)
+        assert drone.end == (drone.place or drone.landing)
         frames = [frame for frame, _ in keys]
         assert frames == sorted(set(frames))
 
@@ -290,9 +291,8 @@ def test_meshcat_is_not_imported_before_a_scene_is_drawn() -> None:
 
 LIVE = """
 from robochoc.model.outcome import Outcome, Verdict
-from robochoc.view import scene as scenes
 from robochoc.view.live import serve
-from robochoc.view.scene import scene_of
+from tests.support.flights import scene_of
 outcome = Outcome("live team", "abt", "processes", 0, Verdict.SOLUTION, {"V1.1": 1})
 serve(scene_of(outcome), ready=lambda url: print(url, flush=True))
 print("left")

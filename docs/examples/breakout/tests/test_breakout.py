@@ -17,13 +17,13 @@ from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 
 
 def agents(team: Team) -> dict[str, Breakout]:
     """The protocol objects of all robots, by name, not yet started."""
     order = PriorityOrder(team.order)
-    known = agent_problems(team, everywhere=Breakout.traits.everywhere)
+    known = agent_problems(team, shared_scopes=Breakout.traits.shared_scopes)
     return {name: Breakout(LocalProblem(part), order) for name, part in known.items()}
 
 
@@ -162,7 +162,7 @@ def test_random_graphs_are_coloured(seed: int) -> None:
     team = soluble(10, 20, Random(seed))
     result = Simulation(team, Breakout, _schedule(seed)).search(messages=50_000)
     assert result.verdict is Verdict.SOLUTION
-    assert not list(objections(team, {name: v for own in result.assignments.values() for name, v in own.items()}))
+    assert not list(violations(team, {name: v for own in result.assignments.values() for name, v in own.items()}))
 
 
 def test_delays_change_nothing() -> None:

@@ -1,0 +1,51 @@
+"""Points in space, of which those near another one are found at once, however many there are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import product
+
+from robochoc.flight.layout import Point
+
+_Cell = tuple[int, int, int]
+_A_HAIR_MORE = 1 + 1e-9
+"""What lies just beyond a cube's side may still be near: distances are rounded."""
+
+
+class PointIndex:
+    """Points, kept by the unit cube in which they lie. The same point may be there several times."""
+
+    def __init__(self) -> None:
+        self._cubes: dict[_Cell, list[Point]] = {}
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add(self, place: Point) -> None:
+        """Keep `place`."""
+        x, y, z = map(math.floor, place)
+        self._cubes.setdefault((x, y, z), []).append(place)
+        self._count += 1
+
+    def any_near(self, place: Point, within: float) -> bool:
+        """Whether one of them is no further than `within` from `place`."""
+        return any(math.dist(place, other) <= within for cube in self._around(place, within) for other in cube)
+
+    def remove_near(self, place: Point, within: float) -> bool:
+        """Forget those no further than `within` from `place`; returns whether there were any."""
+        before = self._count
+        for cube in self._around(place, within):
+            far = [other for other in cube if math.dist(place, other) > within]
+            self._count -= len(cube) - len(far)
+            cube[:] = far
+        return self._count < before
+
+    def _around(self, place: Point, within: float) -> Iterator[list[Point]]:
+        reach = within * _A_HAIR_MORE
+        spans = (range(math.floor(at - reach), math.floor(at + reach) + 1) for at in place)
+        for x, y, z in product(*spans):
+            cube = self._cubes.get((x, y, z))
+            if cube:
+                yield cube

@@ -1,0 +1,53 @@
+"""Places among others: how near any two are, and which are free."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robochoc.flight.quadrotor.airframe import Array
+
+_STEPS = 8
+"""Steps of half a distance, in each direction, in which free places are looked for."""
+
+
+def nearest_two(points: Array) -> float:
+    """How near two of `points` (K, 3) are; infinite if there are not two."""
+    if len(points) < 2:  # noqa: PLR2004 - a pair
+        return float("inf")
+    apart = _distances(points, points)
+    np.fill_diagonal(apart, np.inf)
+    return float(apart.min())
+
+
+def nearest_distances(points: Array, others: Array) -> Array:
+    """(K,): how near the nearest of `others` (M, 3) is to each of `points` (K, 3); infinite without others."""
+    return np.asarray(_distances(points, others).min(axis=1, initial=np.inf))
+
+
+def free_point(wish: Array, taken: Array, radii: Array, ground: float, *, low: bool) -> Array:
+    """A place that is `radii` (M,) from `taken` (M, 3): `wish`, or the nearest to it of those on a grid.
+
+    On the ground if it is to be `low`, else not much lower than `wish`.
+    """
+    step = float(radii.max(initial=0.5)) / 2
+    steps = np.arange(-_STEPS, _STEPS + 1) * step
+    x, y, z = np.meshgrid(steps, steps, [0.0] if low else steps, indexing="ij")
+    offsets = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
+    offsets = offsets[np.argsort(np.square(offsets).sum(1), kind="stable")]
+    spots = np.asarray(wish + offsets)
+    if low:
+        spots[:, 2] = ground
+    else:
+        spots = spots[spots[:, 2] >= min(ground + 2 * step, wish[2])]
+    free = (_distances(spots, taken) >= radii).all(1)
+    if free.any():
+        return np.asarray(spots[free.argmax()])
+    # All is full around here: beyond everybody, beside or above.
+    beyond = np.array([wish[0], wish[1], ground if low else wish[2]])
+    side = 0 if low else 2
+    beyond[side] = taken[:, side].max() + 2.001 * step
+    return beyond
+
+
+def _distances(points: Array, others: Array) -> Array:
+    return np.asarray(np.sqrt(np.square(points[:, None] - others).sum(2)))

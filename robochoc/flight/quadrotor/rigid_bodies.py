@@ -1,0 +1,168 @@
+"""Rigid bodies: all drones in one step, component by component, so that numpy works along the drones.
+
+The integrator is of second order: motors exactly (their commands are constant within a step), body rates by the
+midpoint rule, rotations by the Cayley map, which keeps them orthonormal up to rounding (Hairer, Lubich, Wanner,
+"Geometric Numerical Integration", 2006, Section IV.8), places with the mean thrust of the step, and drag implicitly.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from robochoc.flight.quadrotor.airframe import GRAVITY, Airframe, Array
+
+Mask = npt.NDArray[np.bool_]
+
+HARD_M_S = 2.0
+"""Who touches the ground faster than that, or lies more than `STEEP` on its side, does not fly again."""
+STEEP = math.cos(math.radians(45))
+_LEVELLING_S = 0.1
+"""The feet turn a drone that stands upright, with this time constant."""
+
+
+class RigidBodies:
+    """N drones. `state` is (6, N): position and velocity, in the world's frame, whose z is up.
+
+    `axes` is (3, 3, N): `axes[k]` is the body's axis k in the world. `rates` (3, N), rad/s, are about the body's
+    axes, and `thrusts` (4, N), N, are the rotors'. Who `stands` or has fallen is held by the ground.
+    """
+
+    def __init__(self, homes: Array, ground: float, airframe: Airframe, dt: float) -> None:
+        number = len(homes)
+        self.state = np.zeros((6, number))
+        self.state[:3] = homes.T
+        # The first two axes once more behind the third: a cross product is then two products of slices.
+        self._axes = np.zeros((5, 3, number))
+        self._axes[[0, 1, 2, 3, 4], [0, 1, 2, 0, 1]] = 1
+        self.axes = self._axes[:3]
+        self.rates = np.zeros((3, number))
+        self.thrusts = np.zeros((4, number))
+        self.stands: Mask = np.ones(number, dtype=np.bool_)
+        self.fallen: Mask = np.zeros(number, dtype=np.bool_)
+        self.broken = np.ones((4, number))
+        """0 for a motor that has stopped."""
+        self._ground = ground
+        self._airframe = airframe
+        self._dt = dt
+        self._mixing = airframe.mixing()
+        inertia = np.array(airframe.inertia)[:, None]
+        self._per_inertia = 1 / inertia
+        self._gyroscopic = (np.roll(inertia, -1, 0) - np.roll(inertia, -2, 0)) / inertia
+        self._decays = tuple(math.exp(-dt / lag) for lag in (airframe.lag_up, airframe.lag_down))
+        self._means = tuple(
+            (1 - decay) * lag / dt
+            for decay, lag in zip(self._decays, (airframe.lag_up, airframe.lag_down), strict=True)
+        )
+        self._turning = np.zeros((5, number))
+        self._rotation = np.zeros((2, 5, 3, number))
+
+    @property
+    def wrapped_axes(self) -> Array:
+        """(5, 3, N): the axes, the first two once more behind the third."""
+        return self._axes
+
+    def step(self, command: Array, air: Array) -> None:
+        """One step with these thrusts (4, N) commanded, in air that moves at `air` m/s: (3, N) or (3, 1)."""
+        before = self.state[:2].copy() if self.stands.any() else None
+        axes_before = None if before is None else self._axes.copy()
+        wrench = self._mixing @ self._spin(command * self.broken)
+        up = self._axes[2].copy()
+        self._turn(wrench[1:])
+        up += self._axes[2]
+        self._move(wrench[0] * up, air)
+        low = self.state[2] <= self._ground
+        if before is not None or low.any():
+            self._touch(low, before, axes_before)
+
+    def stop_motor(self, drone: int, motor: int) -> None:
+        """From now on it gives no thrust. A drone that stands does not fly again."""
+        self.broken[motor, drone] = 0
+        self.fallen[drone] |= self.stands[drone]
+
+    def lay(self, drone: int, place: Array) -> None:
+        """Put `drone` on the ground below `place`, for good."""
+        self.state[:, drone] = [place[0], place[1], self._ground, 0, 0, 0]
+        self._axes[:, :, drone] = np.eye(3)[[0, 1, 2, 0, 1]]
+        self.rates[:, drone] = 0
+        self.thrusts[:, drone] = 0
+        self.stands[drone] = self.fallen[drone] = True
+
+    def energy(self) -> Array:
+        """(N,) in J: kinetic, of both kinds, and potential above the ground."""
+        mass, inertia = self._airframe.mass, np.array(self._airframe.inertia)[:, None]
+        moving = mass / 2 * (self.state[3:] ** 2).sum(0) + (inertia / 2 * self.rates**2).sum(0)
+        return np.asarray(moving + mass * GRAVITY * (self.state[2] - self._ground))
+
+    def _spin(self, command: Array) -> Array:
+        """The mean thrusts of the step, at whose end they stand."""
+        gap = command - self.thrusts
+        grows = gap > 0
+        mean = command - gap * np.where(grows, *self._means)
+        np.subtract(command, gap * np.where(grows, *self._decays), out=self.thrusts)
+        return np.asarray(mean)
+
+    def _turn(self, torque: Array) -> None:
+        """Euler's equation by the midpoint rule, then the rotation by the rates in the middle of the step."""
+        dt, spin = self._dt, self._turning
+        push = torque * self._per_inertia
+        spin[:3] = self.rates
+        spin[3:] = self.rates[:2]
+        half = self.rates + (push + self._gyroscopic * spin[1:4] * spin[2:5]) * (dt / 2)
+        spin[:3] = half
+        spin[3:] = half[:2]
+        self.rates += (push + self._gyroscopic * spin[1:4] * spin[2:5]) * dt
+        # Cayley's map of h turns by 2 arctan |h|: h is tan(angle / 2) here, up to its fifth power.
+        quarter = np.square(half).sum(0) * (dt * dt / 4)
+        spin *= dt / 2 * (1 + quarter / 3)
+        vector = spin[:, None]
+        once, twice = self._rotation
+        np.subtract(self._axes[1:4] * vector[2:], self._axes[2:] * vector[1:4], out=once[:3])
+        once[3:] = once[:2]
+        np.subtract(once[1:4] * vector[2:], once[2:] * vector[1:4], out=twice[:3])
+        twice[:3] += once[:3]
+        twice[:3] *= 2 / (1 + np.square(spin[:3]).sum(0))
+        self.axes += twice[:3]
+        self._axes[3:] = self._axes[:2]
+
+    def _move(self, thrust: Array, air: Array) -> None:
+        """Newton's law. `thrust` is twice the force, as it is the sum of its directions before and after."""
+        dt, frame = self._dt, self._airframe
+        drag = frame.drag / frame.mass
+        velocity = self.state[3:]
+        push = thrust * (0.5 / frame.mass) + (air - velocity) * drag
+        push[2] -= GRAVITY
+        push *= dt / (1 + drag * dt / 2)
+        self.state[:3] += (velocity + push / 2) * dt
+        velocity += push
+
+    def _touch(self, low: Mask, before: Array | None, axes_before: Array | None) -> None:
+        """The ground takes up whoever came too low, and holds it."""
+        hit = low & ~self.stands & ~self.fallen
+        if hit.any():
+            self.fallen |= hit & ((self.state[5] < -HARD_M_S) | (self._axes[2, 2] < STEEP) | ~self.broken.all(0))
+        held = low & self.stands
+        if before is not None and axes_before is not None:
+            np.copyto(self.state[:2], before, where=held)
+            np.copyto(self._axes, axes_before, where=held)
+        np.copyto(self.state[2], self._ground, where=low)
+        np.copyto(self.state[3:], 0.0, where=low)
+        np.copyto(self.rates, 0.0, where=low)
+        np.copyto(self.stands, low)
+        tilted = low & ~self.fallen & (self._axes[2, 2] < 1)
+        if tilted.any():
+            self._level(tilted)
+
+    def _level(self, which: Mask) -> None:
+        axes = self._axes[:, :, which]
+        up = axes[2]
+        up[:2] *= 1 - self._dt / _LEVELLING_S
+        up /= np.sqrt(np.square(up).sum(0))
+        front = axes[0] - up * (up * axes[0]).sum(0)
+        front /= np.sqrt(np.square(front).sum(0))
+        axes[0] = front
+        axes[1] = up[[1, 2, 0]] * front[[2, 0, 1]] - up[[2, 0, 1]] * front[[1, 2, 0]]
+        axes[3:] = axes[:2]
+        self._axes[:, :, which] = axes

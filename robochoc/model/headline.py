@@ -1,0 +1,54 @@
+"""An outcome in one line: the title of its page, and the first line on the terminal."""
+
+from __future__ import annotations
+
+from robochoc.model.outcome import Outcome, Verdict
+
+
+def describe_outcome(
+    outcome: Outcome, total: int, *, flying: int | None = None, noun: str = "robot", weighted: bool = False
+) -> str:
+    """Return what happened, in a few words: "10 of 16 fly (proven maximum)", "solution for all 16 robots".
+
+    Args:
+        outcome: How the run ended.
+        total: The number of robots that took part. If the outcome has epochs, those of the last epoch are counted.
+        flying: How many of `total` have a place, where drones are counted and a robot decides about several.
+        noun: What is counted, in the singular.
+        weighted: Whether robots differ in weight. The maximum is then one of weight, not of number.
+    """
+    if flying is None:
+        if outcome.epochs and outcome.epochs[-1].robots:
+            total = len(outcome.epochs[-1].robots) + len(outcome.lost)
+        flying = total - len(outcome.withdrawn)
+    match outcome.verdict:
+        case Verdict.UNKNOWN:
+            so_far = f"; {flying} of {total} fly in the best answer so far" if outcome.aside else ""
+            return f"no verdict, a limit was reached{so_far}"
+        case Verdict.NO_SOLUTION:
+            once_solved = any(epoch.assignment for epoch in outcome.epochs)
+            return f"no solution{_left(outcome)}{' in the end' if once_solved else ''}"
+        case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.aside:
+            best = "proven" if outcome.verdict is Verdict.OPTIMAL else "not proven to be the"
+            what = "maximum by weight" if weighted else "maximum"
+            return f"{flying} of {total} fly ({best} {what}{_lost(outcome)})"
+        case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.lost:
+            return f"{_solution(outcome)} for {flying} of {total} {noun}s ({len(outcome.lost)} lost)"
+        case Verdict.SOLUTION | Verdict.OPTIMAL:
+            return f"{_solution(outcome)} for {f'all {total} {noun}s' if total > 1 else f'the {noun}'}{_cost(outcome)}"
+
+
+def _solution(outcome: Outcome) -> str:
+    return "optimal solution" if outcome.verdict is Verdict.OPTIMAL else "solution"
+
+
+def _left(outcome: Outcome) -> str:
+    return " for the robots that are left" if outcome.lost else ""
+
+
+def _lost(outcome: Outcome) -> str:
+    return f"; {len(outcome.lost)} lost" if outcome.lost else ""
+
+
+def _cost(outcome: Outcome) -> str:
+    return f", cost {outcome.cost:,g}" if outcome.cost else ""

@@ -1,0 +1,152 @@
+"""Words for what messages say: values with their variables' names, costs, numbers, lists.
+
+A message uses them in its `in_words`. What is said may come from a journal of unknown origin. So long lists are cut,
+and values of robots that nobody knows are still named.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple, TypeVar
+
+RobotValue = Sequence[int | None]
+"""A robot's value: the values of its interface variables (`model/message.py`)."""
+T = TypeVar("T")
+
+MOST_LISTED = 8
+"""Things in a list, before it is cut."""
+
+
+def listed(things: Iterable[str], conjunction: str = "and") -> str:
+    """Return `a`, `a and b`, `a, b and c`; of many `a, b, ... and 12 more`."""
+    items = list(things)
+    if len(items) > MOST_LISTED + 1:
+        items = [*items[:MOST_LISTED], f"{len(items) - MOST_LISTED:,} more"]
+        conjunction = "and"
+    return f"{', '.join(items[:-1])} {conjunction} {items[-1]}" if len(items) > 1 else "".join(items)
+
+
+def counted(number: int, thing: str) -> str:
+    """Return `1 value`, `3 values`."""
+    return f"{number:,} {thing if number == 1 else thing + 's'}"
+
+
+def cost_text(cost: float) -> str:
+    """Return a cost as it is written: `3`, `2.5`, `infinity`."""
+    if math.isinf(cost) or math.isnan(cost):
+        return "infinity"
+    shown = round(cost, 3)
+    return f"{int(shown):,}" if shown == int(shown) else f"{shown:,}"
+
+
+def costs_text(costs: Iterable[float]) -> str:
+    """Return costs value by value: `0, 1 and 3`."""
+    return listed(map(cost_text, costs))
+
+
+def incumbent_text(cost: float) -> str:
+    """Return what is known of the incumbent, the best solution so far; an infinite cost: there is none."""
+    return "no solution is known yet" if math.isinf(cost) else f"the best solution so far costs {cost_text(cost)}"
+
+
+def is_withdrawn(value: RobotValue) -> bool:
+    """Return whether a value says that its robot withdraws: it has variables, and none has a value."""
+    return bool(value) and all(part is None for part in value)
+
+
+class Wording(NamedTuple):
+    """The sender and the receiver of a message, and the names that its words need.
+
+    `order` and `interfaces` are empty where the team is not known.
+
+    Attributes:
+        sender: The robot that sent the message.
+        receiver: The robot that it is addressed to.
+        order: All robots, the highest priority first.
+        interfaces: By robot, the variables whose values its messages hold.
+        branch: The robots whose values a partial assignment holds, the highest first: the priority order. In a
+            protocol on the order's pseudo-tree these are the sender's ancestors and the sender.
+    """
+
+    sender: str
+    receiver: str
+    order: Sequence[str] = ()
+    interfaces: Mapping[str, Sequence[str]] = {}
+    branch: Sequence[str] = ()
+
+    def variables(self, robot: str) -> str:
+        """Return what a robot's value is called: its variables' names."""
+        names = self.interfaces.get(robot, ())
+        return listed(names) if names else f"the value of {robot}"
+
+    def parts(self, robot: str, value: RobotValue) -> list[tuple[str, str]]:
+        """Return the variables that matter in a robot's value, each with its value."""
+        names = self.interfaces.get(robot, ())
+        if len(names) != len(value):
+            names = (robot,) if len(value) == 1 else [f"{robot}[{place}]" for place in range(1, len(value) + 1)]
+        return [(name, str(part)) for name, part in zip(names, value, strict=True) if part is not None]
+
+    def facts(self, robot: str, value: RobotValue) -> list[str]:
+        """Return a robot's value variable by variable, such as `V1.1 = 2`; or that the robot withdraws."""
+        if is_withdrawn(value):
+            return [f"{robot} steps aside"]
+        return [f"{name} = {part}" for name, part in self.parts(robot, value)]
+
+    def own_value(self, value: RobotValue, otherwise: str = "I have a value") -> str:
+        """Return the sender's value in its own words; `otherwise` if it shows no variable."""
+        return "I step aside" if is_withdrawn(value) else listed(self.facts(self.sender, value)) or otherwise
+
+    def assigned(self, values: Iterable[tuple[str, RobotValue]]) -> str:
+        """Return what robots have taken: `V1.1 = 2 and V1.3 = 1`."""
+        return listed([fact for robot, value in values for fact in self.facts(robot, value)]) or "nothing yet"
+
+    def partial(self, values: Sequence[RobotValue]) -> str:
+        """Return a partial assignment: the values of the first robots of `branch`."""
+        return self.assigned(along(self.branch, values))
+
+    def condition(self, lhs: Mapping[str, RobotValue]) -> str:
+        """Return a nogood's left side as a condition, `as long as V1.1 = 2, `; empty if there is none.
+
+        Variables that do not matter are left out.
+        """
+        facts = [f"{name} = {part}" for robot, value in lhs.items() for name, part in self.parts(robot, value)]
+        return f"as long as {listed(facts)}, " if facts else ""
+
+    def nogood(self, lhs: Mapping[str, RobotValue], value: RobotValue) -> str:
+        """Return a nogood: `as long as V1.1 = 2, V2.1 cannot be 3`, where `value` is the receiver's."""
+        condition = self.condition(lhs)
+        return f"{condition}{self._cannot_be(value)}{'' if condition else ', whatever the others do'}"
+
+    def _cannot_be(self, value: RobotValue) -> str:
+        match self.parts(self.receiver, value):
+            case []:
+                return f"{self.receiver} has no value left"
+            case [(name, part)]:
+                return f"{name} cannot be {part}"
+            case facts:
+                both = "both" if len(facts) == len("ab") else "all"
+                return f"{listed([f'{name} = {part}' for name, part in facts])} cannot {both} hold"
+
+    def context(self, values: Mapping[str, tuple[RobotValue, int]]) -> str:
+        """Return a context of ADOPT (values with counters): `as long as V1.1 = 2, `; empty if there is none."""
+        facts = [fact for robot, (value, _) in values.items() for fact in self.facts(robot, value)]
+        return f"as long as {listed(facts)}, " if facts else ""
+
+    def domain(self, values: Sequence[RobotValue]) -> str:
+        """Return the values that the sender may take: `V2.1 is 1, 2 or 3`."""
+        names = self.interfaces.get(self.sender, ())
+        flying = [value for value in values if not is_withdrawn(value)]
+        aside = ", or I step aside" if len(flying) < len(values) else ""
+        if all(len(value) == 1 for value in flying):
+            shown = listed([str(value[0]) for value in flying], "or")
+        else:
+            shown = listed([f"({', '.join(map(str, value))})" for value in flying], "or")
+        called = names[0] if len(names) == 1 else f"({', '.join(names)})" if names else self.sender
+        return f"{called} is {shown or 'nothing'}{aside}"
+
+
+def along(names: Sequence[str], things: Sequence[T]) -> list[tuple[str, T]]:
+    """Return each thing with the robot that it belongs to, in the order of `names`; further robots are numbered."""
+    known = [*names[: len(things)], *(f"robot {place + 1}" for place in range(len(names), len(things)))]
+    return list(zip(known, things, strict=True))

@@ -1,0 +1,137 @@
+"""Recorded messages: the protocols of a trace's runs, and messages made again from their recorded fields."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import cache
+from typing import Any, cast, get_args
+
+import msgspec
+from msgspec.inspect import (
+    AnyType,
+    CollectionType,
+    DictType,
+    FloatType,
+    NoneType,
+    StructType,
+    TupleType,
+    Type,
+    UnionType,
+    type_info,
+)
+
+from robochoc.model.communicative_acts import INFORM, Act
+from robochoc.model.message import Message
+from robochoc.protocols.protocol import Protocol
+from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_by_name
+from robochoc.sniffer.trace import Trace
+
+_LISTS = (CollectionType, TupleType, StructType)
+
+
+class RunProtocols:
+    """The protocols of the runs of `trace`, as far as they are installed."""
+
+    def __init__(self, trace: Trace) -> None:
+        self._trace = trace
+        self._found: dict[int, tuple[str, type[Protocol]] | None] = {}
+        self._types: dict[int, Mapping[str, type[Message]]] = {}
+
+    def of_run(self, run: int) -> tuple[str, type[Protocol]] | None:
+        """Return the name and the class of a run's protocol; None if it is not installed."""
+        if run not in self._found:
+            self._found[run] = _installed(self._trace, run)
+        return self._found[run]
+
+    def message_types(self, run: int) -> Mapping[str, type[Message]]:
+        """Return the message types of a run's protocol by name; none if it is not installed."""
+        if run not in self._types:
+            found = self.of_run(run)
+            kinds = message_types(found[1]) if found else ()
+            self._types[run] = {kind.__name__: kind for kind in kinds}
+        return self._types[run]
+
+    def type_of(self, message: int) -> type[Message] | None:
+        """Return the class of the message of this number; None if it is not known."""
+        columns = self._trace.messages
+        return self.message_types(columns.run[message]).get(self._trace.kinds[columns.kind[message]])
+
+    def act_of(self, message: int) -> Act:
+        """Return the FIPA act of the message of this number."""
+        kind = self.type_of(message)
+        return kind.act if kind else INFORM
+
+    def act_of_type(self, name: str) -> Act:
+        """Return the FIPA act of messages called `name`, in the first run whose protocol has such messages."""
+        for run in range(len(self._trace.runs)):
+            kind = self.message_types(run).get(name)
+            if kind is not None:
+                return kind.act
+        return INFORM
+
+
+def message_types(protocol: type[Protocol]) -> tuple[type[Message], ...]:
+    """Return the types of all messages of a protocol."""
+    return get_args(protocol.messages) or (protocol.messages,)
+
+
+def message_of(kind: type[Message], content: Mapping[str, Any]) -> Message | None:
+    """Return the message of type `kind` with these recorded fields; None if they do not fit the type.
+
+    A journal in its text form has bytes in base64, and null for an infinite number; both are restored.
+    """
+    try:
+        info = _declared(kind)
+        values = {field.name: _with_infinity(content[field.name], field.type) for field in info.fields}
+        fields: Any = [info.tag, *values.values()] if info.array_like else {info.tag_field: info.tag, **values}
+        return msgspec.convert(fields, kind, str_keys=True)
+    except (msgspec.MsgspecError, LookupError, TypeError, ValueError, OverflowError, RecursionError):
+        return None
+
+
+@cache
+def _declared(kind: type[Message]) -> StructType:
+    return cast("StructType", type_info(kind))
+
+
+def _installed(trace: Trace, run: int) -> tuple[str, type[Protocol]] | None:
+    """Return the protocol of a run; journals name it by its class, or in a run without a beginning by its name."""
+    name = trace.runs[run].protocol
+    if name == trace.header.protocol:
+        with suppress(UnknownProtocolError):
+            return name, protocol_by_name(name)
+    return protocol_by_class(name, [trace.header.protocol])
+
+
+def _with_infinity(value: Any, declared: Type) -> Any:  # noqa: ANN401 - fields are of any type
+    """Return `value` with `inf` for each None where its declared type has numbers, and no None."""
+    if value is None:
+        return math.inf if _is_number(declared) else None
+    if isinstance(value, dict):
+        kind = declared.value_type if isinstance(declared, DictType) else AnyType()
+        return {key: _with_infinity(one, kind) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_with_infinity(one, kind) for one, kind in zip(value, _items(declared, len(value)), strict=True)]
+    return value
+
+
+def _is_number(declared: Type) -> bool:
+    kinds = declared.types if isinstance(declared, UnionType) else (declared,)
+    return any(isinstance(kind, FloatType) for kind in kinds) and not any(isinstance(kind, NoneType) for kind in kinds)
+
+
+def _items(declared: Type, count: int) -> Sequence[Type]:
+    """Return the declared types of the items of a list of so many."""
+    match declared:
+        case UnionType(types):
+            return _items(next((kind for kind in types if isinstance(kind, _LISTS)), AnyType()), count)
+        case TupleType(types) if len(types) == count:
+            return types
+        case StructType(fields=fields) if len(fields) == count:
+            return [field.type for field in fields]
+        case CollectionType(item):
+            return [item] * count
+        case _:
+            return [AnyType()] * count

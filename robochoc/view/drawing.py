@@ -1,0 +1,313 @@
+"""A scene as meshcat commands: the ground, the box with its grid and axes, the drones, and their flight."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from itertools import product
+from typing import assert_never
+
+import numpy as np
+import numpy.typing as npt
+
+from robochoc.flight.layout import Axis, Point
+from robochoc.view.keyframes import Keys, Samples, angle, attitude_keys, position_keys
+from robochoc.view.label import label
+from robochoc.view.meshcat_commands import MeshcatCommands, Track
+from robochoc.view.palette import GREY, RED, Colour, colours
+from robochoc.view.playback import DroneState, Playback
+from robochoc.view.quadrotor import HUB, Shape, box, disc, joined, quadrotor
+from robochoc.view.scene import DrawnDrone, Scene
+
+_Corners = npt.NDArray[np.float64]
+"""The lowest and the highest x, y and z of something, a row each."""
+_Corner = npt.NDArray[np.float64]
+"""An x, a y and a z."""
+
+_LINE: Colour = (0.45, 0.52, 0.60)
+_GROUND: Colour = (0.50, 0.56, 0.62)
+_WHITE: Colour = (1, 1, 1)
+_MARGIN = 0.8
+"""Ground around the outermost drones, in cells."""
+_EYE = np.array([0.7, -1.0, 0.42])
+"""Where the camera states from: in front of row 1, a little to the right, from above."""
+_FIELD_OF_VIEW_DEG = 28
+_ROOM = 1.06
+"""Of the view, for what the scene itself fills: the axes' labels need some."""
+_TEXT = 0.045
+"""Height of text, as a part of the scene's radius."""
+_READABLE = 0.03
+"""Height of text that can still be read, likewise."""
+_NAME_WIDTH = 0.8
+"""Of a drone's name, at most, in cells: the neighbour needs room for its own."""
+FPS = 30
+"""Frames a second, of the animation."""
+_FADE = 25
+"""Frames in which a drone that steps aside turns grey."""
+_CLOSE = 0.002
+"""Of a cell: so much may an animated drone be off where it was flown."""
+_ALIKE = math.radians(0.5)
+"""So much may it be turned."""
+_IN_THE_WAY = 0.9
+"""Of a cell, that an obstacle takes up."""
+_OPACITIES = {"body": 0.35, "edges": 0.9}
+"""Of an obstacle's parts."""
+
+
+def commands(scene: Scene) -> list[bytes]:
+    """The packed commands that make meshcat's viewer show `scene` and play its playback once."""
+    if scene.playback is None:
+        return _drawn(scene, [drone.end for drone in scene.drones]).commands
+    meshcat = _drawn(scene, [drone.home for drone in scene.drones])
+    _draw_obstacles(meshcat, [place for _, place in scene.playback.obstacles])
+    _animate(meshcat, scene.drones, scene.playback)
+    return meshcat.commands
+
+
+def still(scene: Scene) -> list[bytes]:
+    """The same without the playback: every drone stays at home."""
+    return _drawn(scene, [drone.home for drone in scene.drones]).commands
+
+
+def path_of(number: int, name: str) -> str:
+    """Where in meshcat's tree, below its root, the drone called `name` is: the scene's `number`-th, counted from 0.
+
+    The number keeps paths apart, and away from names that mean something in JavaScript.
+    """
+    return f"drones/{number + 1} " + re.sub(r"[^\w.-]", "_", name)
+
+
+def corners(scene: Scene) -> list[list[float]]:
+    """Points around all there is to see, names of axes included, in a frame scaled to radius 1 around the drones."""
+    extent, radius = _measured(scene)
+    names = [2 * name_at - origin for _, _, origin, name_at in _beside(scene.axes, _TEXT * radius)]
+    found: list[list[float]] = ((np.array([*_corners(extent), *names]) - extent.mean(axis=0)) / radius).tolist()
+    return found
+
+
+def cell_of(scene: Scene) -> float:
+    """How long a cell is in that frame."""
+    return 1 / _measured(scene)[1]
+
+
+def _drawn(scene: Scene, points: Sequence[Point]) -> MeshcatCommands:
+    """Everything, each drone at its point of `points`."""
+    meshcat = MeshcatCommands()
+    extent, radius = _measured(scene)
+    _aim(meshcat, extent, radius)
+    _draw_ground(meshcat, scene, extent)
+    _draw_box(meshcat, scene.axes)
+    _label_axes(meshcat, scene.axes, _TEXT * radius)
+    _draw_drones(meshcat, scene.drones, points, radius)
+    return meshcat
+
+
+def _measured(scene: Scene) -> tuple[_Corners, float]:
+    """What the scene takes up, and the radius of the sphere around that."""
+    points = [point for drone in scene.drones for point in (drone.home, drone.place, drone.landing) if point]
+    everything = np.array([*points, *_box(scene.axes)])
+    margin = np.array([_MARGIN, _MARGIN, 0])
+    extent = np.array([everything.min(axis=0) - margin, everything.max(axis=0) + margin])
+    return extent, float(np.linalg.norm(extent[1] - extent[0])) / 2
+
+
+def _box(axes: Sequence[Axis]) -> _Corners:
+    return np.array([[axis.low - 0.5 for axis in axes], [axis.high + 0.5 for axis in axes]])
+
+
+def _corners(extent: _Corners) -> _Corners:
+    return np.array([*product(*extent.T)])
+
+
+def _aim(meshcat: MeshcatCommands, extent: _Corners, radius: float) -> None:
+    """Scale any scene to radius 1 around the origin, where the lights are, and have the camera see all of it."""
+    x, y, z = (float(part) for part in -extent.mean(axis=0) / radius)
+    meshcat.place("", (x, y, z), (1 / radius, 1 / radius, 1 / radius))
+    for default in ("/Grid", "/Axes"):
+        meshcat.set(default, "visible", value=False)
+    around = (_corners(extent) - extent.mean(axis=0)) / radius
+    x, y, z = (float(part) for part in _from_where_to_see(around))
+    camera = "/Cameras/default/rotated/<object>"
+    meshcat.set(camera, "fov", _FIELD_OF_VIEW_DEG)
+    meshcat.set(camera, "position", [x, z, -y])  # the camera's own y is up
+
+
+def _from_where_to_see(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Where, in the direction of `_EYE`, a camera that states at the origin just has all `corners` in a square view."""
+    back: npt.NDArray[np.float64] = _EYE / np.linalg.norm(_EYE)
+    right = np.cross([0, 0, 1], back)
+    right /= np.linalg.norm(right)
+    aside = np.abs(corners @ np.column_stack([right, np.cross(back, right)])).max(axis=1)
+    distance = corners @ back + _ROOM * aside / math.tan(math.radians(_FIELD_OF_VIEW_DEG / 2))
+    return back * float(distance.max())
+
+
+def _draw_ground(meshcat: MeshcatCommands, scene: Scene, extent: _Corners) -> None:
+    """A plane, and on it each drone's pad in the colour of its row."""
+    (left, front, _), (right, back, _) = extent
+    corners = np.array([[left, front, 0], [right, front, 0], [right, back, 0], [left, back, 0]])
+    plane = Shape(corners, np.array([[0, 1, 2], [0, 2, 3]]), np.ones((4, 3)))
+    meshcat.mesh("ground/plane", plane, _GROUND, opacity=0.3)
+    meshcat.place("ground/plane", (0, 0, scene.ground - 0.02))
+    if scene.drones:
+        paint = paints(scene.drones)
+        pads = [disc(drone.home, 0.36, colour) for drone, colour in zip(scene.drones, paint, strict=True)]
+        meshcat.mesh("ground/pads", joined(pads), _WHITE, opacity=0.45)
+        meshcat.place("ground/pads", (0, 0, -0.01))
+
+
+def _draw_box(meshcat: MeshcatCommands, axes: Sequence[Axis]) -> None:
+    """The edges, the walls behind and below with their grid, and very faintly every cell."""
+    low, high = _box(axes)
+    walls = [np.arange(a, b + 0.5) for a, b in zip(low, high, strict=True)]
+    parts = {
+        "cells": (walls, 0.5 / max(map(len, walls))),
+        "floor": ([*walls[:2], low[2:]], 0.35),
+        "side": ([low[:1], *walls[1:]], 0.2),
+        "back": ([walls[0], high[1:2], walls[2]], 0.2),
+        "edges": ([wall[[0, -1]] for wall in walls], 0.9),
+    }
+    for name, (lines, opacity) in parts.items():
+        meshcat.segments(f"box/{name}", _lattice(lines), _LINE, opacity)
+
+
+def _label_axes(meshcat: MeshcatCommands, axes: Sequence[Axis], height: float) -> None:
+    """Each named axis' name and numbers, beside the edge of the box that is nearest to the viewer."""
+    for number, axis, origin, name_at in _beside(axes, height):
+        for at, text in axis.ticks:
+            spot = origin.copy()
+            spot[number] = at
+            _write(meshcat, f"axes/{axis.name} {text}", text, spot, height)
+        _write(meshcat, f"axes/{axis.name}", axis.name, name_at, 1.2 * height)
+
+
+def _beside(axes: Sequence[Axis], height: float) -> Iterator[tuple[int, Axis, _Corner, _Corner]]:
+    """The named axes by their numbers, the line beside the box for the numbers of each, the spot for its name."""
+    low, high = _box(axes)
+    middle = (low + high) / 2
+    near = 1.2 * height
+    lines = [
+        np.array([middle[0], low[1] - near, low[2]]),
+        np.array([high[0] + near, middle[1], low[2]]),
+        np.array([low[0] - near, low[1], middle[2]]),
+    ]
+    for number, (axis, origin) in enumerate(zip(axes, lines, strict=True)):
+        if axis.name:
+            yield number, axis, origin, origin + np.sign(origin - middle) * [1, 1, 0] * 2.2 * height
+
+
+def _lattice(walls: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
+    """Both ends of every line parallel to an axis, where walls meet."""
+    ends = []
+    for along in range(3):
+        across = [walls[axis] if axis != along else walls[axis][[0, -1]] for axis in range(3)]
+        mesh = np.stack(np.meshgrid(*across, indexing="ij"), axis=-1)
+        if len(walls[along]) > 1:
+            ends.append(np.moveaxis(mesh, along, 2).reshape(-1, 3))
+    return np.concatenate(ends)
+
+
+def _draw_drones(
+    meshcat: MeshcatCommands, drones: Sequence[DrawnDrone], points: Sequence[Point], radius: float
+) -> None:
+    texts = _texts([drone.name for drone in drones], _READABLE * radius)
+    drawn = zip(drones, points, texts, paints(drones), strict=True)
+    for number, (drone, point, text, colour) in enumerate(drawn):
+        path = path_of(number, drone.name)
+        meshcat.mesh(f"{path}/body", quadrotor(), colour)
+        meshcat.place(f"{path}/body", HUB)
+        height = min(_TEXT * radius, _NAME_WIDTH / label(text).aspect)
+        _write(meshcat, f"{path}/name", text, np.array([0, 0, 0.42]), height)
+        meshcat.place(path, point)
+
+
+def _draw_obstacles(meshcat: MeshcatCommands, obstacles: Sequence[Point]) -> None:
+    for number, place in enumerate(obstacles, 1):
+        meshcat.mesh(f"obstacles/{number}/body", box(place, _IN_THE_WAY), RED, opacity=_OPACITIES["body"])
+        sides = [np.array([at - _IN_THE_WAY / 2, at + _IN_THE_WAY / 2]) for at in place]
+        meshcat.segments(f"obstacles/{number}/edges", _lattice(sides), RED, _OPACITIES["edges"])
+
+
+def _animate(meshcat: MeshcatCommands, drones: Sequence[DrawnDrone], playback: Playback) -> None:
+    paint = paints(drones)
+    tracks: list[Track] = []
+    for number, (drone, colour) in enumerate(zip(drones, paint, strict=True)):
+        path = path_of(number, drone.name)
+        tracks += _moves(path, playback, number)
+        if playback.states[number]:
+            tracks.append(_painting(f"{path}/body/<object>", playback.states[number], colour))
+    for number, (seen_s, _) in enumerate(playback.obstacles, 1):
+        if seen_s > 0:
+            tracks += [
+                _appearing(f"obstacles/{number}/{part}/<object>", seen_s, opacity)
+                for part, opacity in _OPACITIES.items()
+            ]
+    if tracks:
+        meshcat.animate(tracks, FPS)
+
+
+def _moves(path: str, playback: Playback, number: int) -> Iterator[Track]:
+    """How a drone moves and tilts, if it does at all."""
+    frames = FPS * playback.times
+    positions, attitudes = playback.positions[:, number], playback.attitudes[:, number]
+    if np.linalg.norm(positions - positions[0], axis=1).max() > _CLOSE:
+        yield Track(path, "position", "vector3", _keys(frames, positions, position_keys(frames, positions, _CLOSE)))
+    if angle(attitudes, attitudes[0]).max() > _ALIKE:
+        keys = attitude_keys(frames, attitudes, _ALIKE)
+        yield Track(f"{path}/body", "quaternion", "quaternion", _keys(frames, attitudes, keys))
+
+
+def _keys(frames: Samples, values: Samples, keys: Keys) -> list[tuple[float, list[float]]]:
+    return [*zip(frames[keys].round(6).tolist(), values[keys].tolist(), strict=True)]
+
+
+def _painting(path: str, states: Sequence[tuple[float, DroneState]], colour: Colour) -> Track:
+    """How a drone changes its colour."""
+    keys: list[tuple[float, Colour]] = [(0, colour)]
+    for at_s, look in states:
+        begin, now = max(FPS * at_s, keys[-1][0]), keys[-1][1]
+        keys += [(begin, now), (begin + _FADE, tint(look, colour))]
+    return Track(path, "material.color", "color", keys)
+
+
+def _appearing(path: str, at_s: float, opacity: float) -> Track:
+    """How something comes into sight."""
+    begin = FPS * at_s
+    return Track(path, "material.opacity", "number", [(0, [0.0]), (begin, [0.0]), (begin + _FADE, [opacity])])
+
+
+def _texts(names: Sequence[str], readable: float) -> list[str]:
+    """What to write on the drones: their names; where those would be too small, the 3.1 of `Robot3.1`."""
+    if all(_NAME_WIDTH / label(name).aspect >= readable for name in names):
+        return list(names)
+    word = re.split("[0-9]", names[0])[0]
+    numbered = all(name.startswith(word) and name[len(word) :][:1].isdecimal() for name in names)
+    return [name[len(word) :] for name in names] if numbered else list(names)
+
+
+def _write(meshcat: MeshcatCommands, path: str, text: str, at: npt.NDArray[np.float64], height: float) -> None:
+    picture = label(text)
+    x, y, z = (float(part) for part in at)
+    meshcat.sprite(path, picture.svg)
+    meshcat.place(path, (x, y, z), (height * picture.aspect, height, 1))
+
+
+def paints(drones: Sequence[DrawnDrone]) -> list[Colour]:
+    """The colour of each drone: that of its row."""
+    groups = sorted({drone.group for drone in drones})
+    shades = dict(zip(groups, colours(len(groups)), strict=True))
+    return [shades[drone.group] for drone in drones]
+
+
+def tint(look: DroneState, colour: Colour) -> Colour:
+    """What a drone states like, if it is of that `colour` by itself."""
+    match look:
+        case DroneState.FLIES:
+            return colour
+        case DroneState.WITHDRAWN:
+            return GREY
+        case DroneState.FALLEN:
+            return RED
+        case _ as never:
+            assert_never(never)

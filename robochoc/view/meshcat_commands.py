@@ -1,0 +1,137 @@
+"""meshcat without its server: what would go to it is kept, packed as its viewer reads it.
+
+The only module that knows meshcat's Python side. meshcat is imported when a scene is drawn, not before: it brings a
+web server, zmq and IPython, a third of a second that no other command should pay. `Visualizer()` alone would start
+a server on all interfaces; given a window of ours, it only talks to that.
+"""
+
+from __future__ import annotations
+
+import base64
+import warnings
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from robochoc.flight.layout import Point
+from robochoc.view.palette import Colour
+from robochoc.view.quadrotor import Shape
+
+
+class Track(NamedTuple):
+    """How a property (`position`, `quaternion`, `material.color`) of the object at `path` changes: values by frame."""
+
+    path: str
+    name: str
+    type: str
+    keys: Sequence[tuple[float, Sequence[float]]]
+
+
+class _Command(Protocol):
+    """What meshcat sends: `lower` makes it a dict of plain values."""
+
+    def lower(self) -> dict[str, Any]: ...
+
+
+class MeshcatCommands:
+    """Draws by meshcat into `commands`: the packed messages that make its viewer show the same, in their order.
+
+    Paths are meshcat's: names joined by `/`, below `/meshcat` unless they begin with `/`. The same calls make the
+    same bytes.
+    """
+
+    def __init__(self) -> None:
+        self.commands: list[bytes] = []
+        self._meshcat = _meshcat()
+        self._root = self._meshcat.Visualizer(window=self)
+
+    def send(self, command: _Command) -> None:
+        """Keep what meshcat would send to its server: meshcat calls this."""
+        self._keep(command.lower())
+
+    def mesh(self, path: str, shape: Shape, colour: Colour, opacity: float = 1) -> None:
+        """A solid at `path`, its faces flat, its shades times `colour`."""
+        three = self._meshcat.geometry
+        geometry = three.TriangularMeshGeometry(shape.vertices, shape.faces)
+        # Bytes where they do: half the size, times every drone.
+        geometry.color = np.rint(255 * shape.colours).astype(np.uint8)
+        if len(shape.vertices) <= np.iinfo(np.uint8).max:
+            geometry.faces = shape.faces.astype(np.uint8)
+        material = three.MeshPhongMaterial(
+            color=_hex(colour), opacity=opacity, vertexColors=True, flatShading=True, depthWrite=opacity == 1
+        )
+        drawing = self._drawing(path, three.Mesh(geometry, material))
+        drawing["object"]["geometries"][0]["data"]["attributes"]["color"]["normalized"] = True  # 255 means 1
+        self._keep(drawing)
+
+    def segments(self, path: str, points: npt.NDArray[np.float64], colour: Colour, opacity: float = 1) -> None:
+        """Thin lines at `path`: of the N x 3 `points`, each two are the ends of one."""
+        three = self._meshcat.geometry
+        material = three.LineBasicMaterial(color=_hex(colour), opacity=opacity, depthWrite=False)
+        self._keep(self._drawing(path, three.LineSegments(three.PointsGeometry(points.T), material)))
+
+    def sprite(self, path: str, svg: str) -> None:
+        """A picture at `path`, one unit wide and high before it is placed, that always faces the viewer."""
+        # meshcat's Python side has no sprites, but its viewer draws them: this is three.js's own format.
+        picture = f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"
+        material = {"uuid": "material", "type": "SpriteMaterial", "map": "texture", "transparent": True}
+        sprite = {
+            "metadata": {"version": 4.5, "type": "Object"},
+            "geometries": [],
+            "images": [{"uuid": "image", "url": picture}],
+            "textures": [{"uuid": "texture", "image": "image"}],
+            "materials": [{**material, "depthWrite": False}],
+            "object": {"uuid": f"{path} object", "type": "Sprite", "material": "material"},
+        }
+        self._keep({"type": "set_object", "path": self._at(path).path.lower(), "object": sprite})
+
+    def place(self, path: str, at: Point = (0, 0, 0), size: Point = (1, 1, 1)) -> None:
+        """Move what is at `path` to `at` and stretch it to `size`."""
+        matrix = np.diag([*size, 1.0])
+        matrix[:3, 3] = at
+        self._at(path).set_transform(matrix)
+
+    def set(self, path: str, name: str, value: object) -> None:
+        """Set a property of the object at `path`, by three.js's name for it."""
+        self._at(path).set_property(name, value)
+
+    def animate(self, tracks: Sequence[Track], fps: int) -> None:
+        """Play `tracks` once, all at the same time, and stay where they end."""
+        animation = self._meshcat.animation.Animation(default_framerate=fps)
+        for track in tracks:
+            animated = self._at(track.path)
+            for frame, value in track.keys:
+                with animation.at_frame(animated, frame) as then:
+                    then.set_property(track.name, track.type, list(value))
+        self._root.set_animation(animation)
+
+    def _at(self, path: str) -> Any:  # noqa: ANN401 - meshcat is untyped
+        return self._root[path] if path else self._root
+
+    def _drawing(self, path: str, drawn: Any) -> dict[str, Any]:  # noqa: ANN401 - meshcat is untyped
+        # meshcat gives its objects ids by the clock and the network card: ours make every run's bytes the same.
+        for part, element in (("object", drawn), ("geometry", drawn.geometry), ("material", drawn.material)):
+            element.uuid = f"{path} {part}"
+        lowered: dict[str, Any] = self._meshcat.commands.SetObject(drawn, path=self._at(path).path).lower()
+        return lowered
+
+    def _keep(self, message: dict[str, Any]) -> None:
+        import umsgpack  # noqa: PLC0415 - comes with meshcat, and like it only when a scene is drawn
+
+        # Key frames are many, and finer than single precision nobody sees.
+        precision = "single" if message["type"] == "set_animation" else "double"
+        self.commands.append(umsgpack.packb(message, force_float_precision=precision))
+
+
+def _meshcat() -> Any:  # noqa: ANN401 - meshcat is untyped
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of the pyzmq it imports, about itself
+        import meshcat  # noqa: PLC0415 - see above: only when a scene is drawn
+    return meshcat
+
+
+def _hex(colour: Colour) -> int:
+    red, green, blue = (round(255 * part) for part in colour)
+    return red << 16 | green << 8 | blue

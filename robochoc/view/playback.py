@@ -1,0 +1,142 @@
+"""What was flown, as a picture shows it: where each drone was when, the epochs on a line of time, what happened.
+
+Lengths are in cells, as in `scene`; times in seconds from the beginning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from robochoc.flight.cells import in_cells
+from robochoc.flight.layout import Point
+from robochoc.flight.log import FlightEvent, FlightLog
+from robochoc.flight.mission import Leg, Mission
+from robochoc.model.outcome import Verdict
+
+_HIT = "hits the ground"
+"""What the flight says in the end of one that falls."""
+
+_Array = npt.NDArray[np.float64]
+
+
+class DroneState(StrEnum):
+    """What a drone states like: in the colour of its row, or grey, or red."""
+
+    FLIES = "flies"
+    WITHDRAWN = "withdrawn"
+    FALLEN = "fallen"
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """An epoch: when its flight begins, what opened it, and what came of it."""
+
+    begins_s: float
+    opened_by: str
+    says: str
+
+
+@dataclass(frozen=True)
+class EventMark:
+    """Something that happened to a drone, by its number."""
+
+    at_s: float
+    drone: int
+    says: str
+
+
+@dataclass(frozen=True, eq=False)
+class Playback:
+    """A flight to be shown. Arrays have a row for each of T times, and in it one for each of N drones.
+
+    `states` are for each drone its changes, in order: from when on it states how.
+    """
+
+    times: _Array
+    positions: _Array
+    """(T, N, 3)"""
+    attitudes: _Array
+    """(T, N, 4): unit quaternions x, y, z, w."""
+    states: tuple[tuple[tuple[float, DroneState], ...], ...]
+    chapters: tuple[Chapter, ...] = ()
+    marks: tuple[EventMark, ...] = ()
+    obstacles: tuple[tuple[float, Point], ...] = ()
+    """Since when each is seen, and where it is."""
+
+    @property
+    def duration_s(self) -> float:
+        """How long it lasts."""
+        return float(self.times[-1]) if len(self.times) else 0.0
+
+
+def playback_of(mission: Mission, flown: FlightLog) -> Playback:
+    """How `flown` states in the box of `mission`, whose drones it flew."""
+    marks = [EventMark(event.at_s, event.drone, event.what) for event in flown.events]
+    obstacles = [in_cells(mission, np.array(place)) for place in flown.obstacles]
+    return Playback(
+        flown.times,
+        in_cells(mission, flown.positions),
+        flown.attitudes,
+        tuple(tuple(_states(number, mission, flown)) for number in range(len(mission.drones))),
+        tuple(_chapters(mission, flown)),
+        tuple(sorted(marks, key=lambda mark: mark.at_s)),
+        tuple(
+            (seen_s, (float(x), float(y), float(z)))
+            for seen_s, (x, y, z) in zip(flown.seen_s or [0.0] * len(obstacles), obstacles, strict=True)
+        ),
+    )
+
+
+def fell(flown: FlightLog) -> dict[int, FlightEvent]:
+    """Who lies fallen in the end, and what made it fall: the last that happened to it before it hit the ground."""
+    told: dict[int, list[FlightEvent]] = {}
+    for event in flown.events:
+        if np.isnan(flown.errors_m[event.drone]):
+            told.setdefault(event.drone, []).append(event)
+    for own in told.values():
+        if len(own) > 1 and own[-1].what == _HIT:
+            own.pop()
+    return {number: own[-1] for number, own in told.items()}
+
+
+def _states(number: int, mission: Mission, flown: FlightLog) -> Iterator[tuple[float, DroneState]]:
+    fallen = fell(flown).get(number)
+    falls_s = fallen.at_s if fallen else np.inf
+    now = DroneState.FLIES
+    for leg, begins_s in _begun(mission, flown):
+        goal = leg.goals.get(number)
+        then = now if goal is None else DroneState.WITHDRAWN if goal.lands else DroneState.FLIES
+        if then is not now and begins_s < falls_s:
+            yield begins_s, then
+            now = then
+    if fallen:
+        yield falls_s, DroneState.FALLEN
+
+
+def _begun(mission: Mission, flown: FlightLog) -> list[tuple[Leg, float]]:
+    """The legs that were flown, and when each began."""
+    return [(leg, times.begins_s) for leg, times in zip(mission.legs, flown.legs, strict=False)]
+
+
+def _chapters(mission: Mission, flown: FlightLog) -> Iterator[Chapter]:
+    flying: set[int] = set()
+    for leg, begins_s in _begun(mission, flown):
+        for number, goal in leg.goals.items():
+            (flying.discard if goal.lands else flying.add)(number)
+        yield Chapter(begins_s, leg.opened_by, f"{_told(leg.verdict)}, {_flying(flying, leg)}")
+
+
+def _told(verdict: Verdict) -> str:
+    return verdict.value.replace("-", " ")
+
+
+def _flying(flying: set[int], leg: Leg) -> str:
+    if not flying:
+        return "nobody flies"
+    stay = leg.verdict in {Verdict.NO_SOLUTION, Verdict.UNKNOWN}
+    return f"{len(flying)} {'hover on' if stay else 'fly'}"

@@ -1,0 +1,53 @@
+"""What the page's player needs to know of a scene, beside meshcat's commands: JSON that may stand in HTML."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from robochoc.view.drawing import cell_of, corners, paints, path_of, tint
+from robochoc.view.label import printable
+from robochoc.view.palette import web
+from robochoc.view.playback import Playback
+from robochoc.view.scene import Scene
+
+
+def playback_json(scene: Scene) -> str:
+    """The drones, by their names, paths and colours; the epochs and what happened, by when; and the room they take.
+
+    Times are in seconds, `corners` and `cell` in meshcat's frame as `stage` scales it. Names are strangers': they are
+    text, and no sign of them ends the script that this is put into.
+    """
+    whole = {
+        "corners": [[round(part, 5) for part in corner] for corner in corners(scene)],
+        "cell": round(cell_of(scene), 5),
+        "drones": [*_drones(scene)],
+        **(_story(scene.playback) if scene.playback else {"duration": 0, "chapters": [], "marks": []}),
+    }
+    return json.dumps(whole, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _drones(scene: Scene) -> Iterator[dict[str, Any]]:
+    states = scene.playback.states if scene.playback else ((),) * len(scene.drones)
+    drawn = zip(scene.drones, paints(scene.drones), states, strict=True)
+    for number, (drone, colour, changes) in enumerate(drawn):
+        yield {
+            "name": printable(drone.name),
+            "path": path_of(number, drone.name),
+            "colour": web(colour),
+            "states": [[round(at_s, 3), look.value, web(tint(look, colour))] for at_s, look in changes],
+        }
+
+
+def _story(playback: Playback) -> dict[str, Any]:
+    return {
+        "duration": round(playback.duration_s, 4),
+        "chapters": [
+            {"at": round(chapter.begins_s, 3), "opened": printable(chapter.opened_by), "says": chapter.says}
+            for chapter in playback.chapters
+        ],
+        "marks": [
+            {"at": round(mark.at_s, 3), "drone": mark.drone, "says": printable(mark.says)} for mark in playback.marks
+        ],
+    }

@@ -1,0 +1,86 @@
+"""`robochoc completion`: what shells are given, and bash itself."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+from click.shell_completion import ShellComplete
+from click.testing import CliRunner
+
+from robochoc.cli.commands.completion import SHELLS, VARIABLE
+from robochoc.cli.group import COMMANDS, cli
+from robochoc.run.registry import protocol_names
+
+WANTED = """
+source <("{robochoc}" completion bash)
+COMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1))
+_robochoc_completion "{robochoc}"
+printf '%s\\n' "${{COMPREPLY[@]}}"
+"""
+
+
+def completions(*words: str) -> list[str]:
+    *before, last = words
+    return [one.value for one in ShellComplete(cli, {}, "robochoc", VARIABLE).get_completions(before, last)]
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_each_shell_is_given_a_script(shell: str) -> None:
+    done = CliRunner().invoke(cli, ["completion", shell])
+    assert done.exit_code == 0
+    assert VARIABLE in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        (("so",), ["solve"]),
+        (("solve", "--proto"), ["--protocol"]),
+        (("solve", "--protocol", "AFC"), ["afc", "afc-ng", "afc-tree"]),
+        (("master", "--protocol", "dpo"), ["dpop"]),
+        (("protocols", "dpo"), ["dpop"]),
+        (("solve", "--order", "d"), ["dom-deg", "dfs"]),
+        (("solve", "--channel", "wp"), ["wpan"]),
+        (("solve", "--runtime", "si"), ["simulator"]),
+        (("solve", "--withdraw", "--runtime", "ne"), ["network"]),
+        (("solve", "--withdraw", "max"), ["maximal"]),
+        (("completion", ""), [*SHELLS]),
+    ],
+)
+def test_names_are_completed(words: tuple[str, ...], found: list[str]) -> None:
+    assert completions(*words) == found
+
+
+def test_all_commands_and_protocols_are_completed() -> None:
+    assert completions("") == [*COMMANDS]
+    assert completions("solve", "--protocol", "") == [*protocol_names(), "central"]
+
+
+def test_folders_of_teams_are_completed_by_the_shell() -> None:
+    command = cli.get_command(click.Context(cli), "solve")
+    assert command is not None
+    found = ShellComplete(cli, {}, "robochoc", VARIABLE).get_completions(["solve"], "inst")
+    assert [(one.type, one.value) for one in found] == [("dir", "inst")]
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        ("robochoc solve --protocol agi", "agile-abt"),
+        ("robochoc prot", "protocols"),
+        ("robochoc compile --no", "--no-cache"),
+    ],
+)
+def test_bash_completes(words: str, found: str, tmp_path: Path) -> None:
+    program = Path(sys.executable).with_name("robochoc")
+    script = WANTED.format(robochoc=program, words=words)
+    asked = ["bash", "--norc", "--noprofile", "-c", script]
+    done = subprocess.run(asked, capture_output=True, text=True, check=True, cwd=tmp_path, env=dict(os.environ))
+    assert done.stdout.split() == [found]

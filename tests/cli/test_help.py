@@ -1,0 +1,97 @@
+"""`--help`: short enough to be read, each option in one section, names of protocols in any case."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from robochoc import load
+from robochoc.cli.group import COMMANDS, cli
+from robochoc.cli.options.sections import COMMON, REST, SectionedCommand
+from robochoc.run.registry import installed_spelling
+from tests.support.program import robochoc
+
+MANY = 12
+"""A command with more options has sections."""
+
+
+def commands(group: click.Group, *path: str) -> Iterator[tuple[str, click.Command]]:
+    """Yield every command with its words, also those of groups."""
+    context = click.Context(group)
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        assert command is not None
+        if isinstance(command, click.Group):
+            yield from commands(command, *path, name)
+        yield " ".join((*path, name)), command
+
+
+ALL = dict(commands(cli))
+SECTIONED = {name: command for name, command in ALL.items() if isinstance(command, SectionedCommand)}
+
+
+def options_of(command: click.Command) -> list[click.Option]:
+    return [one for one in command.get_params(click.Context(command)) if isinstance(one, click.Option)]
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_command_has_help_without_an_option_that_is_not_explained(name: str) -> None:
+    done = CliRunner().invoke(cli, [*name.split(), "--help"])
+    assert done.exit_code == 0
+    assert REST not in done.stdout
+    assert [one.opts for one in options_of(ALL[name]) if not one.help] == []
+
+
+@pytest.mark.parametrize("name", SECTIONED)
+def test_every_option_is_in_one_section(name: str) -> None:
+    command = SECTIONED[name]
+    named = Counter(spelling for spellings in command.sections.values() for spelling in spellings)
+    there = options_of(command)
+    spelt = {spelling for one in there for spelling in one.opts}
+    assert set(named) <= spelt | {"--help"}
+    assert [one.opts for one in there if sum(named[spelling] for spelling in one.opts) != 1] == []
+    assert next(iter(command.sections)) == COMMON
+
+
+def test_commands_with_many_options_have_sections() -> None:
+    long = {name for name, command in ALL.items() if len(options_of(command)) > MANY}
+    assert long <= {*SECTIONED}
+
+
+def test_help_on_solve_shows_what_most_runs_need_on_the_first_screen() -> None:
+    lines = robochoc("solve", "--help").stdout.splitlines()
+    assert len(lines) < 100
+    screen = "\n".join(lines[:40])
+    for option in ("--protocol", "--runtime", "--timeout", "--withdraw", "--json", "--html", "--journal", "--sniff"):
+        assert f"\n  {option}" in screen
+
+
+def test_help_on_robochoc_names_every_command() -> None:
+    words = robochoc("--help").stdout
+    assert all(f"\n  {name} " in words for name in COMMANDS)
+
+
+@pytest.mark.parametrize(("typed", "name"), [("ABT", "abt"), ("AFC-ng", "afc-ng"), ("Central", "central"), ("?", "?")])
+def test_a_protocol_is_known_in_any_case(typed: str, name: str, four: Path) -> None:
+    assert installed_spelling(typed) == name
+    done = robochoc("solve", str(four), "--runtime", "simulator", "--protocol", typed)
+    assert done.returncode == (2 if name == "?" else 0)
+    assert name in (done.stderr if name == "?" else done.stdout)
+
+
+def test_a_protocol_is_known_in_any_case_from_python(four: Path) -> None:
+    assert load(four).solve("DisFC", "simulator").protocol == "disfc"
+
+
+@pytest.mark.parametrize("word", ["minimum", "fewest", "", "Fewest"])
+def test_the_minimum_withdrawal_has_its_former_name_too(word: str, four: Path) -> None:
+    option = f"--withdraw={word}" if word else "--withdraw"
+    done = robochoc("solve", str(four), "--runtime", "simulator", option)
+    assert done.returncode == (2 if word == "Fewest" else 0)
+    if word == "Fewest":
+        assert "minimum" in done.stderr

@@ -1,0 +1,202 @@
+"""Machines as users have them: each with a data folder of its own, on which the program is started and ended."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Self
+
+from click.testing import CliRunner
+
+from robochoc.cli.group import cli
+from robochoc.formats import write_team
+from robochoc.model.problem import Constraint, Team
+from tests.support.problems import PREDICATES, team_of
+from tests.support.program import ROOT
+
+LOOPBACK = "127.0.0.1"
+LONG_S = 90.0
+SOON_S = 20.0
+_DIFFERENT = [Constraint("C", PREDICATES[0], pair, pair) for pair in (("A", "B"), ("B", "C"), ("A", "C"))]
+PAIR = team_of(dict.fromkeys("AB", range(1, 3)), _DIFFERENT[:1])
+TRIANGLE = team_of(dict.fromkeys("ABC", range(1, 3)), _DIFFERENT)
+_POLL_S = 0.02
+
+
+class Program:
+    """A process that was started as a user would, with what it prints in files."""
+
+    def __init__(self, command: Sequence[object], home: Path) -> None:
+        home.mkdir(parents=True, exist_ok=True)
+        stem = str(len(list(home.iterdir())))
+        self._out, self._err = home / f"{stem}.out", home / f"{stem}.err"
+        environment = {**os.environ, "XDG_DATA_HOME": str(home), "PYTHONPATH": str(ROOT)}
+        with self._out.open("wb") as out, self._err.open("wb") as err:
+            self._process = subprocess.Popen(
+                list(map(str, command)), stdin=subprocess.DEVNULL, stdout=out, stderr=err, env=environment, cwd=home
+            )
+        self.pid = self._process.pid
+
+    @property
+    def output(self) -> str:
+        """What it has printed."""
+        return self._out.read_text()
+
+    @property
+    def errors(self) -> str:
+        """What it has said on standard error."""
+        return self._err.read_text()
+
+    @property
+    def object(self) -> dict[str, Any]:
+        """What it has printed, one JSON object."""
+        found: dict[str, Any] = json.loads(self.output)
+        return found
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it has not ended yet."""
+        return self._process.poll() is None
+
+    def wait_to_say(self, words: str, times: int = 1) -> None:
+        """Wait until `words` stand on its standard error."""
+
+        def said() -> bool:
+            assert self._process.poll() is None or self.errors.count(words) >= times, self.errors
+            return self.errors.count(words) >= times
+
+        wait_until(said, lambda: f"{words!r} was never said: {self.errors}")
+
+    def wait_to_print(self, words: str) -> None:
+        """Wait until `words` stand on its standard output."""
+        wait_until(lambda: words in self.output, lambda: f"{words!r} was never printed: {self.output} {self.errors}")
+
+    def status(self, within_s: float = LONG_S) -> int:
+        """Its exit status, once it has ended; no program ends with a traceback."""
+        status = self._process.wait(within_s)
+        assert "Traceback" not in self.errors, self.errors
+        return status
+
+    def strike(self, signum: signal.Signals) -> None:
+        """Send it a signal."""
+        self._process.send_signal(signum)
+
+    def kill(self) -> None:
+        """End it at once, if it has not ended."""
+        if self._process.poll() is None:
+            self._process.kill()
+        self._process.wait()
+
+
+class Deployment:
+    """Machines around one master at `place`, with an Authority, below `folder`. A context manager: none outlives it.
+
+    `inside` is put before a command: what starts it elsewhere.
+    """
+
+    def __init__(self, folder: Path, host: str = LOOPBACK, port: int | None = None) -> None:
+        self.folder = folder
+        self.port = port or free_port(host)
+        self.place = f"{host}:{self.port}"
+        self.authority_folder = folder / "authority"
+        self._programs: list[Program] = []
+        self.authority("init")
+
+    def authority(self, *words: object) -> str:
+        """What `robochoc authority` prints."""
+        done = CliRunner().invoke(cli, ["authority", *map(str, words), "--authority", str(self.authority_folder)])
+        assert done.exit_code == 0, done.output
+        return done.stdout
+
+    def enrol(self, *words: object) -> dict[str, str]:
+        """The tokens of all whom `words` enrol, by their names."""
+        rows = [json.loads(line) for line in self.authority("enrol", *words, "--json").splitlines()]
+        return {row["name"]: row["token"] for row in rows}
+
+    def start(self, machine: str, *words: object, inside: Sequence[str] = ()) -> Program:
+        """Start the program on `machine`."""
+        program = Program([*inside, sys.executable, "-m", "robochoc", *words], self.folder / machine)
+        self._programs.append(program)
+        return program
+
+    def script(self, machine: str, text: str) -> Program:
+        """Start a Python program on `machine`."""
+        program = Program([sys.executable, "-c", text], self.folder / machine)
+        self._programs.append(program)
+        return program
+
+    def master(self, *words: object, inside: Sequence[str] = ()) -> Program:
+        """Start a master, and wait until robots can come."""
+        listening = ("--listen", self.place, "--authority", self.authority_folder)
+        program = self.start("master", "master", *listening, *words, inside=inside)
+        program.wait_to_say("listening at")
+        return program
+
+    def robot(self, file: Path, *words: object, inside: Sequence[str] = ()) -> Program:
+        """Start a robot."""
+        return self.start(file.stem, "robot", file.resolve(), "--master", self.place, *words, inside=inside)
+
+    def robots(self, files: Path, tokens: Mapping[str, str], *words: object) -> dict[str, Program]:
+        """Start all robots of the folder `files` that there are tokens for."""
+        return {n: self.robot(files / f"{n}.xml", "--token", token, *words) for n, token in tokens.items()}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for program in reversed(self._programs):
+            program.kill()
+
+
+@contextmanager
+def taken(port: int, host: str = LOOPBACK) -> Iterator[None]:
+    """Somebody else listens there."""
+    with socket.create_server((host, port)):
+        yield
+
+
+def free_port(host: str = LOOPBACK) -> int:
+    """A port that nobody listens at now, nor at the one after it."""
+    while True:
+        with socket.create_server((host, 0)) as first:
+            port: int = first.getsockname()[1]
+            try:
+                with socket.create_server((host, port + 1)):
+                    return port
+            except (OSError, OverflowError):
+                continue
+
+
+def wait_until(done: Callable[[], bool], otherwise: Callable[[], str], within_s: float = LONG_S) -> None:
+    """Wait until `done()`."""
+    deadline = time.monotonic() + within_s
+    while not done():
+        assert time.monotonic() < deadline, otherwise()
+        time.sleep(_POLL_S)
+
+
+def ended(programs: Mapping[str, Program], status: int = 0) -> None:
+    """Wait until all have ended, with that status."""
+    found = {name: program.status() for name, program in programs.items()}
+    others = {name: (it, programs[name].errors) for name, it in found.items() if it != status}
+    assert not others, others
+
+
+def written(team: Team, site: Deployment) -> Path:
+    folder = site.folder / "files"
+    write_team(team, folder)
+    return folder
+
+
+def one_line(program: Program) -> str:
+    """All that a program says that did not get far."""
+    assert program.errors.count("\n") == 1, program.errors
+    return program.errors

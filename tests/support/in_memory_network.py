@@ -1,0 +1,226 @@
+"""A network in memory: all robots and their master run in one thread."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from queue import SimpleQueue
+from typing import cast
+
+from robochoc.authority.identity import Identity
+from robochoc.communication.control import Failed, OfEpoch, Pause, Wave
+from robochoc.communication.network.control_messages import (
+    Joined,
+    Judge,
+    Leave,
+    Objection,
+    Register,
+    Search,
+    Show,
+    Shown,
+    ToRobot,
+    Welcome,
+    Word,
+)
+from robochoc.communication.network.framing import MASTER, Framing
+from robochoc.communication.network.inbox import Arrived, Item
+from robochoc.communication.network.members import Members
+from robochoc.communication.network.robot import Ending, NetworkRobot
+from robochoc.communication.network.search_state import SearchState
+from robochoc.communication.network.transport import Transport
+from robochoc.communication.run_result import RunResult
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Robot, Team
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
+from robochoc.solver.compiled_team import CompiledRobot
+
+RUN = "run"
+
+
+class ScriptedTransport:
+    """The transport of the robot `name`: `script` says what the master answers to each message.
+
+    `heard` holds these words; what it sends to others stands in `sent`.
+    """
+
+    router = "here"
+
+    def __init__(self, name: str, script: Callable[[Word], Iterable[Item]]) -> None:
+        self.inbox: SimpleQueue[Item] = SimpleQueue()
+        self.heard: list[Word] = []
+        self.sent: list[tuple[str, bytes]] = []
+        self._name = name
+        self._script = script
+        self._letters = {MASTER: Framing(MASTER, RUN)}
+
+    def send(self, receiver: str, content: bytes) -> None:
+        if receiver != MASTER:
+            self.sent.append((receiver, content))
+            return
+        letters = self._letters[MASTER]
+        opened = letters.read(self._name, content)
+        letters.take(self._name, opened.number)
+        self.heard.append(opened.word)
+        for item in self._script(opened.word):
+            self.inbox.put(item)
+
+    def letter(self, word: Word, sender: str = MASTER) -> Arrived:
+        """The next letter of `sender` to the robot."""
+        letters = self._letters.setdefault(sender, Framing(sender, RUN))
+        return Arrived(sender, letters.write(self._name, word))
+
+    def heard_of(self, kind: type[Word]) -> list[Word]:
+        """The words of one kind."""
+        return [word for word in self.heard if isinstance(word, kind)]
+
+
+class InMemoryNetwork:
+    """A team of robots whose letters stay in this thread, and a master who does no more than has to be."""
+
+    def __init__(
+        self,
+        team: Team,
+        protocol: type[Protocol],
+        identities: dict[str, Identity] | None = None,
+        filters: Sequence[str] = (),
+        brief: RunParameters = NO_BRIEF,
+        traitor: str = "",
+    ) -> None:
+        self.traitor = traitor
+        self.inboxes: dict[str, SimpleQueue[Item]] = {name: SimpleQueue() for name in (*team.order, MASTER)}
+        self.members = Members(team.order)
+        self.tally = SearchState()
+        self.objections: list[Objection] = []
+        self.failures: dict[str, Failed] = {}
+        self._protocol = protocol
+        self._filters = tuple(filters)
+        self._brief = brief
+        self._searching = False
+        self._letters = Framing(MASTER, RUN)
+        unproven = cast("Identity", None)
+        self._robots = {
+            robot.name: SteppedRobot(
+                robot, (identities or {}).get(robot.name, unproven), InMemoryTransport(self, robot.name), protocol
+            )
+            for robot in team.robots
+        }
+        for one in self._robots.values():
+            one.begin()
+        self._settle()
+        for name, variables in self.members.unseen().items():
+            self.tell(name, Show(variables))
+        self._settle()
+
+    def search(self) -> RunResult:
+        """One search, until all is quiet."""
+        tally = self.tally = SearchState(
+            self.tally.epoch + 1, self.members.order, None, self.members.declared(self._protocol.traits)
+        )
+        tasks = self.members.tasks(tally.epoch, self._protocol.__name__, self._protocol.traits, self._brief)
+        for name, task in tasks.items():
+            self.tell(name, task)
+        self._settle()
+        if tally.ready:
+            self._tell_all(Search(tally.epoch))
+            self._searching = tally.ordered = True
+            self._settle()
+            while not (tally.verdict or tally.counters.quiescent or tally.broken_off) and tally.wave_due:
+                self._tell_all(Wave(tally.counters.begin_wave()))
+                self._settle()
+            if tally.counters.quiescent:
+                tally.verdict = tally.verdict or Verdict.SOLUTION
+        self._searching = False
+        self._tell_all(Pause())
+        self._settle()
+        return tally.result(0)
+
+    def judge(self, values: dict[str, dict[str, int]]) -> tuple[bool, float]:
+        """Have all check what was decided."""
+        for name in self.members.order:
+            self.tell(name, Judge(self.tally.epoch, self.members.neighbourhood(name, values)))
+        self._settle()
+        return self.tally.held, self.tally.cost
+
+    def leave(self) -> dict[str, Ending]:
+        """Send all home."""
+        self._tell_all(Leave("over", failed=False))
+        return {name: robot.run() for name, robot in self._robots.items()}
+
+    def tell(self, name: str, word: ToRobot) -> None:
+        """Say something to a robot."""
+        self.inboxes[name].put(Arrived(MASTER, self._letters.write(name, word)))
+
+    def _weigh(self, name: str, fault: str) -> None:
+        """Who says what cannot be is lost; of nobody but the `traitor` that is to be expected."""
+        if fault:
+            assert name == self.traitor, (name, fault)
+            self.tally.lose(name, fault)
+
+    def _tell_all(self, word: ToRobot) -> None:
+        for name in self._robots:
+            self.tell(name, word)
+
+    def _settle(self) -> None:
+        """Until nobody has anything to say, or a search has its verdict, after which robots may talk for ever."""
+        while any(not inbox.empty() for inbox in self.inboxes.values()):
+            if self._searching and self.tally.verdict is not None:
+                return
+            for name, robot in self._robots.items():
+                robot.step(_drained(self.inboxes[name]))
+            for item in _drained(self.inboxes[MASTER]):
+                if isinstance(item, Arrived):
+                    self._hear(*item)
+            if all(inbox.empty() for inbox in self.inboxes.values()):
+                for robot in self._robots.values():
+                    robot.step([])
+
+    def _hear(self, name: str, content: bytes) -> None:
+        opened = self._letters.read(name, content)
+        self._letters.take(name, opened.number)
+        match opened.word:
+            case Register(profile, visit):
+                self.members.register(name, profile, visit)
+                self.tell(name, Welcome(visit, RUN, self._filters, observed=False, private=False))
+            case Joined(visit, card):
+                self.members.robots[name].join(visit, card)
+            case Shown(variables):
+                self.members.robots[name].also.update(variables)
+            case Objection() as objection:
+                self.objections.append(objection)
+            case Failed() as failed:
+                self.failures[name] = failed
+            case OfEpoch() as word:
+                self._weigh(name, self.tally.hear(name, word))
+            case _:
+                pass
+
+
+class InMemoryTransport:
+    """One robot's post in the office."""
+
+    router = "here"
+
+    def __init__(self, office: InMemoryNetwork, name: str) -> None:
+        self.inbox = office.inboxes[name]
+        self._office = office
+        self._name = name
+
+    def send(self, receiver: str, content: bytes) -> None:
+        self._office.inboxes[receiver].put(Arrived(self._name, content))
+
+
+class SteppedRobot(NetworkRobot):
+    """A robot whose loop is turned by hand."""
+
+    def __init__(self, robot: Robot, identity: Identity, desk: InMemoryTransport, protocol: type[Protocol]) -> None:
+        super().__init__(CompiledRobot(robot), identity, cast("Transport", desk), lambda _name: protocol)
+
+    def begin(self) -> None:
+        self._register()
+
+    def step(self, items: list[Item]) -> None:
+        self._turn(items)
+
+
+def _drained(inbox: SimpleQueue[Item]) -> list[Item]:
+    return [inbox.get_nowait() for _ in range(inbox.qsize())]

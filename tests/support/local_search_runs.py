@@ -1,0 +1,104 @@
+"""Runs of synchronous local search, cycle by cycle."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from random import Random
+from typing import TypeVar
+
+from robochoc.communication.run_result import RunResult
+from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Assignment, Team
+from robochoc.protocols.cycles import CycleProtocol
+from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.agent_problem import RunParameters, agent_problems
+from robochoc.solver.compiled import Burden, LocalProblem
+
+P = TypeVar("P", bound=CycleProtocol)
+
+
+def robot_of(protocol: type[P], team: Team, name: str, *chances: float) -> P:
+    """The protocol object of one robot, not yet started, which draws `chances`, and then 0 for ever."""
+    part = agent_problems(team, shared_scopes=protocol.traits.shared_scopes)[name]
+    robot = protocol(LocalProblem(part), PriorityOrder(team.order))
+    robot.chance = itertools.chain(chances, itertools.repeat(0.0)).__next__
+    return robot
+
+
+def started(robot: CycleProtocol) -> list[tuple[str, Message]]:
+    """What `robot` says first."""
+    robot.start()
+    said = list(robot.outbox)
+    robot.outbox.clear()
+    return said
+
+
+def any_schedule(chance: Random) -> Schedule:
+    return chance.choice(
+        (RandomChannels(chance.getrandbits(32)), Concurrent(0), Concurrent(0, chance.choice((3, 200))))
+    )
+
+
+def played(
+    team: Team, protocol: type[CycleProtocol], schedule: Schedule, seed: int = 0, **settings: object
+) -> RunResult:
+    """A run of simple robots to its own end."""
+    brief = RunParameters(seed, {name: str(value) for name, value in settings.items()})
+    result = Simulation(team, protocol, schedule, brief=brief).search()
+    assert result.verdict in {Verdict.SOLUTION, Verdict.NO_SOLUTION}
+    return result
+
+
+def domains_of(team: Team) -> dict[str, list[int]]:
+    """The values that each variable may have by its robot's own constraints; one variable a robot."""
+    domains = {}
+    for name, part in agent_problems(team).items():
+        (variable,) = team[name].variables
+        problem = LocalProblem(part)
+        domains[variable.name] = [problem.solution(index)[variable.name] for index in range(len(problem.values))]
+    return domains
+
+
+def assignments_by_cycle(team: Team, result: RunResult) -> list[Assignment]:
+    """The values that all robots had in each cycle."""
+    domains = domains_of(team)
+    trails = {team[name].variables[0].name: found.trail for name, found in result.findings.items()}
+    (last,) = {trail.cycle for trail in trails.values() if trail}
+    course: list[Assignment] = []
+    for cycle in range(last + 1):
+        changed = {
+            name: domains[name][index]
+            for name, trail in trails.items()
+            for when, index in (trail.entries if trail else ())
+            if when == cycle
+        }
+        course.append({**(course[-1] if course else {}), **changed})
+    return course
+
+
+def cost_of_assignment(team: Team, assignment: Assignment) -> Burden:
+    """How many constraints `assignment` breaks, and what the others charge."""
+    prices = [constraint.price(assignment) for constraint in team.constraints()]
+    return prices.count(INFINITE), sum(price for price in prices if price < INFINITE)
+
+
+def is_optimal(team: Team, assignment: Assignment, together: int) -> bool:
+    """Whether no `together` neighbours can do better by moving at once (k-optimality; Pearce, Tambe 2007)."""
+    now = cost_of_assignment(team, assignment)
+    return all(cost_of_assignment(team, other) >= now for other in _moves(team, assignment, together))
+
+
+def _moves(team: Team, assignment: Assignment, together: int) -> Iterator[Assignment]:
+    domains = domains_of(team)
+    for names in itertools.combinations(domains, together):
+        if together == 1 or any({*names} <= {*constraint.variables} for constraint in team.constraints()):
+            for values in itertools.product(*(domains[name] for name in names)):
+                yield {**assignment, **dict(zip(names, values, strict=True))}
+
+
+def never_rises(burdens: Sequence[Burden]) -> bool:
+    return all(after <= before for before, after in itertools.pairwise(burdens))

@@ -1,0 +1,36 @@
+"""Journals of real runs, and traces of them, for the sniffer's tests."""
+
+from __future__ import annotations
+
+from functools import cache
+from random import Random
+
+from robochoc.generators.queens3d import queens3d
+from robochoc.journal.journal import Header, Journal, Recorder, read_journal
+from robochoc.model.problem import Team
+from robochoc.run.orchestrator import Options, Runtime, ScheduleName, solve
+from robochoc.run.registry import protocol_named
+from robochoc.sniffer.feed import Feed
+from robochoc.sniffer.trace import Trace
+from tests.support.cost_problems import random_cost_team
+
+
+def record(team: Team, options: Options) -> Journal:
+    """The journal of a run, written and read again."""
+    recorder = Recorder(Header(team=team.name, protocol=options.protocol, runtime=options.runtime, seed=options.seed))
+    recorder.outcome = solve(team, options, observer=recorder)
+    return read_journal(recorder.content())
+
+
+@cache
+def recorded(protocol: str, n: int = 3, schedule: ScheduleName = ScheduleName.CONCURRENT) -> Journal:
+    """A short run in the simulator: queens in space, or a few robots with costs where that is what it is about."""
+    team = random_cost_team(Random(5)) if protocol_named(protocol).traits.costs else queens3d(n)
+    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, schedule=schedule, messages=2_000, cache=False)
+    return record(team, options)
+
+
+@cache
+def feed_of(protocol: str, n: int = 3) -> Feed:
+    """The feed of that run."""
+    return Feed(Trace.of(recorded(protocol, n)))

@@ -1,0 +1,354 @@
+"""What messages say, in words: right for every type, and words for whatever a journal holds."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from random import Random
+from typing import Any, get_args
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robochoc.generators.queens3d import queens3d
+from robochoc.model.message import Message
+from robochoc.model.wording import Wording, listed
+from robochoc.protocols.dfs import Token
+from robochoc.protocols.first_fit import FirstFit
+from robochoc.protocols.protocol import Protocol
+from robochoc.run.orchestrator import Options, Runtime, Withdrawal
+from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.sniffer.feed import Feed
+from robochoc.sniffer.sentences import sentence
+from robochoc.sniffer.trace import Trace
+from tests.support.complex_problems import random_complex_team
+from tests.support.problems import random_team
+from tests.support.random_changes import random_changing_team
+from tests.support.recorded_journals import feed_of, record
+
+OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
+PROTOCOLS: list[type[Protocol]] = [*map(protocol_named, OURS), FirstFit]
+TYPES: list[type[Message]] = sorted(
+    {kind for protocol in PROTOCOLS for kind in get_args(protocol.messages) or (protocol.messages,)},
+    key=lambda kind: (kind.__name__, kind.__module__),
+)
+
+REAL = {
+    ("abt", "Ok"): "Robot1.1 says: V1.1 = 1 from now on",
+    ("abt", "Nogood"): "Robot3.2 says: as long as V1.2 = 1, V3.1 cannot be 2",
+    ("abt", "AddLink"): "Robot3.1 says: tell me V1.2 from now on",
+    ("dynabt", "Nogood"): "Robot3.2 says: as long as V1.2 = 1, V3.1 cannot be 2",
+    ("abt-do-retro", "Ok"): "Robot1.1 says: V1.1 = 3 from now on; 1 of my values is not ruled out",
+    ("abt-do-retro", "Nogood"): (
+        "Robot2.3 says: as long as V1.2 = 1, V1.3 cannot be 2; without that value, 2 of my values are not ruled out"
+    ),
+    ("abt-do-retro", "Order"): (
+        "Robot1.2 says: the order is now Robot1.1, Robot2.1, Robot1.2, Robot1.3, Robot2.2, Robot2.3, Robot3.1,"
+        " Robot3.2 and Robot3.3"
+    ),
+    ("abt-do-retro", "AddLink"): "Robot3.1 says: tell me V1.2 from now on, whenever you are above me",
+    ("agile-abt", "Ok"): (
+        "Robot3.3 says: V3.3 = 2 from now on; as long as V1.1 = 1 and V1.3 = 1, I have 1 of 3 values left"
+    ),
+    ("agile-abt", "Nogood"): "Robot3.1 says: as long as V1.1 = 1, V2.1 cannot be 3",
+    ("agile-abt", "Order"): (
+        "Robot3.3 says: the order is now Robot1.1, Robot1.3, Robot3.3, Robot2.3, Robot2.2, Robot3.1, Robot3.2,"
+        " Robot1.2 and Robot2.1"
+    ),
+    ("awc", "Ok"): "Robot3.3 says: V3.3 = 1 from now on, with priority 3",
+    ("awc", "Nogood"): "Robot1.1 says: V1.3 = 2 and V1.2 = 2 cannot both stand",
+    ("awc", "AddLink"): "Robot1.1 says: from now on let us tell each other V1.1 and V2.3",
+    (
+        "disfc",
+        "Ok",
+    ): "Robot1.1 says: my assignment number 2 stands from now on; it leaves Robot1.2 0 values of its domain",
+    ("disfc", "Nogood"): (
+        "Robot3.3 says: as long as Robot2.3 keeps its assignment number 9,"
+        " Robot3.2 cannot keep its assignment number 17"
+    ),
+    ("disfc", "AddLink"): "Robot3.1 says: tell me of each new assignment of yours from now on",
+    ("afc", "CPA"): "Robot1.2 says: so far V1.1 = 3 and V1.2 = 1; it is Robot1.3's turn",
+    ("afc", "FcCPA"): "Robot1.1 says: so far V1.1 = 1; look which of your values still go with it",
+    ("afc", "NotOk"): "Robot2.2 says: no solution has V1.1 = 1 and V1.2 = 3",
+    ("afc", "BacktrackCPA"): "Robot1.3 says: no solution has V1.1 = 3 and V1.2 = 1: take another value",
+    ("afc-ng", "CPA"): "Robot1.2 says: so far V1.1 = 3 and V1.2 = 1",
+    ("afc-ng", "Nogood"): "Robot2.1 says: V1.1 cannot be 2, whatever the others do",
+    ("afc-tree", "Nogood"): "Robot2.1 says: V1.1 cannot be 2, whatever the others do",
+    ("sbt", "CPA"): "Robot1.2 says: so far V1.1 = 3 and V1.2 = 1; it is Robot1.3's turn",
+    ("sbt", "Backtrack"): (
+        "Robot1.3 says: nobody below Robot1.2 has a value left that goes with its own: take another one"
+    ),
+    ("adopt", "Wave"): "RX03 says: RX00, which has 3 neighbours, wants to be the root",
+    ("adopt", "Token"): "RX02 says: you are my child in the tree, which holds RX00, RX02 and RX01 already",
+    ("adopt", "Back"): "RX01 says: all below me are in the tree, which holds RX00, RX02 and RX01 by now",
+    ("adopt", "Value"): "RX02 says: X02 = 1 from now on (change 23)",
+    ("adopt", "Cost"): "RX03 says: as long as X02 = -3 and X00 = 5, my subtree costs between 0 and 10",
+    ("adopt", "Threshold"): ("RX02 says: as long as X00 = -3, your subtree may cost 19 before you try other values"),
+    ("adopt", "Terminate"): "RX02 says: all above you have taken their last values: X00 = -3 and X02 = 1",
+    ("bnb-adopt", "Value"): "RX02 says: X02 = 1 from now on (change 18); your subtree may cost 8 then",
+    ("bnb-adopt", "Cost"): (
+        "RX03 says: as long as X02 = 3 and X00 = 5, my subtree costs between 0 and 10; tell me my threshold again"
+    ),
+    ("dpop", "Domain"): "RX00 says: X00 is -3, 0, 3 or 5",
+    ("dpop", "Dimensions"): (
+        "RX03 says: my table will have 16 cells over RX02 (4 values) and RX00 (4 values), and no cost above 19;"
+        " from me down the induced width is 2, and RX03 needs the most memory, 1,128 bytes"
+    ),
+    ("dpop", "Proceed"): "RX03 says: all tables fit: make yours, over RX03 and RX00",
+    ("dpop", "UTIL"): "RX01 says: a piece of my table: 16 costs, from 17 to 24",
+    ("dpop", "VALUE"): (
+        "RX03 says: by number, the values of the robots in your separator are 2 and 1, the nearest robot first"
+    ),
+    ("afb", "CPA"): (
+        "RX03 says: so far X00 = -3, X01 = -1, X02 = 1 and X03 = 3, which costs at least 22;"
+        " the best solution so far costs 26; it is RX04's turn"
+    ),
+    ("afb", "FBCPA"): "RX01 says: so far X00 = 5 and X01 = -1; what does a value of yours add to it at least?",
+    ("afb", "FBEstimate"): (
+        "RX04 says: a value of mine adds at least 3 to a CPA of 2 values; to its beginnings, the empty one first,"
+        " at least 0"
+    ),
+    ("afb", "NewSolution"): (
+        "RX04 says: the best solution so far costs 25: X00 = -3, X01 = -1, X02 = 1, X03 = 3 and X04 = -2"
+    ),
+    ("afb", "Terminate"): "RX00 says: the search is over: no solution is better than the best one so far",
+    ("syncbb", "Path"): (
+        "RX01 says: so far X00 = -3 and X01 = -1, which costs 13; the best solution so far costs 26; it is RX02's turn"
+    ),
+    ("syncbb", "Backtrack"): ("RX01 says: RX00's value leads to nothing that costs less than 25: take another one"),
+    ("syncbb", "Terminate"): (
+        "RX00 says: the search is over: nothing costs less than 25, with X00 = -3, X01 = -1, X02 = 1, X03 = 3 and"
+        " X04 = -2"
+    ),
+    ("sfb", "Above"): "RX02 says: above you there are RX00 (4 values), RX01 (2 values) and RX02 (4 values)",
+    ("sfb", "Below"): (
+        "RX02 says: below you there are RX02 (4 values), RX03 (2 values) and RX04 (3 values);"
+        " all together they cost at most 13"
+    ),
+    ("sfb", "CPAs"): "RX00 says: 1 partial assignment for RX01 to extend; no solution is known yet",
+    ("sfb", "Explored"): (
+        "RX01 says: nothing is left of the oldest partial assignments that I have had from you and have not answered"
+    ),
+    ("sfb", "Solution"): (
+        "RX04 says: a solution costs 25, less than all before; by number, robots' values in it are 1, 2, 3, 2 and 1"
+    ),
+    ("dsa", "Value"): "RX01 says: X01 = -1 in this cycle",
+    ("mgm", "Gain"): "RX02 says: my move would save 15 of cost",
+    ("mgm2", "Domain"): "RX04 says: X04 is -2, -1 or 4",
+    ("mgm2", "Offer"): (
+        "RX02 says: let us move together: of 2 values of yours and 4 of mine, the best two would save me 15 of cost"
+    ),
+    ("mgm2", "Accept"): "RX03 says: I take your offer: you take your value number 1, and we save 5 of cost in all",
+    ("mgm2", "Reject"): "RX04 says: I do not take your offer",
+    ("mgm2", "Go"): "RX03 says: no go: one of my neighbours is to move instead",
+    ("maxsum", "R"): "RX02 says: by our function, RX01's values cost 5 and 5",
+    ("maxsum", "Q"): "RX03 says: without our function, RX03's values cost 1 and 0",
+}
+
+
+@cache
+def said(protocol: str) -> dict[str, set[str]]:
+    """All that is said in a run, by the type of message."""
+    feed = feed_of(protocol)
+    return words_of(feed)
+
+
+def words_of(feed: Feed) -> dict[str, set[str]]:
+    told: dict[str, set[str]] = {kind: set() for kind in feed.trace.kinds}
+    for message, kind in enumerate(feed.trace.messages.kind):
+        told[feed.trace.kinds[kind]].add(feed.words(message))
+    return told
+
+
+@pytest.mark.parametrize(("protocol", "kind"), REAL)
+def test_what_robots_say_in_real_runs(protocol: str, kind: str) -> None:
+    assert REAL[protocol, kind] in said(protocol)[kind]
+
+
+@pytest.mark.parametrize("protocol", OURS)
+def test_no_message_of_ours_is_told_as_a_strangers(protocol: str) -> None:
+    for kind, sentences in said(protocol).items():
+        assert all(" says: " in sentence for sentence in sentences), kind
+
+
+@pytest.mark.parametrize("kind", TYPES, ids=lambda kind: f"{kind.__module__}.{kind.__name__}")
+def test_every_type_of_every_protocol_has_its_words(kind: type[Message]) -> None:
+    assert kind.in_words is not Message.in_words
+
+
+def test_a_solution_that_is_found_and_who_steps_aside() -> None:
+    team = random_team(Random(3))
+    options = Options(protocol="afc-ng", runtime=Runtime.SIMULATOR, cache=False)
+    told = words_of(Feed(Trace.of(record(team, options))))
+    (solved,) = told["Solved"]
+    assert solved.startswith(f"{team.order[-1]} says: a solution is found, and the search is over: ")
+    options = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL, cache=False)
+    told = words_of(Feed(Trace.of(record(queens3d(3), options))))
+    assert "Robot1.1 says: I fly, with V1.1 = 1" in told["Placed"]
+    assert any(sentence.endswith("says: I step aside") for sentence in told["Placed"])
+
+
+def test_a_tree_names_the_robots_on_the_branch_only() -> None:
+    for seed in range(40):
+        team = random_team(Random(seed))
+        feed = Feed(Trace.of(record(team, Options(protocol="afc-tree", runtime=Runtime.SIMULATOR, cache=False))))
+        told = words_of(feed)
+        if any(len(one) > 30 for one in told.get("CPA", ())) and "Accept" in told:
+            break
+    for message in range(len(feed.trace.messages.t)):
+        of = feed.trace.messages
+        if feed.trace.kinds[of.kind[message]] == "CPA":
+            sender = feed.trace.robots[of.sender[message]]
+            own = feed.names.wording(0, sender, sender)
+            branch = own.branch
+            assert branch[-1] == sender
+            values = [value for value, _ in feed.trace.content(message)["assignments"]]
+            assert len(values) == len(branch)
+            facts = [
+                f"{name} = {one}"
+                for robot, value in zip(branch, values, strict=True)
+                for name, one in zip(own.interfaces[robot], value, strict=True)
+            ]
+            assert feed.words(message) == f"{sender} says: so far {listed(facts)}"
+    assert all("accept its partial assignment" in one for one in told["Accept"])
+
+
+FACT = re.compile(r"(V\S+) (?:=|cannot be) (-?\d+)")
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_robots_with_several_variables_are_told_by_those_that_matter(seed: int) -> None:
+    team = random_complex_team(Random(seed))
+    team = replace(team, robots=tuple(replace(robot, private=()) for robot in team.robots))  # what needs no solver
+    feed = Feed(Trace.of(record(team, Options(protocol="abt", runtime=Runtime.SIMULATOR, cache=False))))
+    of = feed.trace.messages
+    for message in range(len(of.t)):
+        sender, receiver = (feed.trace.robots[robot[message]] for robot in (of.sender, of.receiver))
+        content = feed.trace.content(message)
+        values = {**content.get("lhs", {}), (receiver if "lhs" in content else sender): content.get("value", [])}
+        facts = {
+            (name, str(value))
+            for robot, told in values.items()
+            for name, value in zip(team[robot].interface, told, strict=bool(told))
+            if value is not None
+        }
+        words = feed.words(message)
+        assert " more" not in words
+        assert {match.groups() for match in FACT.finditer(words)} == facts, words
+
+
+def test_names_follow_the_team_through_its_epochs() -> None:
+    found = 0
+    for seed in range(40):
+        team = random_changing_team(Random(seed))
+        options = Options(protocol="dynabt", runtime=Runtime.SIMULATOR, cache=False)
+        feed = Feed(Trace.of(record(team, options)))
+        of = feed.trace.messages
+        joined = set(feed.trace.robots) - set(team.order)
+        for message in range(len(of.t)):
+            sender = feed.trace.robots[of.sender[message]]
+            if sender in joined and feed.trace.kinds[of.kind[message]] == "Ok":
+                found += 1
+                (name,) = feed.names.wording(of.run[message], sender, sender).interfaces[sender]
+                assert feed.words(message).startswith(f"{sender} says: {name} = ")
+                assert name in feed.names.variables(sender)
+        if found:
+            break
+    assert found
+
+
+# One by one
+
+ORDER = ("Robot1.1", "Robot2.1")
+TWO = Wording("Robot2.1", "Robot1.1", ORDER, {"Robot1.1": ("V", "W"), "Robot2.1": ("V2.1",)}, ORDER)
+
+
+def type_with(kind: str, content: Mapping[str, Any]) -> type[Message]:
+    """A type of that name with those fields; of several, any."""
+    return next(one for one in TYPES if one.__name__ == kind and set(one.__struct_fields__) == {*content})
+
+
+@pytest.mark.parametrize(
+    ("kind", "content", "words"),
+    [
+        ("Nogood", {"lhs": {"Robot2.1": [3]}, "value": [1, 2]},
+         "as long as V2.1 = 3, V = 1 and W = 2 cannot both hold"),
+        ("Nogood", {"lhs": {"Robot2.1": [3]}, "value": [None, 2]}, "as long as V2.1 = 3, W cannot be 2"),
+        ("Nogood", {"lhs": {"Robot2.1": [None]}, "value": [1, None]}, "V cannot be 1, whatever the others do"),
+        ("Nogood", {"lhs": {}, "value": [None, None]}, "Robot1.1 has no value left, whatever the others do"),
+        ("Nogood", {"lhs": {"Robot9.9": [3]}, "value": [1, None]}, "as long as Robot9.9 = 3, V cannot be 1"),
+        ("Nogood", {"lhs": {"X": [3, 4]}, "value": [1, None]}, "as long as X[1] = 3 and X[2] = 4, V cannot be 1"),
+        ("Ok", {"value": [None]}, "I step aside from now on"),
+        ("AddLink", {}, "tell me V and W from now on"),
+        ("NotOk", {"assignments": [], "sc": 1}, "there is no solution"),
+        ("Solved", {"solution": {"Robot1.1": [None, None], "Robot2.1": [3]}},
+         "a solution is found, and the search is over: Robot1.1 steps aside and V2.1 = 3"),
+        ("Placed", {"value": None}, "I step aside"),
+        ("Cost", {"context": {}, "lb": math.inf, "ub": math.inf}, "my subtree has no solution"),
+        ("Cost", {"context": {"Robot1.1": [[1, 2], 4]}, "lb": 3, "ub": 3.0},
+         "as long as V = 1 and W = 2, my subtree costs 3"),
+        ("Cost", {"context": {}, "lb": 2.5, "ub": None}, "my subtree costs at least 2.5"),
+        ("Value", {"value": [3], "counter": 2, "threshold": None}, "V2.1 = 3 from now on (change 2)"),
+        ("Terminate", {"best": [None, []]}, "the search is over, and there is no solution"),
+        ("Terminate", {"context": {}}, "all above you have taken their last values"),
+        ("Backtrack", {"best": [None, []]}, "Robot1.1's value leads to no solution: take another one"),
+        ("CPA", {"assignments": [[[1, 2], 1]], "bound": None, "least": []},
+         "no solution has V = 1 and W = 2: take another value"),
+        ("CPAs", {"count": 1, "rows": "", "least": 7, "ceiling": 9},
+         "1 partial assignment for Robot1.1 to extend; the best solution so far costs 7"),
+        ("Below", {"domains": [], "charges": [], "runs": [], "most": 0}, "nobody is below me"),
+        ("UTIL", {"width": 1, "costs": bytes([3, 255, 9])},
+         "a piece of my table: 3 costs, from 3 to 9, and 1 infinite"),
+        ("UTIL", {"width": 2, "costs": "//8="}, "a piece of my table: 1 cost, and 1 infinite"),
+        ("VALUE", {"assignment": []}, "nobody above you has to do with your subtree: take your best value"),
+        ("Domain", {"values": [[1], [2], [None]]}, "V2.1 is 1 or 2, or I step aside"),
+        ("Gain", {"broken": 2, "cost": 0}, "my move would save 2 broken constraints"),
+        ("Gain", {"broken": 1, "cost": 3}, "my move would save 1 broken constraint and 3 of cost"),
+        ("Gain", {"broken": 0, "cost": 0.0}, "my move would save nothing"),
+        ("Offer", {"gains": None}, "I have no offer for you"),
+        ("Go", {"go": True}, "go: of my neighbours, nobody is to move before us"),
+        ("R", {"rows": [[0, math.inf], [1, 2]]},
+         "by our 2 functions, one after the other, Robot1.1's values cost 0 and infinity; 1 and 2"),
+        ("Proceed", {"separator": []}, "all tables fit: make yours"),
+    ],
+)  # fmt: skip
+def test_the_rarer_things_that_are_said(kind: str, content: dict[str, Any], words: str) -> None:
+    assert sentence(kind, content, TWO, type_with(kind, content)) == f"Robot2.1 says: {words}"
+
+
+def test_long_contents_are_cut() -> None:
+    names = [f"R{place}" for place in range(20)]
+    told = sentence("Token", {"visited": names}, TWO, Token)
+    assert told.endswith("holds R0, R1, R2, R3, R4, R5, R6, R7 and 12 more already")
+    assert len(sentence("Token", {"visited": ["x" * 500] * 9}, TWO, Token)) == 1000
+
+
+def test_a_users_own_type_is_told_by_its_fields() -> None:
+    content = {"price": 3, "item": "x" * 100, "many": list(range(50)), "few": [1, 2]}
+    told = sentence("Bid", content, TWO, None)
+    assert told == f"Robot2.1 says Bid (inform): price = 3, item = {'x' * 59}…, many = 50 entries and few = [1,2]"
+    assert sentence("Ok", {"value": [3]}, TWO, None) == "Robot2.1 says Ok (inform): value = [3]"
+    assert sentence("Bye", {}, TWO, None) == "Robot2.1 says Bye (inform)"
+
+
+anything = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | st.binary(max_size=9),
+    lambda inner: (
+        st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4) | st.just("Robot1.1"), inner, max_size=3)
+    ),
+    max_leaves=8,
+)
+
+
+@given(st.sampled_from(TYPES), st.data())
+@settings(max_examples=100, deadline=None)
+def test_there_are_words_for_whatever_a_journal_holds(kind: type[Message], data: st.DataObject) -> None:
+    content: Mapping[str, Any] = {name: data.draw(anything) for name in kind.__struct_fields__}
+    told = sentence(kind.__name__, content, TWO, kind)
+    assert told.startswith("Robot2.1 says")
+    assert len(told) <= 1000
+    assert told.isprintable()
