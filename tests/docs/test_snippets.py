@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.machines import free_port
+from tests.support.deployments import free_port
 from tests.support.program import ROOT
 from tests.support.snippets import LONG_S, Block, Reader, Step, agrees, blocks_of, steps_of
 
