@@ -34,7 +34,7 @@ from robochoc.model.problem import (
     Semantics,
     Team,
 )
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 
 RAW = ROOT / "out" / "bench" / "dynamic.csv"
 DATA = Path(__file__).with_name("data") / "dynamic.csv"

@@ -26,7 +26,7 @@ forbids (`_refuse_below`). Such a value is forgotten once it is refused, as that
 same again, is sure to come. Without a PKC nothing changes.
 
 >>> from robochoc.generators.queens3d import queens3d
->>> from robochoc.run.orchestrator import Options, Runtime, solve
+>>> from robochoc.run import Options, Runtime, solve
 >>> outcome = solve(queens3d(4), Options(protocol="abt", runtime=Runtime.SIMULATOR))
 >>> outcome.verdict.value, outcome.witness
 ('no-solution', 'Robot1.1')

@@ -16,7 +16,7 @@ from robochoc.model.change import ChangeError, keep_interfaces, team_after_event
 from robochoc.model.orders import Order, OrderError, compute_order, with_priorities
 from robochoc.model.problem import Robot, Team
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
-from robochoc.replay.steps import Run
+from robochoc.replay.steps import RecordedRun
 from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_by_name
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.agent_problem import AgentProblem, RunParameters
@@ -49,7 +49,7 @@ class CannotReplayError(Exception):
         self.broken = broken
 
 
-class Means(NamedTuple):
+class ReplayOptions(NamedTuple):
     """What a replay may use.
 
     `team` is the one in the files, for runs whose journals do not say what robots were given; `protocols` are, by
@@ -66,7 +66,7 @@ class Means(NamedTuple):
     solver: AceProcess | None = None
 
 
-class Ensemble(NamedTuple):
+class RebuiltRobots(NamedTuple):
     """The robots of one run, ready to begin: the protocol, their hosts, and what each of them knows.
 
     Those in `mindful` go on with what they found out in the epoch before. `compiled` is what they were made of.
@@ -80,13 +80,13 @@ class Ensemble(NamedTuple):
     compiled: CompiledTeam
 
 
-class Cast:
+class Rebuilder:
     """Makes the robots of one run after the other; those that go on from one epoch to the next are the same.
 
     `only` names those that are to play (None: all).
     """
 
-    def __init__(self, header: Header | None, means: Means, only: Collection[str] | None = None) -> None:
+    def __init__(self, header: Header | None, means: ReplayOptions, only: Collection[str] | None = None) -> None:
         self._header = header
         self._means = means
         self._only = only
@@ -95,7 +95,7 @@ class Cast:
         self._before: Mapping[str, CompiledRobot] = {}
         self._lost: set[str] = set()
 
-    def enter(self, run: Run) -> Ensemble:
+    def enter(self, run: RecordedRun) -> RebuiltRobots:
         """The robots of `run`. Raises `CannotReplayError`."""
         protocol = self._protocol(run)
         try:
@@ -112,9 +112,9 @@ class Cast:
         kept = issubclass(protocol, DynamicProtocol)
         mindful = [name for name in parts if kept and name in before and name not in epoch.restarted]
         lossless = run.given is None or run.given.quiet
-        return Ensemble(protocol, self._hosts, parts, lossless, mindful, epoch.compiled)
+        return RebuiltRobots(protocol, self._hosts, parts, lossless, mindful, epoch.compiled)
 
-    def _protocol(self, run: Run) -> type[Protocol]:
+    def _protocol(self, run: RecordedRun) -> type[Protocol]:
         """The class that the run names; of a master's journal, the header's."""
         asked = self._header.protocol if self._header else None
         if run.began is None:
@@ -135,7 +135,7 @@ class Cast:
         except UnknownProtocolError as unknown:
             raise CannotReplayError(str(unknown)) from unknown
 
-    def _epoch(self, run: Run, protocol: type[Protocol]) -> Epoch:
+    def _epoch(self, run: RecordedRun, protocol: type[Protocol]) -> Epoch:
         if run.given is not None and not (run.given.why and self._means.team):
             return self._as_given(run.given)
         return self._as_filed(run, protocol)
@@ -144,7 +144,7 @@ class Cast:
         compiled = self._compiled(self._reader.team(given))
         return Epoch(compiled, void_of(given), frozenset(given.fresh), brief_of(given))
 
-    def _as_filed(self, run: Run, protocol: type[Protocol]) -> Epoch:
+    def _as_filed(self, run: RecordedRun, protocol: type[Protocol]) -> Epoch:
         """What the files say, for a run whose journal does not; robots that were lost before are left out."""
         if self._means.team is None:
             raise CannotReplayError(

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from robochoc.replay.insight import states_of
+from robochoc.replay.robot_states import states_of
 from tests.support.sniffer_pages import (
     ALL,
     COUNT,

@@ -7,7 +7,7 @@ import pytest
 from robochoc.formats import read_team
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.cost_problems import least_cost
 from tests.support.program import ROOT

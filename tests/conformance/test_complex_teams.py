@@ -15,7 +15,7 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.orders import with_order
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Robot, Team
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver import compiled
 from robochoc.solver.ace import AceProcess

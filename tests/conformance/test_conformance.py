@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from robochoc.communication.run_result import RunResult
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE, Team
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.verification.checker import violations
 from tests.support.loose_problems import any_order, loosened, minimum_cost

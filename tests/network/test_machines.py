@@ -11,7 +11,7 @@ import pytest
 
 from robochoc.formats import read_team
 from robochoc.model.outcome import Verdict
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.verification.checker import violations
 from tests.support.deployments import PAIR, TRIANGLE, Deployment, Program, ended, one_line, written
 from tests.support.journal_entries import entries_of

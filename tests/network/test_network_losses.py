@@ -15,7 +15,7 @@ from robochoc.journal.events import AnyEvent, Lost, Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint
 from robochoc.run.registry import protocol_named
-from robochoc.run.scenario import Played, ScenarioRun
+from robochoc.run.scenario import FinishedEpoch, ScenarioRun
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.checker import violations
@@ -46,18 +46,18 @@ def test_those_who_are_left_go_on_with_the_values_that_they_had(tmp_path: Path) 
         events.append(event)
 
     brief = RunParameters(settings={"file": str(go)})
-    journey = ScenarioRun(TEAM, None, CompiledTeam, lambda: None, brief=brief)
-    played: list[Played] = []
+    journey = ScenarioRun(TEAM, None, CompiledTeam, lambda: None, parameters=brief)
+    played: list[FinishedEpoch] = []
     with LocalNetwork(
         journey.compiled(), PausedABT, observer=observe, conditions=NetworkSettings(survive=True), brief=brief
     ) as network:
-        for one in journey.go(network, lambda _: None):
+        for one in journey.epochs(network, lambda _: None):
             played.append(one)
             shown = {name: member.robot.interface for name, member in network.master.members.robots.items()}
-            assert shown == {robot.name: robot.interface for robot in one.compiled.team.robots}
+            assert shown == {robot.name: robot.interface for robot in one.epoch.team.robots}
     first, second = played
     assert list(first.result.lost) == ["B"]
-    assert second.compiled.team["V"].interface == ("v", "w")
+    assert second.epoch.team["V"].interface == ("v", "w")
     assert second.result.verdict is Verdict.SOLUTION
     assert second.result.assignments["V"]["v"] != second.result.assignments["A"]["a"]
 

@@ -27,7 +27,7 @@ from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.sfb import SFB
 from robochoc.protocols.traits import Traits
-from robochoc.run.networked.lead import claimed
+from robochoc.run.networked.machines import claimed
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support import traitors
 from tests.support.in_memory_network import InMemoryNetwork

@@ -18,8 +18,8 @@ from robochoc.protocols.findings import Trail
 from robochoc.protocols.maxsum import MaxSum
 from robochoc.protocols.mgm import MGM
 from robochoc.protocols.mgm2 import MGM2
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.incumbent import best_of
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam

@@ -34,9 +34,10 @@ def played(team: Team, schedule: Schedule) -> Counter[Verdict]:
     journey = ScenarioRun(team, None, compiled_by_brute_force, lambda: None)
     seen = Counter[Verdict]()
     with Simulation(journey.compiled(), protocol_named("dynabt"), schedule) as session:
-        epochs = list(journey.go(session, lambda _: None))
-    for now, (then, result, *_) in zip(stages(team), epochs, strict=True):
-        assert now.order == then.order
+        epochs = list(journey.epochs(session, lambda _: None))
+    for now, epoch in zip(stages(team), epochs, strict=True):
+        result = epoch.result
+        assert now.order == epoch.team.order
         if result.verdict is not Verdict.UNKNOWN:
             check(now, result)
             seen[result.verdict] += 1

@@ -17,7 +17,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ConstraintModel, Team
 from robochoc.protocols.abt import ABT, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError

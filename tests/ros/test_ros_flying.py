@@ -17,7 +17,7 @@ from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import RemoveAgent, RemoveValue, ScenarioEvent
 from robochoc.ros.closed_loop import ClosedLoop, drones_of
 from robochoc.ros.simulated_feedback import CannotFlyError, FlightSettings, SimulatedFeedback, UnknownDroneError
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.verification.checker import violations
 from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import ROOT
@@ -42,7 +42,7 @@ class Looped:
 def looped(surroundings: FlightSettings, options: Options = SIMULATED, *, scale: float | None = None) -> Looped:
     flying = SimulatedFeedback(surroundings)
     loop = ClosedLoop(HANGAR, (), flying, scale=scale)
-    outcome = solve(HANGAR, options, field=loop)
+    outcome = solve(HANGAR, options, environment=loop)
     flown = flying.flown()
     assert flown is not None
     assert loop.mission is not None

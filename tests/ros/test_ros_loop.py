@@ -20,7 +20,7 @@ from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.source import ReceivedMessage, Source, SourceError
 from robochoc.ros.source_feedback import SourceFeedback
-from robochoc.run.orchestrator import OnLoss, Options, Runtime, Withdrawal, solve
+from robochoc.run import OnLoss, Options, Runtime, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.clocks import waiting
 from tests.support.problems import ON_ONE_MACHINE
@@ -55,7 +55,7 @@ def openings(outcome: Outcome) -> list[str]:
 @pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_a_field_is_told_each_epoch_and_says_the_next(runtime: Runtime) -> None:
     field = Says(ScenarioEvent((RemoveValue("A", 1),)), ScenarioEvent((RemoveAgent("RB"),)))
-    outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=runtime), field=field)
+    outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=runtime), environment=field)
     assert openings(outcome) == ["the start", "A without 1", "-RB"]
     assert [(order, left_s) for order, _, left_s in field.summary] == [(("RA", "RB"), None)] * 2 + [(("RA",), None)]
     assert [epoch for _, epoch, _ in field.summary] == [*outcome.epochs]
@@ -68,28 +68,30 @@ def test_what_cannot_be_is_passed_over() -> None:
         ScenarioEvent((RemoveAgent("RX"), RemoveValue("A", 9), RemoveValue("A", 1))),
         ScenarioEvent((RemoveAgent("RX"),)),
     )
-    outcome = solve(pair(values=3), SIMULATED, field=field)
+    outcome = solve(pair(values=3), SIMULATED, environment=field)
     assert openings(outcome) == ["the start", "A without 1", "nothing"]
     team = pair(values=3)
     there = Says(ScenarioEvent((AddAgent(team["RB"]),)))
-    assert openings(solve(team, SIMULATED, field=there)) == ["the start", "nothing"]
+    assert openings(solve(team, SIMULATED, environment=there)) == ["the start", "nothing"]
 
 
 def test_the_files_own_events_come_first() -> None:
     team = pair(ScenarioEvent((RemoveValue("A", 1),)), values=3)
-    outcome = solve(team, SIMULATED, field=Says(ScenarioEvent((RemoveValue("A", 2), RemoveValue("A", 1)))))
+    outcome = solve(team, SIMULATED, environment=Says(ScenarioEvent((RemoveValue("A", 2), RemoveValue("A", 1)))))
     assert openings(outcome) == ["the start", "A without 1", "A without 2"]
     assert outcome.events == 2
 
 
 def test_without_a_field_a_problem_that_does_not_change_has_no_epochs() -> None:
     assert solve(pair(values=3), SIMULATED).epochs == ()
-    assert len(solve(pair(values=3), SIMULATED, field=Says()).epochs) == 1
+    assert len(solve(pair(values=3), SIMULATED, environment=Says()).epochs) == 1
 
 
 def test_an_epoch_without_a_solution_may_be_followed_by_one_with() -> None:
     values = tuple(RemoveValue("A", value) for value in (1, 2, 3))
-    outcome = solve(pair(values=3), SIMULATED, field=Says(ScenarioEvent(values), ScenarioEvent((RemoveAgent("RA"),))))
+    outcome = solve(
+        pair(values=3), SIMULATED, environment=Says(ScenarioEvent(values), ScenarioEvent((RemoveAgent("RA"),)))
+    )
     assert [epoch.verdict for epoch in outcome.epochs] == ["solution", "no-solution", "solution"]
 
 
@@ -103,7 +105,7 @@ def test_an_epoch_without_a_solution_may_be_followed_by_one_with() -> None:
 )
 def test_what_a_changing_problem_cannot_have_is_refused(options: Options, named: str) -> None:
     with pytest.raises(UnsupportedError, match=f"{named} is for problems that do not change"):
-        solve(pair(values=3), options, field=Says())
+        solve(pair(values=3), options, environment=Says())
 
 
 def test_when_the_time_is_over_nothing_that_comes_is_heeded() -> None:
@@ -114,7 +116,7 @@ def test_when_the_time_is_over_nothing_that_comes_is_heeded() -> None:
             return super().__call__(team, epoch, left_s)
 
     field = Slow(ScenarioEvent((RemoveValue("A", 1),)))
-    outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1), field=field)
+    outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1), environment=field)
     assert (outcome.verdict, openings(outcome)) == (Verdict.UNKNOWN, ["the start", "A without 1"])
     assert field.summary[-1][2] == 0
     assert "--timeout" in (outcome.reason or "")
@@ -122,7 +124,7 @@ def test_when_the_time_is_over_nothing_that_comes_is_heeded() -> None:
 
 def test_when_all_messages_are_sent_nothing_that_comes_is_heeded() -> None:
     field = Says()
-    outcome = solve(HANGAR, replace(SIMULATED, messages=3), field=field)
+    outcome = solve(HANGAR, replace(SIMULATED, messages=3), environment=field)
     assert (outcome.verdict, field.summary[-1][2]) == (Verdict.UNKNOWN, 0)
 
 
@@ -142,10 +144,10 @@ def test_a_robot_that_dies_while_the_team_waits_is_lost() -> None:
     options = Options(protocol="dynabt")
     event = ScenarioEvent((RemoveValue("A", 1),))
     with pytest.raises(RobotsLostError) as lost:
-        solve(pair(values=3), options, field=Striking(event))
+        solve(pair(values=3), options, environment=Striking(event))
     assert "RB" in lost.value.robots
     surviving = Options(protocol="dynabt", on_loss=OnLoss.WITHDRAW)
-    outcome = solve(pair(values=3), surviving, field=Striking(event))
+    outcome = solve(pair(values=3), surviving, environment=Striking(event))
     assert openings(outcome) == ["the start", "A without 1", "the loss of RB"]
     assert (outcome.lost, outcome.assignment) == (("RB",), {"A": 2})
 
@@ -157,7 +159,7 @@ def test_no_process_outlives_a_field_that_fails(error: BaseException | type[Base
         raise error
 
     with pytest.raises((KeyboardInterrupt, SourceError)):
-        solve(pair(values=3), Options(protocol="dynabt"), field=fails)
+        solve(pair(values=3), Options(protocol="dynabt"), environment=fails)
     assert multiprocessing.active_children() == []
 
 
@@ -214,7 +216,7 @@ def at(seconds: float, topic: str, fields: Mapping[str, object]) -> ReceivedMess
 def listened(*messages: ReceivedMessage, sink: Sink | None = None, team: Team = HANGAR) -> tuple[Outcome, ClosedLoop]:
     feedback = SourceFeedback(Tape(*messages), ReportDecoder(drones_of(team), "map"))
     loop = ClosedLoop(team, [sink] if sink else [], feedback)
-    return solve(team, SIMULATED, field=loop), loop
+    return solve(team, SIMULATED, environment=loop), loop
 
 
 def test_the_first_report_that_changes_the_problem_opens_an_epoch() -> None:
@@ -284,7 +286,7 @@ def live(patience_s: float, *messages: ReceivedMessage) -> tuple[ClosedLoop, Cal
 def test_a_live_source_is_waited_for_and_somebody_told_so() -> None:
     loop, waited = live(0.5, at(time.time(), "/port/blocked", PORTS))
     with waiting(30, at_least_s=0.9):
-        outcome = solve(HANGAR, SIMULATED, field=loop)
+        outcome = solve(HANGAR, SIMULATED, environment=loop)
     assert openings(outcome) == ["the start", "port without 3"]
     assert waited() >= 2
 
@@ -292,7 +294,7 @@ def test_a_live_source_is_waited_for_and_somebody_told_so() -> None:
 def test_waiting_is_bounded_by_the_time_for_all() -> None:
     loop, _ = live(60)
     with waiting(30):
-        outcome = solve(HANGAR, Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1.5), field=loop)
+        outcome = solve(HANGAR, Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1.5), environment=loop)
     assert (outcome.verdict, openings(outcome)) == (Verdict.SOLUTION, ["the start"])
 
 
@@ -306,5 +308,5 @@ def test_the_team_of_a_run_nobody_changed_is_as_its_files_have_it() -> None:
 
 def test_a_field_for_whoever_uses_the_library() -> None:
     field = Says(ScenarioEvent((RemoveValue("port", 3),)))
-    outcome = Problem(HANGAR).solve("dynabt", "simulator", field=field)
+    outcome = Problem(HANGAR).solve("dynabt", "simulator", environment=field)
     assert openings(outcome) == ["the start", "port without 3"]

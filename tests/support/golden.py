@@ -9,7 +9,7 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Given
 from robochoc.journal.journal import Header, Recorder, lines_of, read_journal
 from robochoc.model.problem import Constraint, ProblemKind, Relation, Semantics, Team
-from robochoc.run.orchestrator import Options, Runtime, ScheduleName, Withdrawal, solve
+from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.problems import team_of
 from tests.support.program import ROOT

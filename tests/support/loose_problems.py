@@ -25,8 +25,8 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
+from robochoc.run import solve
 from robochoc.run.options import Options
-from robochoc.run.orchestrator import solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
 from tests.support.complex_problems import random_complex_team

@@ -12,7 +12,7 @@ from robochoc.journal.events import AnyEvent, Began, Given
 from robochoc.journal.journal import Header, Journal, Recorder, read_journal
 from robochoc.model.orders import Order
 from robochoc.model.problem import ConstraintModel, ProblemKind, Team
-from robochoc.run.orchestrator import Options, Withdrawal, solve
+from robochoc.run import Options, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
 from tests.support.complex_changes import random_complex_changing_team

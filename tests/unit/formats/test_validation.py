@@ -46,8 +46,8 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
+from robochoc.run import solve
 from robochoc.run.options import Options, Runtime
-from robochoc.run.orchestrator import solve
 from tests.support.broken import CASES
 from tests.support.broken_case import TEAM, write_files
 from tests.support.broken_objects import AS_IN_FILES, OF_OBJECTS, breakages
@@ -202,7 +202,7 @@ def test_what_a_field_says_is_held_against_the_rules(change: Change, message: st
     newcomer = AddAgent(Robot("RC", (Variable("C", Domain("D", (range(2),))),)))
     event = ScenarioEvent((newcomer, change))
     with pytest.raises(InvalidInputError, match=message):
-        solve(team, replace(HERE, protocol="dynabt"), field=lambda *_: event)
+        solve(team, replace(HERE, protocol="dynabt"), environment=lambda *_: event)
 
 
 # Found valid once

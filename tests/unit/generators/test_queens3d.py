@@ -11,7 +11,7 @@ from robochoc.formats import read_robot, read_team, write_team
 from robochoc.generators.queens3d import QueensModel, queens3d
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.verification.checker import needlessly_withdrawn, violations
 from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import ROOT

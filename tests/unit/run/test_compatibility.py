@@ -9,8 +9,8 @@ import pytest
 
 from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind, Relation, Semantics, Team
 from robochoc.run import compatibility as refusals
+from robochoc.run import solve
 from robochoc.run.options import Options, Runtime, Withdrawal
-from robochoc.run.orchestrator import solve
 from robochoc.run.registry import Offer, offers
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.exact import EXACT

@@ -17,7 +17,7 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.model.change import without_robots
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from tests.support.faults import PROGRAM, Run, running
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")

@@ -74,7 +74,7 @@ def team(tmp_path: Path) -> Team:
 def travel(team: Team, losses: Sequence[str], spares: int = 0) -> tuple[ScenarioRun, Losing, list[Team]]:
     journey = ScenarioRun(team, None, CompiledTeam, lambda: None, spares=spares)
     session = Losing(journey.team, losses)
-    return journey, session, [played.team for played in journey.go(session, lambda _: None)]
+    return journey, session, [played.team for played in journey.epochs(session, lambda _: None)]
 
 
 def test_who_is_lost_leaves(team: Team) -> None:
@@ -129,7 +129,7 @@ def test_a_file_that_cannot_be_read_keeps_its_robot_away(team: Team) -> None:
     Path(team["RB"].file).write_text("<instance>")
     journey, _, _ = travel(team, ["RB"], spares=1)
     assert journey.withdrawn == ["RB"]
-    assert "RB could not come back" in journey.regrets[0]
+    assert "RB could not come back" in journey.failed_returns[0]
 
 
 def test_a_file_that_has_lost_a_variable_meanwhile_does_not_stop_the_scenario(team: Team) -> None:

@@ -14,7 +14,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import (
     Team,
 )
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.central import CentralSolver, Judgement
 from robochoc.verification.checker import violations

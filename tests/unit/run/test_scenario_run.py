@@ -32,8 +32,8 @@ from robochoc.model.problem import (
     Variable,
 )
 from robochoc.protocols.dynabt import DynABT
-from robochoc.run.orchestrator import Options, Runtime, solve
-from robochoc.run.scenario import Played, ScenarioRun
+from robochoc.run import Options, Runtime, solve
+from robochoc.run.scenario import FinishedEpoch, ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import invalidated_by
 from tests.support.problems import team_of
@@ -81,11 +81,11 @@ def journey_of(team: Team, *, spares: int = 0, messages: int | None = None) -> S
     return ScenarioRun(team, None, CompiledTeam, lambda: None, messages=messages, spares=spares)
 
 
-def travel(journey: ScenarioRun, session: Scripted) -> list[Played]:
-    return list(journey.go(session, lambda _: None))
+def travel(journey: ScenarioRun, session: Scripted) -> list[FinishedEpoch]:
+    return list(journey.epochs(session, lambda _: None))
 
 
-def teams(played: Sequence[Played]) -> list[tuple[str, ...]]:
+def teams(played: Sequence[FinishedEpoch]) -> list[tuple[str, ...]]:
     return [one.team.order for one in played]
 
 
@@ -128,7 +128,7 @@ def test_a_team_that_all_have_left_may_be_joined() -> None:
     assert teams(travel(journey_of(team), Scripted(team))) == [("RA", "RB", "RC"), (), ("RD",)]
     news = iter(team.scenario)
     here = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
-    outcome = solve(BASE, here, field=lambda *_: next(news, None))  # a scenario must leave somebody, as in files
+    outcome = solve(BASE, here, environment=lambda *_: next(news, None))  # a scenario must leave somebody, as in files
     assert [str(epoch.verdict) for epoch in outcome.epochs] == ["solution"] * 3
 
 

@@ -23,7 +23,7 @@ from robochoc.formats.xcsp3 import xcsp3
 from robochoc.generators.queens3d import QueensModel, QueensRobots, queens3d
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics
-from robochoc.run.orchestrator import Options, solve
+from robochoc.run import Options, solve
 from robochoc.solver import ace as front
 from robochoc.solver import propagation
 from robochoc.solver.ace import AceProcess

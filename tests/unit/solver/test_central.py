@@ -17,7 +17,7 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.model.expression import Type, parse
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Predicate, Relation, Semantics, Team
-from robochoc.run.orchestrator import Options, RefutedError, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_words import Solved
 from robochoc.solver.central import CentralSolver, Judgement
@@ -26,6 +26,7 @@ from robochoc.solver.encoding import Codes, Component, Network, Table
 from robochoc.solver.failures import SolverLostError
 from robochoc.solver.merged import identifiers
 from robochoc.solver.symmetry import Symmetry, broken, orbits, symmetries
+from robochoc.verification.checker import RefutedError
 from tests.support.clocks import waiting
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.problems import solutions

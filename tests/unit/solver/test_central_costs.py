@@ -19,16 +19,16 @@ from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.incumbent import absent
-from robochoc.run.orchestrator import Options, RefutedError, Runtime, Withdrawal, solve
-from robochoc.run.second_opinion import contradiction
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_words import Solved
 from robochoc.solver.central import CentralSolver, Judgement
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.failures import SolverLostError
-from robochoc.verification.checker import violations
+from robochoc.verification.checker import RefutedError, violations
 from robochoc.verification.objective import withdrawal_cost
+from robochoc.verification.second_opinion import contradiction
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import (
     cost_of,

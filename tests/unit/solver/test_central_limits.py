@@ -14,8 +14,8 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics
+from robochoc.run import Options, solve
 from robochoc.run.incumbent import absent
-from robochoc.run.orchestrator import Options, solve
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import CentralSolver, Judgement
 from robochoc.solver.encoding import Codes, Network, Table

@@ -20,9 +20,9 @@ from robochoc.model.orders import with_dom_deg_order, with_priorities
 from robochoc.model.problem import AddConstraint, Child, Constraint, Parent, Robot, ScenarioEvent, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.traits import Traits
-from robochoc.replay.rebuild import Cast, Means
-from robochoc.replay.steps import Run
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.replay.rebuild import Rebuilder, ReplayOptions
+from robochoc.replay.steps import RecordedRun
+from robochoc.run import Options, Runtime, solve
 from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.agent_problem import NO_BRIEF, agent_problems
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, as_compiled
@@ -62,7 +62,7 @@ def test_every_form_of_a_team_lines_up_with_its_domains() -> None:
         for order in every_order(team, chance):
             journey = ScenarioRun(team, order if isinstance(order, tuple) else None, CompiledTeam, lambda: None)
             assert lined_up(journey.compiled())
-            assert journey.compiled().team == journey.arranged()
+            assert journey.compiled().team == journey.ordered_team()
         assert lined_up(CompiledTeam(with_dom_deg_order(team)))
         left = without_robots(team, chance.sample(team.order, len(team.order) - 1))
         assert lined_up(CompiledTeam(left))
@@ -197,10 +197,10 @@ def test_who_plays_machines_again_knows_what_they_showed_and_what_it_cost_to_ste
     pairs = [("A", "B"), ("B", "C")]
     constraints = [Constraint("C", _UNLIKE, pair, pair, cost=5) for pair in pairs]
     team = with_costs(team_of(dict.fromkeys("ABC", (1, 2)), constraints))
-    cast = Cast(Header(team="t", protocol="abt", runtime="network", seed=0), Means(team=team))
+    cast = Rebuilder(Header(team="t", protocol="abt", runtime="network", seed=0), ReplayOptions(team=team))
     decided = Decided(t=0, robot="RA", assignment={}, clock=0)
-    cast.enter(Run(0, Began(t=0, protocol="DPOP"), None, [decided, Lost(t=1, robot="RB", why="gone")]))
-    part = cast.enter(Run(1, Began(t=0, protocol="DPOP"), None, [decided])).parts["RC"]
+    cast.enter(RecordedRun(0, Began(t=0, protocol="DPOP"), None, [decided, Lost(t=1, robot="RB", why="gone")]))
+    part = cast.enter(RecordedRun(1, Began(t=0, protocol="DPOP"), None, [decided])).parts["RC"]
     assert part.interfaces == {"RA": ("A",), "RC": ("C",)}
     assert part.brief.aside == 1 + 5
 

@@ -15,7 +15,7 @@ import pytest
 from robochoc.formats import PREDEFINED, write_team
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Team
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.solver import ace as front
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.cache import SolutionCache

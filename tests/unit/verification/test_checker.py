@@ -15,8 +15,14 @@ from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.orchestrator import Options, RefutedError, Runtime, solve
-from robochoc.verification.checker import assignment_cost, constraint_cost, needlessly_withdrawn, violations
+from robochoc.run import Options, Runtime, solve
+from robochoc.verification.checker import (
+    RefutedError,
+    assignment_cost,
+    constraint_cost,
+    needlessly_withdrawn,
+    violations,
+)
 from tests.support.problems import ON_ONE_MACHINE, team_of, teams
 
 

@@ -19,7 +19,7 @@ from robochoc.flight.layout import Layout, Point, layout_of
 from robochoc.formats import InvalidInputError, robot_in
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import Assignment, Robot
-from robochoc.sniffer.feed import BadRequestError
+from robochoc.sniffer.page_data import BadRequestError
 from robochoc.sniffer.trace import Trace
 from robochoc.view.drawing import path_of, still
 from robochoc.view.scene import DrawnDrone, Scene
@@ -35,7 +35,7 @@ Move = tuple[int, int, float, float, float]
 
 def whole_scene(trace: Trace) -> bytes:
     """The scene of a trace to which nothing will be added, by the robots' files that it holds; JSON."""
-    stage = Stage(trace, robots_given(trace))
+    stage = TraceScene(trace, robots_given(trace))
     return msgspec.json.encode(stage.answer() if stage else None)
 
 
@@ -48,7 +48,7 @@ def robots_given(trace: Trace) -> dict[str, Robot]:
     return robots
 
 
-class Stage:
+class TraceScene:
     """The drones of one trace. `robots` are those whose files are known; of others only what they decide is.
 
     The box holds all places that known robots might take, and those that others have taken by now.
