@@ -38,6 +38,7 @@ def reader_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reader:
         shutil.copytree(ROOT / part, tmp_path / part, ignore=shutil.ignore_patterns("__pycache__"))
     home = tmp_path / "home"
     home.mkdir()
+    (tmp_path / "out").mkdir()  # as after `make demo`
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     given = {"HOME": str(home), "XDG_DATA_HOME": str(home / "data"), "BROWSER": "true", "PATH": path, "COLUMNS": "120"}
     for name, value in given.items():
