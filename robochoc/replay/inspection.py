@@ -130,7 +130,7 @@ class Inspector:
         if isinstance(store, NogoodStore):
             lhs = store[index]
             return None if lhs is None else (self._others(protocol).all(lhs) or ALWAYS, lhs)
-        broken = self._problem.explained(index, self._seen(protocol))
+        broken = self._problem.conflict_with_key(index, self._seen(protocol))
         if broken is not None:
             lhs, key = broken
             return f"{self._own.all(lhs) or 'its own constraints'}, by {cut(key.partition(':')[2])}", lhs

@@ -13,8 +13,8 @@ from robochoc.protocols.traits import Traits
 from robochoc.run.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.run.registry import offers
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.exact import EXACT, refuse_inexact
-from robochoc.solver.weighted import HIGHEST
+from robochoc.solver.exact_costs import EXACT, check_exact
+from robochoc.solver.weighted import MAX_TOTAL_COST
 from robochoc.verification.objective import withdrawal_cost
 
 PAIR = 2
@@ -69,7 +69,7 @@ def _takes(team: Team, options: Options, traits: Traits) -> bool:
     try:
         _check(team, options, traits)
         if traits.tables:
-            refuse_inexact(_most(team, aside=options.withdraw is not None))
+            check_exact(_most(team, aside=options.withdraw is not None))
     except UnsupportedError:
         return False
     return True
@@ -85,7 +85,7 @@ def _judge_takes(team: Team, options: Options) -> bool:
         refuse_central(team, replace(options, protocol=CENTRAL))
     except UnsupportedError:
         return False
-    return _most(team, aside=options.withdraw is not None) <= HIGHEST
+    return _most(team, aside=options.withdraw is not None) <= MAX_TOTAL_COST
 
 
 def _check(team: Team, options: Options, traits: Traits) -> None:

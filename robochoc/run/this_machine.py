@@ -107,7 +107,7 @@ class ThisMachine(Deployment):
             return False
         from robochoc.verification.second_opinion import total_cost  # noqa: PLC0415 - start-up: seldom asked for
 
-        cost = phase.parameters.aside
+        cost = phase.parameters.withdrawal_cost
         if answer.verdict is Verdict.NO_SOLUTION:
             return self._confirmed(aside=cost)
         total = total_cost(self._scenario.team, answer.assignment, cost)

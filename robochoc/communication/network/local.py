@@ -36,7 +36,7 @@ from robochoc.journal.events import Observer
 from robochoc.model.change import keep_interfaces
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
 
@@ -70,7 +70,7 @@ class LocalNetwork(Session):
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
         conditions: NetworkSettings = NetworkSettings(),
-        brief: RunParameters = NO_BRIEF,
+        brief: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
         super().__init__(team)
         team = self.compiled.team

@@ -13,7 +13,7 @@ from robochoc.run import solve
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.registry import Offer, offers
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.exact import EXACT
+from robochoc.solver.exact_costs import EXACT
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of
 
