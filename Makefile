@@ -37,7 +37,7 @@ $(DOCS): $(READY)
 
 # --strict: a broken link, anchor or reference ends the build. The theme's notice of its end of life is known: mkdocs.yml.
 docs: $(DOCS)  ## the documentation site: out/site/index.html, readable without a network
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # Findings are kept in out/fuzz. A seed repeats what the loop did; a kept input is tried again by
 # .venv/bin/python -m tests.fuzz --target NAME FILE

@@ -42,6 +42,8 @@ _SERVES = re.compile(r"--sniff\b|--serve\b|--watch\b|robochoc sniff (?!.*--no-pa
 _ALONE = {"network", "master", "robot", "directory"}
 """What leaves threads behind is run in a process of its own."""
 LONG_S = 100
+_INTERRUPTED = 130
+"""The status of a program that Ctrl-C has ended, which is right where nothing else ends it."""
 
 
 @dataclass(frozen=True)
@@ -255,4 +257,4 @@ class Reader:
                 os.kill(process.pid, signal.SIGINT)
                 break
         rest, _ = process.communicate(timeout=LONG_S)
-        return Done(process.returncode, "".join(lines) + rest)
+        return Done(process.returncode % _INTERRUPTED, "".join(lines) + rest)
