@@ -2,7 +2,7 @@
 
 A fenced block of the language `sh` or `console` has commands, one of `python` code; a `text` block that follows is what
 they print. In `console` blocks commands begin with `$ ` and their output stands between them. In an output `...` stands
-for any text; seconds and sizes of files may differ. A command ends with status 0, or with what `# exit status N`
+for any text; seconds, sizes of files and the width of columns may differ. A command ends with status 0, or with what `# exit status N`
 behind it says.
 
 A comment before a block says more of it, `<!-- snippet: WORDS -->`, of these words:
@@ -124,7 +124,7 @@ def agrees(said: str, printed: str) -> bool:
 
 
 def _plain(text: str) -> str:
-    lines = [line.rstrip() for line in text.strip().splitlines()]
+    lines = [" ".join(line.split()) for line in text.strip().splitlines()]
     return _VARIES.sub("N", "\n".join(lines))
 
 
