@@ -166,9 +166,15 @@ situation_options = _optional(
         type=Finite(0, min_open=True),
         metavar="SECONDS",
         help=(
-            "A robot is lost after not answering for this long.  [default: no limit; on a network 10]  With"
-            " --situation: how long to wait for reports after each decision.  [default: 10]"
+            "A robot is lost after its process was stopped (on a network: out of reach) for this long.  [default: no"
+            " limit; on a network 10]"
         ),
+    ),
+    click.option(
+        "--report-timeout",
+        type=Finite(0, min_open=True),
+        metavar="SECONDS",
+        help="With --situation: how long to wait for a report after each decision.  [default: 10]",
     ),
     click.option(
         "--battery",
@@ -185,11 +191,11 @@ situation_options = _optional(
         help="An obstacle, in the problem's units. Repeatable.",
     ),
 )
-"""`--situation`, `--patience`, `--battery`, `--obstacle`."""
+"""`--situation`, `--patience`, `--report-timeout`, `--battery`, `--obstacle`."""
 
 _FLOWN = {"failures": "--fail", "distance": "--distance", "wind": "--wind", "gusts": "--gusts"}
 _FLOWN_HERE = {**_FLOWN, "obstacles": "--obstacle"}
-_HEARD = {"battery": "--battery"}
+_HEARD = {"battery": "--battery", "report_timeout": "--report-timeout"}
 _PLACED = {"frame": "--frame", "scale": "--scale"}
 _NOT_PUBLISHED = "is for what is published: add --ros SINK"
 
@@ -202,7 +208,7 @@ class Ros:
     situation: str | None
     frame: str
     scale: float | None
-    patience: float | None
+    report_timeout: float | None
     battery: float | None
     surroundings: Mapping[str, Any]
 
@@ -214,42 +220,22 @@ def ros_asked(settings: dict[str, Any]) -> Ros:
     """Take the options of this file out of `settings`. What would be ignored is wrong usage."""
     sinks, situation = settings.pop("sinks"), settings.pop("situation")
     given = {name: settings.pop(name) for name in (*_FLOWN_HERE, *_HEARD, *_PLACED)}
-    patience = settings["patience"]
     asked = {name for name, value in given.items() if value not in (None, ())}
     if situation != FLIGHT:
         _refuse(_FLOWN_HERE, asked, "is for the simulated flight: add --situation flight")
     if situation in {None, FLIGHT}:
         _refuse(_HEARD, asked, "is for robots that are listened to: add --situation mcap:FILE, or another source")
-        if patience is not None and (settings["runtime"] == "simulator" or settings["protocol"] == "central"):
-            raise click.UsageError("--patience is for robots with processes, and for those that are listened to")
     if not (sinks or situation):
         _refuse(_PLACED, asked, _NOT_PUBLISHED)
     surroundings = {name: given[name] for name in _FLOWN_HERE if name in asked}
     frame = given["frame"] or FRAME
-    return Ros(sinks, situation, frame, given["scale"], patience, given["battery"], surroundings)
+    return Ros(sinks, situation, frame, given["scale"], given["report_timeout"], given["battery"], surroundings)
 
 
 def _refuse(options: Mapping[str, str], asked: set[str], why: str) -> None:
     for name, option in options.items():
         if name in asked:
             raise click.UsageError(f"{option} {why}")
-
-
-def check_ros(ros: Ros, settings: Mapping[str, Any]) -> None:
-    """What does not go together with the rest of `robochoc solve`: `settings` are its options."""
-    if settings["count"] and ros:
-        raise click.UsageError("--count gives a number: there is nothing for --ros, and nothing that could change")
-    if not ros.situation:
-        return
-    asked = {
-        "--withdraw": settings["withdraw"],
-        "--runtime network": settings["runtime"] == "network",
-        "--protocol central": settings["protocol"] == "central",
-    }
-    for option in (name for name, value in asked.items() if value):
-        raise click.UsageError(
-            f"--situation changes the problem while robots solve it; {option} cannot go on with that"
-        )
 
 
 @contextmanager
@@ -348,9 +334,9 @@ def _feedback(ros: Ros, drones: Sequence[Drone], seed: int, stack: ExitStack) ->
     from robochoc.ros.source_feedback import PATIENCE_S, SourceFeedback
 
     source = stack.enter_context(open_source(ros.situation or ""))
-    if ros.patience is not None and not source.live:
-        raise click.UsageError(f"--patience is for robots that report while we wait; {ros.situation} is a recording")
-    return SourceFeedback(source, ReportDecoder(drones, ros.frame), ros.patience or PATIENCE_S)
+    if ros.report_timeout is not None and not source.live:
+        raise click.UsageError(f"--report-timeout is for robots that report now; {ros.situation} is a recording")
+    return SourceFeedback(source, ReportDecoder(drones, ros.frame), ros.report_timeout or PATIENCE_S)
 
 
 @contextmanager
