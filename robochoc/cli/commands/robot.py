@@ -60,7 +60,7 @@ def robot(
     robochoc robot Robot3.1.xml --master 192.168.1.14:7447 --token-file token
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     with network_failures_told(file):
-        from robochoc.communication.network.manner import Manner
+        from robochoc.communication.network.robot_settings import RobotSettings
         from robochoc.communication.run_result import Progress
         from robochoc.formats import read_robot
         from robochoc.run.networked.join import identity_of, join
@@ -79,11 +79,11 @@ def robot(
             published = stack.enter_context(robot_publisher(itself, given))
             stage(f"looking for the master at {place}")
             proof = identity_of(file.stem, place, identity, token, given["patience"])
-            manner = Manner(given["patience"], sniffed=given["sniff"], stage=stage)
+            settings = RobotSettings(given["patience"], sniffed=given["sniff"], stage=stage)
             cache = None if given["no_cache"] else SolutionCache()
             bounds = limits(given["local_solutions"], given["local_timeout"], always_ace=given["always_ace"])
             with Compiler(bounds, cache) as compiler:
-                ending = join(itself, place, proof, manner, compiler)
+                ending = join(itself, place, proof, settings, compiler)
             if ending.failed:
                 raise Failure(LOST, f"{file.stem}: {ending.why}")
             told = published(ending.why, ending.assignment)
