@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, 
 from itertools import product
 
 from robochoc.formats.diagnostics import Diagnostic, shortened
-from robochoc.formats.members import Members
+from robochoc.formats.team_members import Members
 from robochoc.model.expression import Apply, Constant, Expression, Name, UndefinedValueError, compile_expression
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Domain, Relation, Robot
 

@@ -15,8 +15,9 @@ from robochoc.formats.definitions import (
     refuse_predefined,
 )
 from robochoc.formats.diagnostics import MAX_PER_FILE, Diagnostic, MistakeError, shortened
+from robochoc.formats.field_types import AS_BUILT, ShapeError, check_shape
+from robochoc.formats.locations import ObjectPlaces, Place
 from robochoc.formats.names import check_name, check_robot_name, check_unique, check_weight, check_word
-from robochoc.formats.places import ObjectPlaces, Place
 from robochoc.formats.rules import (
     NEIGHBOURS_ONCE,
     check_constraint,
@@ -29,7 +30,6 @@ from robochoc.formats.rules import (
     refuse_private_part,
     repeated,
 )
-from robochoc.formats.shapes import AS_BUILT, ShapeError, check_shape
 from robochoc.model.problem import Constraint, ConstraintModel, Domain, Predicate, ProblemKind, Relation, Robot
 
 Definition = Domain | Relation | Predicate

@@ -14,10 +14,10 @@ from robochoc.formats.definitions import check_semantics, refuse_predefined
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, Report, shortened, suggestion
 from robochoc.formats.extension import check_count, read_domain, read_relation
 from robochoc.formats.intension import read_predicate, read_topic
-from robochoc.formats.members import Member
+from robochoc.formats.locations import FilePlaces
 from robochoc.formats.names import check_robot_name, check_unique
-from robochoc.formats.places import FilePlaces
 from robochoc.formats.rules import NEIGHBOURS_ONCE, check_told, refuse_nothing_to_decide, repeated
+from robochoc.formats.team_members import Member
 from robochoc.formats.xml import attribute, line, parsed_xml, read_xml
 from robochoc.model.problem import (
     Child,

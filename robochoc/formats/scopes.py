@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from robochoc.formats.diagnostics import Diagnostic, shortened, suggestion
-from robochoc.formats.members import Members
+from robochoc.formats.team_members import Members
 from robochoc.model.problem import Constraint, ConstraintModel, Parent, Robot
 
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
-from robochoc.formats.members import Members
 from robochoc.formats.robot import RobotFile, read_robot_file
 from robochoc.formats.scenario import SCENARIO, has_scenario, read_scenario
+from robochoc.formats.team_members import Members
 from robochoc.formats.validation import between, note_valid
 from robochoc.model.priorities import natural_key, priority_order
 from robochoc.model.problem import Robot, Team

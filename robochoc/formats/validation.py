@@ -16,7 +16,8 @@ from typing import TypeVar
 
 from robochoc.formats.copies import differing_copies
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, shortened
-from robochoc.formats.members import Member, Members
+from robochoc.formats.field_types import AS_BUILT, ShapeError, check_shape
+from robochoc.formats.locations import ObjectPlaces, Place
 from robochoc.formats.names import check_integer
 from robochoc.formats.neighbours import (
     cycles,
@@ -27,10 +28,9 @@ from robochoc.formats.neighbours import (
     shared_variables,
 )
 from robochoc.formats.objects import Objects, repeated_robots
-from robochoc.formats.places import ObjectPlaces, Place
 from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
 from robochoc.formats.scopes import misplaced, misplaced_parts, untold
-from robochoc.formats.shapes import AS_BUILT, ShapeError, check_shape
+from robochoc.formats.team_members import Member, Members
 from robochoc.model.change import ChangeError, apply_changes
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, RemoveValue, Robot, ScenarioEvent, Team

@@ -130,7 +130,7 @@ def _answer(run: RecordedRun, ensemble: RebuiltRobots, outcome: Outcome) -> Epoc
     result.findings.update({name: one.findings for name, one in protocols.items()})
     team = ensemble.compiled.team
     withdrawal = given.aside is not None or _places(run, outcome)
-    phase = Phase("", ensemble.protocol, RunParameters(aside=given.aside), withdrawal)
+    phase = Phase("", ensemble.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
     check = partial(check_with_files, phase, result, team, ensemble.compiled)
     try:
         answer = evaluate(phase, Search(result, check), team.kind)

@@ -165,7 +165,7 @@ class Rebuilder:
             return Epoch(self._compiled(team), brief=RunParameters(seed, self._means.settings))
         there = [robot for robot in filed.robots if run.given is not None or robot.name in team]
         aside = withdrawal_cost(replace(filed, robots=tuple(there))) if protocol.traits.costs else None
-        return Epoch(self._compiled(team), brief=RunParameters(seed, aside=aside))
+        return Epoch(self._compiled(team), brief=RunParameters(seed, withdrawal_cost=aside))
 
     def _ordered(self, team: Team) -> Team:
         """Return `team` in the order of the run. Raises `OrderError`, `ValueError`."""

@@ -10,8 +10,8 @@ from robochoc.run.compatibility import CENTRAL_TRAITS, max_total, refuse_options
 from robochoc.run.options import CENTRAL, Options, Runtime
 from robochoc.run.registry import offers
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.exact import EXACT, refuse_inexact
-from robochoc.solver.weighted import HIGHEST
+from robochoc.solver.exact_costs import EXACT, check_exact
+from robochoc.solver.weighted import MAX_TOTAL_COST
 
 
 def alternatives(team: Team, options: Options, *, complete: bool = False, costs: bool = False) -> str:
@@ -47,7 +47,7 @@ def _fits(team: Team, options: Options, traits: Traits) -> bool:
     try:
         refuse_unfit(team, options, traits)
         if traits.tables:
-            refuse_inexact(max_total(team, options))
+            check_exact(max_total(team, options))
     except UnsupportedError:
         return False
     return True
@@ -63,4 +63,4 @@ def _central_solver_fits(team: Team, options: Options) -> bool:
         refuse_unfit(team, central, CENTRAL_TRAITS)
     except UnsupportedError:
         return False
-    return max_total(team, options) <= HIGHEST
+    return max_total(team, options) <= MAX_TOTAL_COST

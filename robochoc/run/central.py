@@ -13,7 +13,7 @@ from robochoc.run.context import RunContext
 from robochoc.run.evaluation import Answer, check
 from robochoc.run.incumbent import absent
 from robochoc.run.options import CENTRAL, Options, Withdrawal
-from robochoc.solver.central import CentralSolver, Judgement
+from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.failures import SolverLostError
 from robochoc.verification.checker import assignment_cost
 from robochoc.verification.objective import withdrawal_cost
@@ -89,7 +89,7 @@ def _answer(solver: CentralSolver, team: Team, options: Options) -> Answer:
     return _answer_of(judgement, team, price, options)
 
 
-def _answer_of(judgement: Judgement, team: Team, price: int | None, options: Options) -> Answer:
+def _answer_of(judgement: CentralAnswer, team: Team, price: int | None, options: Options) -> Answer:
     """Return the answer for a `judgement`; `price` is the withdrawal cost (None: no robot may withdraw)."""
     verdict, assignment, bound = judgement.verdict, judgement.assignment, None
     if judgement.cost is not None:

@@ -171,7 +171,7 @@ def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: Comp
     if proven:
         assignment = joined(result.assignments)
     else:
-        best = best_of(compiled, result, phase.parameters.aside)
+        best = best_of(compiled, result, phase.parameters.withdrawal_cost)
         if best is None:
             return None
         assignment = best.assignment
@@ -217,5 +217,5 @@ def _verdict_of(phase: Phase, result: RunResult, kind: ProblemKind, found: Check
 def _bound_of(phase: Phase, result: RunResult) -> float | None:
     """Return the lower bound of the cost; where robots may withdraw, of the weight of those that do."""
     bound = bound_of(result.findings)
-    withdrawal_cost = phase.parameters.aside
+    withdrawal_cost = phase.parameters.withdrawal_cost
     return bound if bound is None or withdrawal_cost is None else bound // withdrawal_cost

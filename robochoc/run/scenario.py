@@ -31,7 +31,7 @@ from robochoc.model.change import (
 from robochoc.model.orders import with_priorities
 from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import AddAgent, Change, Robot, ScenarioEvent, Team
-from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import Invalidated, invalidated_by
 
@@ -89,7 +89,7 @@ class ScenarioRun:
         *,
         messages: int | None = None,
         spares: int = 0,
-        parameters: RunParameters = NO_BRIEF,
+        parameters: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
         """Begin with `team` as it is before the first event.
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
-from robochoc.communication.processes.robot_link import RobotsLostError
+from robochoc.communication.run_result import RobotsLostError
 from robochoc.communication.session import Epoch, Session
 from robochoc.model.orders import Order, compute_order, with_dom_deg_order
 from robochoc.model.outcome import EpochOutcome, Metrics, Verdict
@@ -107,7 +107,7 @@ class ThisMachine(Deployment):
             return False
         from robochoc.verification.second_opinion import total_cost  # noqa: PLC0415 - start-up: seldom asked for
 
-        cost = phase.parameters.aside
+        cost = phase.parameters.withdrawal_cost
         if answer.verdict is Verdict.NO_SOLUTION:
             return self._confirmed(aside=cost)
         total = total_cost(self._scenario.team, answer.assignment, cost)

@@ -58,4 +58,4 @@ def second_phase(options: Options, withdrawal_cost: Callable[[], float]) -> Phas
     name = MINIMISES if options.withdraw is Withdrawal.MINIMUM else FIRST_FIT
     protocol = protocol_by_name(name)
     cost = withdrawal_cost() if protocol.traits.costs else None
-    return Phase(name, protocol, RunParameters(options.seed, aside=cost), withdrawal=True, takes_over=True)
+    return Phase(name, protocol, RunParameters(options.seed, withdrawal_cost=cost), withdrawal=True, takes_over=True)

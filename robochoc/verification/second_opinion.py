@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
-from robochoc.solver.central import CentralSolver, Judgement
+from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.verification.checker import RefutedError, assignment_cost, has_local_solution
 
 
@@ -45,7 +45,7 @@ def confirmed(
     return opinion.verdict is not Verdict.UNKNOWN
 
 
-def contradiction(opinion: Judgement, total: float) -> str | None:
+def contradiction(opinion: CentralAnswer, total: float) -> str | None:
     """Return what the central solver has found against a claim; None where it agrees, or has not come to an end.
 
     `total` is the minimum cost that is claimed, withdrawal costs included; infinite: that there is no solution.

@@ -21,7 +21,7 @@ from robochoc.solver import compiled
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import CentralSolver
 from robochoc.solver.compile import Compiler
-from robochoc.solver.domain import CompiledDomain, compiled_domain
+from robochoc.solver.domain import CompiledDomain, compile_domain
 from robochoc.verification.checker import violations
 from tests.support.complex_problems import random_complex_team
 from tests.support.loose_problems import any_order, loosened
@@ -70,7 +70,7 @@ def test_domains_and_abt_agree_with_brute_force(batch: int) -> None:
     for _ in range(150):
         team = random_complex_team(chance)
         for robot in team.robots:
-            check_domain(robot, compiled_domain(robot, brute_force))
+            check_domain(robot, compile_domain(robot, brute_force))
         team = loosened(team, chance)
         verdict = solved_by_brute_force(with_order(team, any_order(team, chance)), chance)
         assert verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION), team

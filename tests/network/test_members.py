@@ -13,7 +13,7 @@ from robochoc.communication.network.profile import Profile, Ranges
 from robochoc.formats import PREDEFINED
 from robochoc.model.problem import Constraint, Predicate, ProblemKind
 from robochoc.protocols.traits import Traits
-from robochoc.solver.agent_problem import NO_BRIEF
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import random_team, team_of
 from tests.support.sparse_teams import profiles_of
@@ -172,7 +172,7 @@ def test_variables_that_a_parent_looks_at_are_shown() -> None:
     assert members.unseen() == {"B": ("Z",)}
     members.robots["B"].also["Z"] = ((3, 4),)
     assert members.unseen() == {}
-    task = members.tasks(1, "abt", Traits(), NO_BRIEF)["A"]
+    task = members.tasks(1, "abt", Traits(), DEFAULT_PARAMETERS)["A"]
     assert task.interfaces == {"A": ("X",), "B": ("Y", "Z")}
     assert task.domains["Z"] == ((3, 4),)
 
@@ -207,7 +207,7 @@ def test_what_a_childs_constraints_look_at_is_asked_for_whether_its_parent_says_
     assert members.show("A", {"X": ((1, 3),)}) == ""
     assert not members.unseen()
     assert not list(members.strangers())
-    assert members.tasks(1, "abt", Traits(), NO_BRIEF)["B"].interfaces == {"A": ("X",), "B": ("Y",)}
+    assert members.tasks(1, "abt", Traits(), DEFAULT_PARAMETERS)["B"].interfaces == {"A": ("X",), "B": ("Y",)}
 
 
 def test_two_that_show_one_variable_are_both_named() -> None:

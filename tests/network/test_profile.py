@@ -35,7 +35,7 @@ from robochoc.formats.extension import MAX_VALUES
 from robochoc.model.change import without_robots
 from robochoc.model.problem import Domain, ProblemKind, Robot, Team
 from robochoc.protocols.traits import Traits
-from robochoc.solver.agent_problem import NO_BRIEF, AgentProblem, RunParameters, agent_problems
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters, agent_problems
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
 from robochoc.solver.domain import CompiledDomain
 from tests.support.complex_problems import random_complex_team
@@ -93,7 +93,7 @@ def comparable(part: AgentProblem) -> AgentProblem:
     return part._replace(
         own=part.own.relinked(replace(part.robot, shown=())),
         domains=domains,
-        secretive=tuple(sorted(part.secretive)),
+        pkc_holders=tuple(sorted(part.pkc_holders)),
         interfaces=dict(part.interfaces),
         order=tuple(part.order),
     )
@@ -120,7 +120,7 @@ def test_robots_of_files_know_what_the_whole_team_would_tell_them(folder: Path) 
 @given(team=random_teams)
 @settings(max_examples=120, deadline=None)
 def test_robots_know_what_the_whole_team_would_tell_them(team: Team) -> None:
-    assert_same(team, registered(team), team.robots, NO_BRIEF)
+    assert_same(team, registered(team), team.robots, DEFAULT_PARAMETERS)
 
 
 @given(team=random_teams, data=st.data())
@@ -132,11 +132,11 @@ def test_robots_left_behind_know_what_a_smaller_team_would_tell_them(team: Team,
     left = without_robots(team, gone)
     assert members.order == left.order
     expected = agent_problems(CompiledTeam(left, nothing_of), tree=True)
-    for name, task in members.tasks(2, "abt", TREE, NO_BRIEF).items():
+    for name, task in members.tasks(2, "abt", TREE, DEFAULT_PARAMETERS).items():
         known = part_of(team[name], task)
         assert replace(known.robot, shown=()) == replace(left[name], shown=())
         assert known.links == expected[name].links
-        assert sorted(known.secretive) == sorted(expected[name].secretive)
+        assert sorted(known.pkc_holders) == sorted(expected[name].pkc_holders)
         assert set(known.interfaces) == set(expected[name].interfaces)
         for other, shown in expected[name].interfaces.items():  # what others have shown once they go on showing
             assert set(shown) <= set(known.interfaces[other]) <= {v.name for v in team[other].variables}

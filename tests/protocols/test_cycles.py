@@ -146,7 +146,7 @@ def test_who_may_step_aside_does_so_rather_than_break_anything(protocol: type[Cy
     for seed in range(40):
         team = random_hard_team(chance)
         price = withdrawal_cost(team)
-        brief = RunParameters(seed, {"cycles": "25"}, aside=price)
+        brief = RunParameters(seed, {"cycles": "25"}, withdrawal_cost=price)
         result = Simulation(team, protocol, any_schedule(chance), brief=brief).search()
         assert result.verdict is Verdict.SOLUTION
         found = best_of(CompiledTeam(team), result, price)

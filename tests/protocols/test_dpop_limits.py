@@ -18,7 +18,7 @@ from robochoc.protocols.dpop_messages import UTIL, VALUE, Dimensions, Need, Proc
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
-from robochoc.solver.exact import EXACT
+from robochoc.solver.exact_costs import EXACT
 from tests.support.agents import replies
 from tests.support.cost_problems import with_costs
 from tests.support.dpop_robots import PRODUCT, begun, dimensions, domain, leaf, products

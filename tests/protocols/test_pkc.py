@@ -59,7 +59,7 @@ def test_the_value_goes_up_too_where_a_pkc_is_shared_and_only_there() -> None:
 def test_the_value_goes_up_where_only_the_parent_holds_a_part() -> None:
     shown = replace(pkc_part("AB", name="T"), model=ConstraintModel.TKC)
     team = with_part(team_of(dict.fromkeys("AB", (1, 2)), [shown]), "RA", "RB", pkc_part("AB", (1, 1)))
-    assert LocalProblem(agent_problems(team)["RB"]).partners == ("RA",)
+    assert LocalProblem(agent_problems(team)["RB"]).pkc_parents == ("RA",)
 
 
 def test_a_lower_robot_checks_its_own_part() -> None:
@@ -118,8 +118,8 @@ def test_a_refusal_names_only_the_variables_that_the_part_looks_at() -> None:
     shown = [replace(pkc_part(pair, name="T"), model=ConstraintModel.TKC) for pair in ("ab", "AB")]
     team = complex_team({"RA": ["a", "A"], "RB": ["b", "B"]}, domains, shown)
     problem = LocalProblem(agent_problems(with_part(team, "RA", "RB", pkc_part("AB", (1, 2))))["RA"])
-    assert problem.refuses(0, "RB", (1, 2)) == {"RA": (None, 1), "RB": (None, 2)}
-    assert problem.refuses(0, "RB", (2, 1)) is None
+    assert problem.part_conflict(0, "RB", (1, 2)) == {"RA": (None, 1), "RB": (None, 2)}
+    assert problem.part_conflict(0, "RB", (2, 1)) is None
 
 
 def test_two_parts_that_leave_nothing_together_have_no_solution() -> None:

@@ -14,17 +14,17 @@ from robochoc.communication.network.control_messages import (
     Word,
 )
 from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
-from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot import Ending, NetworkRobot
+from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.transport import Transport
 from robochoc.formats import PREDEFINED
 from robochoc.model.message import encode
 from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.abt import ABT, Ok
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.in_memory_network import RUN, ScriptedTransport
 from tests.support.problems import team_of
@@ -43,7 +43,7 @@ def task(protocol: type[Protocol] = ABT, epoch: int = 1) -> Task:
     members = Members()
     for robot in chain_of_three().robots:
         members.register(robot.name, profile_of(robot), "visit")
-    return members.tasks(epoch, protocol.__name__, protocol.traits, NO_BRIEF)["RB"]
+    return members.tasks(epoch, protocol.__name__, protocol.traits, DEFAULT_PARAMETERS)["RB"]
 
 
 def ok(value: int) -> bytes:
@@ -71,6 +71,6 @@ def played(
 
     post = ScriptedTransport("RB", answers)
     robot = NetworkRobot(
-        CompiledRobot(chain_of_three()["RB"]), UNPROVEN, cast("Transport", post), named, Manner(patience_s)
+        CompiledRobot(chain_of_three()["RB"]), UNPROVEN, cast("Transport", post), named, RobotSettings(patience_s)
     )
     return robot.run(), post

@@ -19,7 +19,7 @@ from robochoc.model.message import Envelope, encode
 from robochoc.model.problem import Constraint, ConstraintModel, Domain, Relation, Robot, Semantics, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.shared import Others, SharedConstraint
+from robochoc.solver.shared_constraint import OtherValues, SharedConstraint
 from tests.support.pkc_problems import allowed, as_predicate, as_table, pkc_parts, rows, with_constraints
 
 Asked = Mapping[tuple[str, str], set[frozenset[tuple[str, int]]]]
@@ -87,7 +87,7 @@ def watched(team: Team, monkeypatch: pytest.MonkeyPatch) -> Asked:
         """A mask that notes which of its bits are looked at."""
 
         constraint: SharedConstraint
-        others: Others
+        others: OtherValues
 
         def __rshift__(self, index: int, /) -> int:
             if self.constraint.key in parts:
@@ -98,7 +98,7 @@ def watched(team: Team, monkeypatch: pytest.MonkeyPatch) -> Asked:
                 asked[holder, name].add(frozenset(pair))
             return int(self) >> index
 
-    def mask(constraint: SharedConstraint, others: Others) -> int:
+    def mask(constraint: SharedConstraint, others: OtherValues) -> int:
         found = Mask(plain(constraint, others))
         found.constraint, found.others = constraint, others
         return found

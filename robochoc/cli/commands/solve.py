@@ -20,11 +20,11 @@ from robochoc.cli.options.paths import TeamFolder, refuse_same_places, teams_at
 from robochoc.cli.options.recording import journal_option, recording, shown_and_flushed
 from robochoc.cli.options.ros import (
     flight_options,
-    looped,
-    ros_asked,
     ros_options,
     situation_options,
+    take_ros_options,
 )
+from robochoc.cli.options.ros_setup import closed_loop
 from robochoc.cli.options.sections import COMMON, Sections
 from robochoc.cli.options.solve import (
     Products,
@@ -177,7 +177,7 @@ def solve(
     robochoc solve instances/queens3d-4 --withdraw --html out/page.html
     robochoc solve instances/ --runtime simulator --protocol dpop --json
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    ros = ros_asked(settings)
+    ros = take_ros_options(settings)
     named = {"--order": settings["order"], "--channel": settings["channel"]}
     given = {option: value for option, value in named.items() if isinstance(value, Path)}
     options = options_of(settings, environment=bool(ros.situation))
@@ -212,7 +212,7 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
             header = partial(_header, team, options)
             objective = None if wanted.ros.situation else _objective(team, options)
             with (
-                looped(wanted.ros, team, options.seed) as loop,
+                closed_loop(wanted.ros, team, options.seed) as loop,
                 recording(products.journal, header, objective, watch.begun()) as recorder,
             ):
                 outcome = _run(team, options, recorder, loop)

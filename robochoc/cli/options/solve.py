@@ -14,7 +14,7 @@ from robochoc.cli.options.channel import channel_for
 from robochoc.cli.options.local_problems import limits
 from robochoc.cli.options.names import ProtocolName
 from robochoc.cli.options.order import GIVEN
-from robochoc.cli.options.ros import Ros
+from robochoc.cli.options.ros import RosOptions
 from robochoc.cli.options.sections import SectionedCommand
 from robochoc.cli.reports.failures import failures_told
 from robochoc.cli.reports.live_sniffer import Watching
@@ -145,7 +145,7 @@ class Wanted:
     order: str | Path
     as_json: bool
     explain: bool
-    ros: Ros
+    ros: RosOptions
 
 
 def protocol_settings(given: Iterable[str]) -> dict[str, str]:

@@ -16,7 +16,7 @@ from robochoc.run.compatibility import refuse_options
 from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.run.registry import Offer, offers
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.exact import EXACT
+from robochoc.solver.exact_costs import EXACT
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of
 

@@ -16,7 +16,7 @@ from robochoc.model.problem import (
 )
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named
-from robochoc.solver.central import CentralSolver, Judgement
+from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.verification.checker import violations
 from tests.support.complex_problems import random_complex_team
 from tests.support.problems import random_team, shuffled, solutions
@@ -64,9 +64,9 @@ def test_judge_and_checker_see_the_files(monkeypatch: pytest.MonkeyPatch) -> Non
     team = graph_team(["AB", "BC", "AC"])
     seen = []
 
-    def judged(_judge: CentralSolver, merged: Team, **_: object) -> Judgement:
+    def judged(_judge: CentralSolver, merged: Team, **_: object) -> CentralAnswer:
         seen.append(merged)
-        return Judgement(Verdict.NO_SOLUTION)
+        return CentralAnswer(Verdict.NO_SOLUTION)
 
     monkeypatch.setattr(CentralSolver, "judge", judged)
     assert solve(team, replace(SIMULATED, order=Order.DFS, verify=True)).verified

@@ -17,10 +17,10 @@ from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.run import Options, solve
 from robochoc.run.incumbent import absent
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.central import CentralSolver, Judgement
+from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.encoding import Codes, Network, Table
 from robochoc.solver.failures import SolverTimeoutError
-from robochoc.solver.weighted import priced
+from robochoc.solver.weighted import weighted_components
 from robochoc.verification.checker import assignment_cost, violations
 from tests.support.clocks import once, waiting
 from tests.support.cost_problems import with_costs
@@ -59,7 +59,7 @@ def test_without_an_answer_until_then_there_is_a_bound() -> None:
     domains = {"A": (1, 2), "B": (1, 2), "C": (1, 2)}
     team = with_costs(team_of(domains, [differ, Constraint("U", unary, ("C",), ("C",))]))
     judgement = CentralSolver(deadline=time.monotonic()).judge(team)
-    assert judgement == Judgement(Verdict.UNKNOWN, bound=4)
+    assert judgement == CentralAnswer(Verdict.UNKNOWN, bound=4)
 
 
 def test_what_was_found_for_another_task_is_not_told(warm: AceProcess) -> None:
@@ -75,7 +75,7 @@ def test_what_was_found_for_another_task_is_not_told(warm: AceProcess) -> None:
 
 def test_a_task_that_is_given_up_has_a_best_once_ace_has_one(warm: AceProcess) -> None:
     team = HARD
-    (part,) = priced(team.variables.values(), list(team.constraints()))
+    (part,) = weighted_components(team.variables.values(), list(team.constraints()))
 
     def best_of(limit: float) -> Codes | None:
         warm.begin(part.network, costs=part.costs)

@@ -24,9 +24,9 @@ from robochoc.replay.rebuild import Rebuilder, ReplayOptions
 from robochoc.replay.steps import RecordedRun
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.scenario import ScenarioRun
-from robochoc.solver.agent_problem import NO_BRIEF, agent_problems
-from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, as_compiled
-from robochoc.solver.domain import CompiledDomain, compiled_domain
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, agent_problems
+from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, ensure_compiled
+from robochoc.solver.domain import CompiledDomain, compile_domain
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.objective import Objective
 from tests.support.cost_problems import with_costs
@@ -91,7 +91,7 @@ def test_a_robot_with_other_links_is_compiled_again_only_if_it_shows_something_e
 
     def noted(robot: Robot) -> CompiledDomain:
         compiled.append(robot.name)
-        return compiled_domain(robot)
+        return compile_domain(robot)
 
     own = CompiledRobot(turned_interface()["A"], noted)
     same = replace(own.robot, children=(Child("B", ("y", "x")),))
@@ -106,7 +106,7 @@ def test_only_those_who_are_asked_for_are_compiled() -> None:
     some = CompiledTeam(turned_interface(), only={"B"})
     assert list(some.robots) == ["B"]
     assert list(agent_problems(some)) == ["B"]
-    assert as_compiled(some) is some
+    assert ensure_compiled(some) is some
 
 
 def test_a_session_says_what_its_robots_work_on() -> None:
@@ -156,7 +156,7 @@ def all_shown(team: Team) -> Members:
 def test_who_shows_more_than_its_file_says_means_what_others_read() -> None:
     """The master lists what was asked for last, wherever it stands in the file."""
     team = untold_interface()
-    task = all_shown(team).tasks(1, "abt", Traits(), NO_BRIEF)["A"]
+    task = all_shown(team).tasks(1, "abt", Traits(), DEFAULT_PARAMETERS)["A"]
     own = CompiledRobot(team["A"]).relinked(among(team["A"], task.interfaces))
     assert own.robot.interface == task.interfaces["A"] == ("y", "x")
     assert own.domain.values[0] == (7, 1)
@@ -175,7 +175,7 @@ def test_who_is_left_shows_what_it_showed_and_keeps_its_place() -> None:
         members.remove(gone)
         assert members.order == tuple(name for name in before if name not in gone)
         left = keep_interfaces(without_robots(team, gone), team)
-        for name, task in members.tasks(2, "abt", Traits(), NO_BRIEF).items():
+        for name, task in members.tasks(2, "abt", Traits(), DEFAULT_PARAMETERS).items():
             assert task.interfaces == {robot.name: robot.interface for robot in left.robots}
             assert among(team[name], task.interfaces).interface == left[name].interface
 
@@ -202,7 +202,7 @@ def test_who_plays_machines_again_knows_what_they_showed_and_what_it_cost_to_ste
     cast.enter(RecordedRun(0, Began(t=0, protocol="DPOP"), None, [decided, Lost(t=1, robot="RB", why="gone")]))
     part = cast.enter(RecordedRun(1, Began(t=0, protocol="DPOP"), None, [decided])).parts["RC"]
     assert part.interfaces == {"RA": ("A",), "RC": ("C",)}
-    assert part.brief.aside == 1 + 5
+    assert part.parameters.withdrawal_cost == 1 + 5
 
 
 # Changes
