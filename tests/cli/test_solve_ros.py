@@ -206,7 +206,7 @@ def test_a_team_without_topics_has_nothing_to_publish(tmp_path: Path) -> None:
         (("--patience", "1", "--runtime", "simulator"), "--patience is for robots with processes"),
         (("--patience", "1", "--protocol", "central"), "--patience is for robots with processes"),
         (("--patience", "0"), "--patience"),
-        (("--battery", "0.1", "--situation", "flight"), "--battery is for robots that are listened to"),
+        (("--battery", "0.1", "--situation", "flight"), "--battery is for robots that report"),
         (("--frame", "hall"), "--frame is for what is published"),
         (("--scale", "2"), "--scale is for what is published"),
         (("--ros", "mcap:a", "--situation", "mcap:a"), "--situation mcap:a and --ros mcap:a are one place"),
