@@ -1,9 +1,9 @@
 """Commands and code that stand on pages of the documentation: read, run, and held against what the page says of them.
 
 A fenced block of the language `sh` or `console` has commands, one of `python` code; a `text` block that follows is what
-they print. In `console` blocks commands begin with `$ ` and their output stands between them. In an output `...` stands
-for any text; seconds, sizes of files and the width of columns may differ. A command ends with status 0, or with what `# exit status N`
-behind it says.
+they print. In `console` blocks commands begin with `$ ` and their output stands between them. A block with a title is a
+file of that name. In an output `...` stands for any text; seconds, sizes of files and the width of columns may differ.
+A command ends with status 0, or with what `# exit status N` behind it says.
 
 A comment before a block says more of it, `<!-- snippet: WORDS -->`, of these words:
 
