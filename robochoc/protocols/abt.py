@@ -196,10 +196,10 @@ class ABT(Backtracking):
         """Tell lower robots whose values the own parts forbid; each pair of values is looked at once (PKC)."""
         if self.value is None:
             return
-        for child, told in list(self.below.items()):
+        for child, theirs in list(self.below.items()):
             if self.allowed.get(child) == self.value:
                 continue
-            refused = self.problem.part_conflict(self.value, child, told)
+            refused = self.problem.part_conflict(self.value, child, theirs)
             if refused is None:
                 self.allowed[child] = self.value
             else:

@@ -4,7 +4,7 @@ Modi, Shen, Tambe, Yokoo: "Adopt: asynchronous distributed constraint optimizati
 Artificial Intelligence 161(1-2), 2005, Section 3, whose names the methods bear:
 
     initialize     `begin`                 maintainThresholdInvariant        `_maintain_threshold_invariant`
-    when received  `hear`                  maintainChildThresholdInvariant   `_maintain_child_threshold_invariant`
+    when received  `handle`                maintainChildThresholdInvariant   `_maintain_child_threshold_invariant`
     backTrack      `decide`, `act`         maintainAllocationInvariant       `_maintain_allocation_invariant`
 
 Complete, for minimisation. On a pseudo-tree each robot takes the value that looks cheapest by what its children say of
@@ -99,7 +99,7 @@ class Threshold(Message, frozen=True):
 class ADOPT(BoundingProtocol):
     """One agent of ADOPT. State beside the bounds: `threshold`, and how it is split over the children, `t`.
 
-    `told` is the parent's last word on the threshold.
+    `parent_threshold` is the last Threshold of the parent.
     """
 
     messages = TreeMessage | Value | Cost | Threshold | Terminate
@@ -116,20 +116,20 @@ class ADOPT(BoundingProtocol):
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
         self.threshold: float = 0
-        self.told = Threshold(0, {})
+        self.parent_threshold = Threshold(0, {})
         self.t: dict[str, list[float]] = {}
 
-    def hear(self, sender: str, said: Message) -> None:
+    def handle(self, sender: str, message: Message) -> None:
         """Dispatch on the message's type."""
         if self.terminated:
             return
-        match cast("Value | Cost | Threshold | Terminate", said):
+        match cast("Value | Cost | Threshold | Terminate", message):
             case Value(value, counter):
                 self.merge({sender: (value, counter)})
             case Cost(context, lb, ub):
                 self._hear_cost(sender, context, lb, ub)
-            case Threshold() as told:
-                self.told = told
+            case Threshold() as threshold:
+                self.parent_threshold = threshold
             case Terminate(context):
                 self.last_values = True
                 self.merge(context)
@@ -150,9 +150,9 @@ class ADOPT(BoundingProtocol):
 
     def _choose(self) -> None:
         if self.threshold == self.ub:
-            self.take(self.least(self.upper))
+            self.take(self.cheapest(self.upper))
         elif self.lower[self.index] > self.threshold:
-            self.take(self.least(self.lower))
+            self.take(self.cheapest(self.lower))
 
     def _hear_cost(self, child: str, context: Mapping[str, Entry], lb: float, ub: float) -> None:
         self.merge(context)
@@ -169,8 +169,8 @@ class ADOPT(BoundingProtocol):
 
     def _maintain_threshold_invariant(self) -> None:
         """LB <= threshold <= UB, and as the parent says if that is of the present context."""
-        if self.agrees(self.told.context):
-            self.threshold = self.told.threshold
+        if self.agrees(self.parent_threshold.context):
+            self.threshold = self.parent_threshold.threshold
         self.threshold = min(max(self.threshold, self.lb), self.ub)
 
     def _maintain_child_threshold_invariant(self, child: str, index: int) -> None:

@@ -50,9 +50,17 @@ from typing import assert_never, cast
 
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
-from robochoc.protocols.afb_bounds import Assignment, Cost, Estimates, Prices, Told, agreement, stamp_of
+from robochoc.protocols.afb_bounds import (
+    Assignment,
+    Cost,
+    CostLookup,
+    CPAEstimates,
+    Estimates,
+    common_length,
+    stamp_of,
+)
 from robochoc.protocols.afb_messages import CPA, FBCPA, FBEstimate, NewSolution, Terminate
-from robochoc.protocols.findings import Best, Findings
+from robochoc.protocols.findings import Findings, Incumbent
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -62,9 +70,9 @@ from robochoc.solver.compiled import LocalProblem
 class AFB(Protocol):
     """One agent of AFB. State: the strongest CPA that it knows of (`assignments`), its own `counter`, and `bound` (B).
 
-    `least` is known while this robot holds a CPA, or has handed it on: what each beginning costs at least, with the own
-    estimate. Then `paid` is what the CPA costs, `cost` the same with the own value, and `left` are the values that have
-    not been tried, the dearest first. `solution` is the best one that this robot has heard of.
+    `lower_bounds` are known while this robot holds a CPA, or has handed it on: what each beginning costs at least, with
+    the own estimate. Then `paid` is what the CPA costs, `cost` the same with the own value, and `left` are the values
+    that have not been tried, the most costly first. `solution` is the best one that this robot has heard of.
     """
 
     messages = CPA | FBCPA | FBEstimate | NewSolution | Terminate
@@ -86,22 +94,22 @@ class AFB(Protocol):
         self.bound: Cost = math.inf
         self.solution: NewSolution | None = None
         self.over = False
-        self.prices = Prices(problem, order)
+        self.costs = CostLookup(problem, order)
         self.estimates = Estimates()
-        self.least: list[Cost] | None = None
+        self.lower_bounds: list[Cost] | None = None
         self.paid: Cost = 0
         self.cost: Cost = 0
         self.left: list[int] = []
         self._came: list[Cost] | None = None
         self._asked: dict[str, list[Assignment]] = {}
-        self._told: dict[str, Told] = {}
+        self._sent_estimates: dict[str, CPAEstimates] = {}
 
     def start(self) -> None:
         """The first robot generates the CPA; the others wait."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
             return
-        self.prices.look_ahead()
+        self.costs.look_ahead()
         if self.rank == 0:
             self._came = [0]
             self.settle()
@@ -116,7 +124,7 @@ class AFB(Protocol):
             case FBCPA(assignments):
                 self._receive_fb_cpa(sender, assignments)
             case FBEstimate(stamp, estimates):
-                self.estimates.save(sender, Told(stamp, estimates))
+                self.estimates.save(sender, CPAEstimates(stamp, estimates))
             case NewSolution() as solution:
                 self._receive_new_solution(solution)
             case Terminate():
@@ -131,21 +139,21 @@ class AFB(Protocol):
         came, self._came = self._came, None
         if came is not None:
             self._take_up(came)
-        if self.least is not None:
-            self._assign_cpa(self.least)
+        if self.lower_bounds is not None:
+            self._assign_cpa(self.lower_bounds)
         self._send_fb_estimates()
 
     @property
-    def heard(self) -> Best | None:
+    def incumbent(self) -> Incumbent | None:
         """The best solution."""
         if self.solution is None:
             return None
-        return Best(self.solution.cost, dict(zip(self.order.names, self.solution.values, strict=True)))
+        return Incumbent(self.solution.cost, dict(zip(self.order.names, self.solution.values, strict=True)))
 
     @property
     def findings(self) -> Findings:
         """The best solution that this robot has heard of; of the first one also what all solutions cost at least."""
-        return Findings(best=self.heard, bound=self._bound_of_all())
+        return Findings(best=self.incumbent, bound=self._bound_of_all())
 
     # What the messages do
 
@@ -173,30 +181,30 @@ class AFB(Protocol):
 
     def _update(self, assignments: list[Assignment]) -> bool:
         """Return whether a CPA is not obsolete. The strongest is kept; what was done with a weaker one is void."""
-        common = agreement(stamp_of(assignments), stamp_of(self.assignments))
+        common = common_length(stamp_of(assignments), stamp_of(self.assignments))
         if common == len(assignments):
             return True
         if common < len(self.assignments) and assignments[common][1] < self.assignments[common][1]:
             return False
         self.assignments = assignments
-        self.least = self._came = self.value = None
+        self.lower_bounds = self._came = self.value = None
         return True
 
     # The one who holds the CPA
 
-    def _take_up(self, least: list[Cost]) -> None:
+    def _take_up(self, lower_bounds: list[Cost]) -> None:
         """The CPA is here: look at all values, unless it is known already that this is in vain."""
-        self.least, self.paid, self.left = least, least[-1], []
-        if self._backtrack_to(least, self.estimates.totals(stamp_of(self.assignments))) is None:
-            self.prices.price(self.assignments)
-            self.least = [cost + more for cost, more in zip(least, self.prices.estimates, strict=True)]
-            self.left = self.prices.dearest_first()
+        self.lower_bounds, self.paid, self.left = lower_bounds, lower_bounds[-1], []
+        if self._backtrack_to(lower_bounds, self.estimates.totals(stamp_of(self.assignments))) is None:
+            self.costs.look_up(self.assignments)
+            self.lower_bounds = [cost + more for cost, more in zip(lower_bounds, self.costs.estimates, strict=True)]
+            self.left = self.costs.by_decreasing_cost()
 
-    def _assign_cpa(self, least: list[Cost]) -> None:
+    def _assign_cpa(self, lower_bounds: list[Cost]) -> None:
         """Keep the value while a better solution may come of it; or take the cheapest one left, or go back."""
         while True:
             totals = self.estimates.totals(stamp_of(self._cpa))
-            shortest = self._backtrack_to(least, totals)
+            shortest = self._backtrack_to(lower_bounds, totals)
             if shortest is not None:
                 self._backtrack(shortest)
                 return
@@ -204,25 +212,25 @@ class AFB(Protocol):
                 if self.cost + totals[-1] < self.bound:
                     return
                 self.value = None
-            if not self.left or self.paid + self.prices.at_least(self.left[-1]) + totals[self.rank] >= self.bound:
+            if not self.left or self.paid + self.costs.at_least(self.left[-1]) + totals[self.rank] >= self.bound:
                 self._backtrack(self.rank)
                 return
             self._assign(self.left.pop())
             if self.below:
-                self._send_cpa(least)
+                self._send_cpa(lower_bounds)
                 return
             self._send_new_solution()
 
     def _assign(self, index: int) -> None:
         self.value = index
         self.counter += 1
-        self.cost = self.paid + self.prices.last[index]
+        self.cost = self.paid + self.costs.last[index]
 
-    def _send_cpa(self, least: list[Cost]) -> None:
+    def _send_cpa(self, lower_bounds: list[Cost]) -> None:
         """The CPA goes to the next robot, copies of it to all whose estimates may change."""
         cpa = self._cpa
         stamp = stamp_of(cpa)
-        self.send(self.below[0], CPA(cpa, self.bound, [*least, self.cost]))
+        self.send(self.below[0], CPA(cpa, self.bound, [*lower_bounds, self.cost]))
         self.estimates.ask(self.below[0], stamp)
         for robot in self.below[1:]:
             if self.estimates.outdated(robot, stamp):
@@ -237,14 +245,14 @@ class AFB(Protocol):
             self.send(robot, self.solution)
         self.value = None
 
-    def _backtrack_to(self, least: list[Cost], totals: list[Cost]) -> int | None:
+    def _backtrack_to(self, lower_bounds: list[Cost], totals: list[Cost]) -> int | None:
         """How long the shortest beginning of the CPA is that no better solution has; None: each may have one."""
-        pairs = enumerate(zip(least, totals, strict=False))
+        pairs = enumerate(zip(lower_bounds, totals, strict=False))
         return next((length for length, (cost, more) in pairs if cost + more >= self.bound), None)
 
     def _backtrack(self, length: int) -> None:
         """No better solution begins like the CPA does up to `length`: its last robot has to take another value."""
-        self.least = self.value = None
+        self.lower_bounds = self.value = None
         self._asked = {robot: asked for robot, asked in self._asked.items() if len(asked) < length}
         if length:
             self.send(self.order.names[length - 1], CPA(self.assignments[:length], self.bound, []))
@@ -264,15 +272,15 @@ class AFB(Protocol):
         for robot, assignments in asked.items():
             length = len(assignments)
             if self.assignments[:length] == assignments:
-                self.prices.price(assignments)
-                told = Told(stamp_of(assignments), self.prices.told(length))
-                if robot not in self._told or not told.follows(self._told[robot]):
-                    self._told[robot] = told
-                    self.send(robot, FBEstimate(told.stamp, told.estimates))
+                self.costs.look_up(assignments)
+                estimates = CPAEstimates(stamp_of(assignments), self.costs.shared(length))
+                if robot not in self._sent_estimates or not estimates.follows(self._sent_estimates[robot]):
+                    self._sent_estimates[robot] = estimates
+                    self.send(robot, FBEstimate(estimates.stamp, estimates.estimates))
 
     def _stop(self) -> None:
         self.over = True
-        self.least = None
+        self.lower_bounds = None
         self._take_best()
 
     def _take_best(self) -> None:
@@ -281,7 +289,7 @@ class AFB(Protocol):
 
     def _bound_of_all(self) -> Cost | None:
         """What every solution costs at least: what it takes for a better one than B, or B. None: not known here."""
-        if self.rank or (self.least is None and not self.over):
+        if self.rank or (self.lower_bounds is None and not self.over):
             return None
         if self.over:
             return self.bound
@@ -290,7 +298,7 @@ class AFB(Protocol):
         if self.value is not None:
             ways.append(self.cost + totals[-1])
         if self.left:
-            ways.append(self.prices.at_least(self.left[-1]) + totals[0])
+            ways.append(self.costs.at_least(self.left[-1]) + totals[0])
         return min(ways)
 
     @property

@@ -20,7 +20,7 @@ Stamp = Sequence[int]
 """The time-stamp of a CPA: its robots' counters. Nobody counts twice the same, so it tells the assignments, too."""
 
 
-class Prices:
+class CostLookup:
     """What the own values cost with each beginning of a CPA: every constraint is looked up once for it.
 
     What a CPA has in common with the last one is not looked up again. `estimates` says for each beginning, the empty
@@ -42,10 +42,10 @@ class Prices:
         self._rows = [self._problem.costs({})]
         self.estimates = [self._estimate(self._rows[0])]
 
-    def price(self, assignments: Sequence[Assignment]) -> None:
+    def look_up(self, assignments: Sequence[Assignment]) -> None:
         """Look at all values with `assignments` of the first robots, and with each of their beginnings."""
         stamp = stamp_of(assignments)
-        common = agreement(self._stamp, stamp)
+        common = common_length(self._stamp, stamp)
         if common == len(assignments):
             return
         for known in (self._rows, self._depths, self.estimates):
@@ -55,7 +55,7 @@ class Prices:
         for length in range(common, len(assignments)):
             self._add(self._names[length], assignments[length][0], length + 1)
 
-    def told(self, length: int) -> list[Cost]:
+    def shared(self, length: int) -> list[Cost]:
         """The estimates for beginnings up to `length`, without those at the end that depend on nothing more."""
         return self.estimates[: self._depths[length] + 1]
 
@@ -68,7 +68,7 @@ class Prices:
         """What the value at `index` costs with the assignments that came last, and with lower robots only."""
         return self._rows[-1][index] + self._ahead[index]
 
-    def dearest_first(self) -> list[int]:
+    def by_decreasing_cost(self) -> list[int]:
         """All own values, those at the end first that cost `at_least` the least; of equals, the first is last."""
         return sorted(range(len(self._problem.values) - 1, -1, -1), key=self.at_least, reverse=True)
 
@@ -93,7 +93,7 @@ class Prices:
         return self._problem.lower_bounds(self._below)
 
 
-class Told(NamedTuple):
+class CPAEstimates(NamedTuple):
     """Estimates for a CPA of that time-stamp and all its beginnings, the empty one first.
 
     The last one holds for all longer beginnings.
@@ -107,10 +107,10 @@ class Told(NamedTuple):
 
         An estimate for a beginning is one for all that begin like it, if not the best one.
         """
-        known = self.estimates[: agreement(self.stamp, stamp) + 1]
+        known = self.estimates[: common_length(self.stamp, stamp) + 1]
         return [*known, *[known[-1]] * (len(stamp) + 1 - len(known))]
 
-    def follows(self, before: Told) -> bool:
+    def follows(self, before: CPAEstimates) -> bool:
         """Return whether it says no more than what follows from what was told `before`."""
         return self.along(self.stamp) == before.along(self.stamp)
 
@@ -124,30 +124,32 @@ class Estimates:
 
     def __init__(self) -> None:
         self._asked: dict[str, Stamp] = {}
-        self._told: dict[str, Told] = {}
+        self._received: dict[str, CPAEstimates] = {}
 
     def outdated(self, robot: str, stamp: Stamp) -> bool:
         """Return whether `robot` may have another estimate than for the last CPA that it was asked for.
 
         On how many robots' values its estimates depend, the first one that it tells says for all CPAs.
         """
-        if robot not in self._told:
+        if robot not in self._received:
             return True
-        return agreement(self._asked[robot], stamp) < len(self._told[robot].estimates) - 1
+        return common_length(self._asked[robot], stamp) < len(self._received[robot].estimates) - 1
 
     def ask(self, robot: str, stamp: Stamp) -> None:
         """`robot` is asked for its estimates for the CPA of this time-stamp."""
         self._asked[robot] = stamp
 
-    def save(self, robot: str, told: Told) -> None:
+    def save(self, robot: str, estimates: CPAEstimates) -> None:
         """Keep what `robot` tells."""
-        self._told[robot] = told
+        self._received[robot] = estimates
 
     def totals(self, stamp: Stamp) -> list[Cost]:
         """What the robots below add at least to each beginning of a CPA, the empty one first."""
-        if not self._told:
+        if not self._received:
             return [0] * (len(stamp) + 1)
-        return [sum(estimates) for estimates in zip(*[told.along(stamp) for told in self._told.values()], strict=True)]
+        return [
+            sum(estimates) for estimates in zip(*[one.along(stamp) for one in self._received.values()], strict=True)
+        ]
 
 
 def stamp_of(assignments: Sequence[Assignment]) -> list[int]:
@@ -155,7 +157,7 @@ def stamp_of(assignments: Sequence[Assignment]) -> list[int]:
     return [counter for _, counter in assignments]
 
 
-def agreement(left: Stamp, right: Stamp) -> int:
+def common_length(left: Stamp, right: Stamp) -> int:
     """For how many robots, from the first one on, two CPAs have the same assignments: the same counters."""
     for place, (one, other) in enumerate(zip(left, right, strict=False)):
         if one != other:

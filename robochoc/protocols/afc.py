@@ -155,7 +155,7 @@ class AFC(Protocol):
         """Add a value to the CPA, unless it is known that this is in vain."""
         self.sc = max(self.sc, held.sc)
         above = held.assignments[: self.rank]
-        if not self.consistent and begins(self.view, above):
+        if not self.consistent and is_prefix(self.view, above):
             self._backtrack(self.view)
             return
         self.view, self.consistent = above, True
@@ -200,7 +200,7 @@ class AFC(Protocol):
             return
         self.sc = sc
         self.value = None  # a robot above has taken another value since
-        if self.consistent or not begins(self.view, assignments):
+        if self.consistent or not is_prefix(self.view, assignments):
             self.view, self.consistent = assignments, True
 
     def _forward_check(self) -> None:
@@ -216,8 +216,8 @@ class AFC(Protocol):
 
     def _process_not_ok(self, inconsistent: Assignments, sc: int) -> None:
         """Believe it when it is about the view, or about a CPA as late; otherwise it is obsolete."""
-        if self.consistent or not begins(self.view, inconsistent):
-            if sc < self.sc and not begins(inconsistent, self.view):
+        if self.consistent or not is_prefix(self.view, inconsistent):
+            if sc < self.sc and not is_prefix(inconsistent, self.view):
                 return
             self.view, self.consistent = inconsistent, False
         self.sc = max(self.sc, sc)
@@ -245,7 +245,7 @@ class FilteredDomain:
         """Look at the values under `assignments`."""
         if assignments == self._assignments:
             return
-        common = agreement(assignments, self._assignments)
+        common = common_length(assignments, self._assignments)
         self._assignments = assignments
         view = dict(zip(self._order.names, assignments, strict=False))
         for index, depth in enumerate(self._ruled_out):
@@ -263,12 +263,12 @@ class FilteredDomain:
         return None if len(depths) < len(self._ruled_out) else self._assignments[: max(depths, default=0)]
 
 
-def begins(beginning: Assignments, assignments: Assignments) -> bool:
+def is_prefix(beginning: Assignments, assignments: Assignments) -> bool:
     """Return whether `assignments` are `beginning` and perhaps more."""
     return assignments[: len(beginning)] == beginning
 
 
-def agreement(left: Assignments, right: Assignments) -> int:
+def common_length(left: Assignments, right: Assignments) -> int:
     """For how many robots, from the first one on, two partial assignments name the same values."""
     pairs = enumerate(zip(left, right, strict=False))
     return next((place for place, (one, other) in pairs if one != other), min(len(left), len(right)))

@@ -99,8 +99,8 @@ class AFCng(Protocol):
     """One agent of AFC-ng. State: `view` and its `counters` (AgentView), `store` (NogoodStore), `counter` (t_i).
 
     `above` are the robots whose values a CPA tells, the highest first; the view knows the first few of them.
-    `successors` may take a value once this robot has one, and `told` are all who get its CPAs. For each own value,
-    `checked` is the place in the order down to which all constraints are known to hold in the view.
+    `successors` may take a value once this robot has one, and `cpa_receivers` are all robots that get its CPAs. For
+    each own value, `checked` is the place in the order down to which all constraints are known to hold in the view.
     """
 
     messages = CPA | Nogood | Solved
@@ -115,7 +115,7 @@ class AFCng(Protocol):
         super().__init__(problem, order)
         self.above = self._above()
         self.successors = self._successors()
-        self.told = [*self.successors, *(child for child in problem.children if child not in self.successors)]
+        self.cpa_receivers = [*self.successors, *(child for child in problem.children if child not in self.successors)]
         self.view: dict[str, Value] = {}
         self.counters = [0] * len(self.above)
         self.counter = 0
@@ -194,7 +194,7 @@ class AFCng(Protocol):
 
     def _send_cpa(self, own: Assignment) -> None:
         cpa = CPA([*zip(self.view.values(), self.counters, strict=True), own])
-        for robot in self.told:
+        for robot in self.cpa_receivers:
             self.send(robot, cpa)
 
     def _detect_solution(self) -> None:

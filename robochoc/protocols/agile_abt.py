@@ -17,7 +17,7 @@ since values left are between 0 and the domain's size, or unknown. So changes of
 numbers in the vectors are, and all robots hold the strongest order ever made, since each went to all. From then on
 it is ABT. Why it is right: nogoods follow from the constraints in any order, so the empty one proves that there is
 no solution. When nobody speaks any more, all orders are equal; each robot's value agrees with what it knows of those
-above it; and it knows all that it has to, as `told` has seen to: each robot remembers what it last told to whom,
+above it; and it knows all that it has to, by `sent_values`: each robot remembers what it last told to whom,
 and speaks to those below it that have heard something else, or that have forgotten it to send a nogood.
 
 What the paper leaves open, or what is done otherwise here: constraints may be n-ary (the robot of the scope that stands
@@ -121,7 +121,7 @@ class AgileABT(Backtracking):
 
     State: `present` (o_i) and `termination` (TV_i), `view` (AgentView), `store` (NogoodStore), `explanations` (E_i),
     and the `sizes` of the domains it has been told. `higher` tell this robot their values while they are above it,
-    and it tells its own to `listeners` while they are below; `told` is what it told them last.
+    and it tells its own to `listeners` while they are below; `sent_values` are the last ones that it told them.
     """
 
     messages = Ok | Nogood | Order | AddLink
@@ -142,7 +142,7 @@ class AgileABT(Backtracking):
         self.sizes = {self.name: len(problem.values)}
         self.higher = set(problem.neighbours)
         self.listeners = list(problem.neighbours)
-        self.told: dict[str, Value] = {}
+        self.sent_values: dict[str, Value] = {}
 
     def start(self) -> None:
         """Choose a first value and tell it."""
@@ -179,9 +179,9 @@ class AgileABT(Backtracking):
 
     def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
         """Accept a nogood about the present value that agrees with the order and the view; others are obsolete."""
-        told = self.told.get(sender)
-        if told is not None and not contradicts(nogood.value, told):
-            del self.told[sender]  # it has forgotten my value; if I have told it another one, that is on its way
+        last = self.sent_values.get(sender)
+        if last is not None and not contradicts(nogood.value, last):
+            del self.sent_values[sender]  # it has forgotten my value; if I have told it another one, that is on its way
         current = self._current()
         if current is None or contradicts(nogood.value, current) or not self._coherent(nogood):
             return
@@ -197,7 +197,7 @@ class AgileABT(Backtracking):
         """Tell the sender the value whenever it is below this robot, and now if it is."""
         if sender not in self.listeners:
             self.listeners.append(sender)
-        self.told.pop(sender, None)
+        self.sent_values.pop(sender, None)
 
     # The search
 
@@ -215,13 +215,15 @@ class AgileABT(Backtracking):
     def _tell(self, value: Value) -> None:
         """Tell the value to all below that have last heard another one, or none, of this robot."""
         rank = self.present.rank
-        below = [name for name in self.listeners if rank[name] > rank[self.name] and self.told.get(name) != value]
+        below = [
+            name for name in self.listeners if rank[name] > rank[self.name] and self.sent_values.get(name) != value
+        ]
         if below:
             lhs, left = self._own_explanation()
             ok = Ok(value, dict(lhs), left, len(self.problem.values))
             for name in below:
                 self.send(name, ok)
-                self.told[name] = value
+                self.sent_values[name] = value
 
     def _backtrack(self) -> None:
         """Resolve the stored nogoods, one for each value, and tell a robot among their causes."""
@@ -297,7 +299,7 @@ class AgileABT(Backtracking):
         return {name: value for name, value in self.view.items() if rank[name] < rank[self.name]}
 
     def _coherent(self, nogood: Nogood) -> bool:
-        """Return whether all of the left side is above this robot, and known to be so by those that tell it their values."""
+        """Return whether the whole left side is above this robot, and its robots' own values say the same."""
         return compatible(self.present, self.name, nogood.lhs) and all(
             agent in self.view and not contradicts(value, self.view[agent])
             for agent, value in nogood.lhs.items()

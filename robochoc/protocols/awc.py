@@ -90,9 +90,9 @@ class Kept(NamedTuple):
     own: Value
 
 
-def stands(value: Value, told: Value | None) -> bool:
+def agrees(value: Value, known: Value | None) -> bool:
     """Return whether `told` is known to be as `value` says, wherever that is not None."""
-    return told is not None and all(part is None or part == known for part, known in zip(value, told, strict=True))
+    return known is not None and all(part is None or part == other for part, other in zip(value, known, strict=True))
 
 
 class NogoodList:
@@ -114,17 +114,17 @@ class NogoodList:
             own = nogood.pop(agent)
             self._awake.append(Kept(nogood, own))
 
-    def told(self, agent: str, value: Value) -> None:
+    def update(self, agent: str, value: Value) -> None:
         """`agent` has taken `value`: wake those that waited for it."""
         waiting = self._waiting.get(agent, {})
-        for part in [part for part in waiting if stands(part, value)]:
+        for part in [part for part in waiting if agrees(part, value)]:
             self._awake += waiting.pop(part)
 
     def standing(self, view: LeftSide) -> list[Kept]:
         """Those whose others all say in `view` what the nogood says of them."""
         awake = []
         for kept in self._awake:
-            missing = next((agent for agent, value in kept.others.items() if not stands(value, view.get(agent))), None)
+            missing = next((agent for agent, value in kept.others.items() if not agrees(value, view.get(agent))), None)
             if missing is None:
                 awake.append(kept)
             else:
@@ -186,7 +186,7 @@ class AWC(Protocol):
     def _received_ok(self, agent: str, value: Value, priority: int) -> None:
         self.view[agent] = value
         self.priorities[agent] = priority
-        self.nogoods.told(agent, value)
+        self.nogoods.update(agent, value)
 
     def _received_nogood(self, nogood: dict[str, tuple[Value, int]]) -> None:
         """Keep it; robots in it that are no neighbours become ones, and meanwhile it is believed about them."""
@@ -228,9 +228,9 @@ class AWC(Protocol):
         if key in self.sent:
             return
         self.sent.add(key)
-        told = Nogood({agent: (value, self.priorities[agent]) for agent, value in nogood.items()})
+        message = Nogood({agent: (value, self.priorities[agent]) for agent, value in nogood.items()})
         for agent in nogood:
-            self.send(agent, told)
+            self.send(agent, message)
         self.priority = 1 + max(self.priorities.values())
         self._look_up()
         self._take(self._allowed())
@@ -289,7 +289,7 @@ class AWC(Protocol):
                 self._standing[index].append(others)
 
     def _is_higher(self, agent: str) -> bool:
-        """Return whether `agent` has higher priority than this robot; of equals, who comes first in the static order."""
+        """Return whether `agent` has higher priority than this robot; ties go by the static order."""
         other = (-self.priorities[agent], self.order.rank[agent])
         return other < (-self.priority, self.order.rank[self.problem.agent])
 

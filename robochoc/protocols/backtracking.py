@@ -55,9 +55,9 @@ class Backtracking(Protocol):
         self.higher.update(strangers)
         for agent, value in lhs.items():
             known = self.view.get(agent)
-            told = joined(known, value)
-            if told != known:
-                self._update(agent, told)
+            more = joined(known, value)
+            if more != known:
+                self._update(agent, more)
         return strangers
 
     def _current(self) -> Value | None:

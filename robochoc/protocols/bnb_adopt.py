@@ -5,7 +5,7 @@ names the methods bear; which messages need not be sent: Gutierrez, Meseguer: "S
 BnB-ADOPT", AAAI 2010:
 
     Start          `begin`                 InitSelf        `_merge`, `_choose`
-    When Received  `hear`                  InitChild       `forget` (in `bounding`, as the next ones)
+    When Received  `handle`                InitChild       `forget` (in `bounding`, as the next ones)
     Backtrack      `decide`, `act`         PriorityMerge   `merge`
                                            Compatible      `agrees`
 
@@ -97,7 +97,7 @@ class Cost(Message, frozen=True):
 class BnBADOPT(BoundingProtocol):
     """One agent of BnB-ADOPT+. State beside the bounds: `threshold` (TH).
 
-    `told` is what each child knows of the own value, and `said` the last Cost, without its request.
+    `sent_values` are the last Values sent to each child, `sent_cost` the last Cost, without its request.
     """
 
     messages = TreeMessage | Value | Cost | Terminate
@@ -115,15 +115,15 @@ class BnBADOPT(BoundingProtocol):
         super().__init__(problem, order)
         self.threshold: float = INFINITE
         self.threshold_request = False
-        self.told: dict[str, Value] = {}
-        self.said: Cost | None = None
+        self.sent_values: dict[str, Value] = {}
+        self.sent_cost: Cost | None = None
         self._moved = False
 
-    def hear(self, sender: str, said: Message) -> None:
+    def handle(self, sender: str, message: Message) -> None:
         """Dispatch on the message's type."""
         if self.terminated:
             return
-        match cast("Value | Cost | Terminate", said):
+        match cast("Value | Cost | Terminate", message):
             case Value(value, counter, threshold):
                 self._merge({sender: (value, counter)})
                 if sender == self.parent:
@@ -133,7 +133,7 @@ class BnBADOPT(BoundingProtocol):
                 self._merge(cost.context)
                 self.bound(sender, cost.context, cost.lb, cost.ub)
                 if cost.threshold_request:
-                    self.told.pop(sender, None)
+                    self.sent_values.pop(sender, None)
             case Terminate(context):
                 self._merge(context)
                 self.threshold = INFINITE
@@ -163,19 +163,19 @@ class BnBADOPT(BoundingProtocol):
 
     def _choose(self) -> None:
         if self.ub <= self.lb:
-            self.take(self.least(self.upper))
+            self.take(self.cheapest(self.upper))
         elif self._moved or self.lower[self.index] >= min(self.threshold, self.ub):
-            self.take(self.least(self.lower))
+            self.take(self.cheapest(self.lower))
         self._moved = False
 
     # What is said
 
     def _tell_value(self, child: str) -> None:
         """Tell `child` a new value, a higher threshold, or what it has asked for."""
-        said, last = Value(*self.own, self._share(child)), self.told.get(child)
-        if last is None or last.counter < said.counter or last.threshold < said.threshold:
-            self.told[child] = said
-            self.send(child, said)
+        value, last = Value(*self.own, self._share(child)), self.sent_values.get(child)
+        if last is None or last.counter < value.counter or last.threshold < value.threshold:
+            self.sent_values[child] = value
+            self.send(child, value)
 
     def _share(self, child: str) -> float:
         """What of this robot's threshold is left for the subtree of `child`, if the others cost as little as can be."""
@@ -187,8 +187,8 @@ class BnBADOPT(BoundingProtocol):
 
     def _tell_cost(self) -> None:
         """Tell the parent new bounds, or bounds in a new context; and anything if the threshold is needed."""
-        said = Cost(dict(self.context), self.lb, self.ub)
-        if self.parent is not None and (self.threshold_request or said != self.said):
-            self.said = said
-            self.send(self.parent, msgspec.structs.replace(said, threshold_request=self.threshold_request))
+        cost = Cost(dict(self.context), self.lb, self.ub)
+        if self.parent is not None and (self.threshold_request or cost != self.sent_cost):
+            self.sent_cost = cost
+            self.send(self.parent, msgspec.structs.replace(cost, threshold_request=self.threshold_request))
             self.threshold_request = False

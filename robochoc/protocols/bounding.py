@@ -101,7 +101,7 @@ class BoundingProtocol(TreeProtocol):
         for child in self.children:
             self.bounds[child] = Bounds(len(self.problem.values))
             self.forget(child)
-        self.take(self.least(self.delta))
+        self.take(self.cheapest(self.delta))
 
     @abstractmethod
     def act(self) -> None:
@@ -185,7 +185,7 @@ class BoundingProtocol(TreeProtocol):
             self.upper = [INFINITE] * len(self.lower)
         self.lb, self.ub = min(self.lower), min(self.upper)
 
-    def least(self, costs: Sequence[float]) -> int:
+    def cheapest(self, costs: Sequence[float]) -> int:
         """The value with the least of `costs`: the present one if it is among several."""
         return min(range(len(costs)), key=lambda index: (costs[index], index != self.value))
 
@@ -224,11 +224,11 @@ class BoundingProtocol(TreeProtocol):
         for child in self.children:
             self.send(child, Terminate({**self.context, self.problem.agent: self.own}))
 
-    def tell(self, receiver: str, said: Message) -> None:
+    def tell(self, receiver: str, message: Message) -> None:
         """Say what is new: not what `receiver` has been told last by a message of that type."""
-        if self._last.get((receiver, type(said))) != said:
-            self._last[receiver, type(said)] = said
-            self.send(receiver, said)
+        if self._last.get((receiver, type(message))) != message:
+            self._last[receiver, type(message)] = message
+            self.send(receiver, message)
 
     def value_notes(self, index: int) -> Mapping[str, float]:
         """Return LB(d) and UB(d) of the value at `index`."""

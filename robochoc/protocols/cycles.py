@@ -109,9 +109,9 @@ class CycleProtocol(Protocol):
     def settle(self) -> None:
         """Go on as far as all that is waited for has come."""
         while self._then and not self._missing and self.verdict is None:
-            heard = {name: self._waiting[name].popleft() for name in self._awaited}
+            messages = {name: self._waiting[name].popleft() for name in self._awaited}
             then, self._then = self._then, None
-            then(heard)
+            then(messages)
 
     def listen(self, names: Sequence[str], then: Then) -> None:
         """Wait for a message of each robot in `names`, and `then` go on with them."""
@@ -168,6 +168,6 @@ def gain(before: LexicographicCost, after: LexicographicCost) -> LexicographicCo
     return before[0] - after[0], before[1] - after[1]
 
 
-def said(heard: Mapping[str, wire.Message]) -> dict[str, wire.Value]:
+def values_in(messages: Mapping[str, wire.Message]) -> dict[str, wire.Value]:
     """What all have said in a phase in which everybody says a `Value`."""
-    return {name: message.value for name, message in heard.items() if isinstance(message, Value)}
+    return {name: message.value for name, message in messages.items() if isinstance(message, Value)}

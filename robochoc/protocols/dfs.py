@@ -72,7 +72,7 @@ class TreeProtocol(Protocol):
     """One agent that takes its place in a pseudo-tree first, and then speaks a protocol on it.
 
     `parent` (None: a root), `pseudo_parents`, `children` and `pseudo_children` are known, in priority order, from
-    `begin` on; then come `hear` for each message and `decide` for each packet. Messages that come before are kept
+    `begin` on; then come `handle` for each message and `decide` for each packet. Messages that come before are kept
     for then. Children may begin before their parents, never after.
     """
 
@@ -92,7 +92,7 @@ class TreeProtocol(Protocol):
         """The place in the tree is known: the search may begin."""
 
     @abstractmethod
-    def hear(self, sender: str, message: Message) -> None:
+    def handle(self, sender: str, message: Message) -> None:
         """Take in one message of the search."""
 
     def decide(self) -> None:
@@ -114,7 +114,7 @@ class TreeProtocol(Protocol):
             return
         match message:
             case Wave():
-                self._propagate(self._election.hear(sender, message))
+                self._propagate(self._election.receive(sender, message))
                 if self._election.won:
                     self._visit(None, [])
             case Token(visited):
@@ -122,7 +122,7 @@ class TreeProtocol(Protocol):
             case Back(visited):
                 self._go_on(visited)
             case _ if self.placed:
-                self.hear(sender, message)
+                self.handle(sender, message)
             case _:
                 self._early.append((sender, message))
 
@@ -201,22 +201,22 @@ class _Election:
         """The own wave goes out."""
         return [(name, self._wave) for name in self._neighbours]
 
-    def hear(self, sender: str, wave: Wave) -> list[tuple[str, Wave]]:
+    def receive(self, sender: str, wave: Wave) -> list[tuple[str, Wave]]:
         """What to say to a wave; a weaker candidate's one ends here."""
         self._degrees[wave.candidate] = wave.neighbours
-        said: list[tuple[str, Wave]] = []
+        answers: list[tuple[str, Wave]] = []
         if self.strength(wave.candidate) > self.strength(self._candidate):
             self._candidate, self._from, self._heard = wave.candidate, sender, set()
-            said = [(name, self._wave) for name in self._neighbours if name != sender]
+            answers = [(name, self._wave) for name in self._neighbours if name != sender]
         if wave.candidate != self._candidate:
-            return said
+            return answers
         self._heard.add(sender)
         if len(self._heard) == len(self._neighbours):
             if self._from is None:
                 self.won = True
             else:
-                said.append((self._from, self._wave))
-        return said
+                answers.append((self._from, self._wave))
+        return answers
 
     @property
     def _wave(self) -> Wave:

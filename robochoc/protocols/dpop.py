@@ -98,7 +98,7 @@ class DPOP(TreeProtocol):
 
     State: `domains` of the neighbours above, `dimensions` of the children; then `separator`, and `utils`, the
     children's tables; then `choices`, for each combination of values in the separator the cheapest own value, and
-    `least`, what the whole tree costs (at its root).
+    `optimum`, what the whole tree costs (at its root).
     """
 
     messages = TreeMessage | Domain | Dimensions | Proceed | UTIL | VALUE
@@ -121,7 +121,7 @@ class DPOP(TreeProtocol):
         self.separator: tuple[str, ...] | None = None
         self.utils: dict[str, Arriving] = {}
         self.choices: Codes | None = None
-        self.least: int | None = None
+        self.optimum: int | None = None
         self._sizes: dict[str, int] = {}
         self._dearest = 0
         self._need = Need(0, problem.agent)
@@ -134,7 +134,7 @@ class DPOP(TreeProtocol):
             self.send(name, Domain(list(self.problem.values)))
         self._measure()
 
-    def hear(self, sender: str, message: Message) -> None:
+    def handle(self, sender: str, message: Message) -> None:
         """Dispatch on the message's type."""
         match cast("Domain | Dimensions | Proceed | UTIL | VALUE", message):
             case Domain(values):
@@ -156,7 +156,7 @@ class DPOP(TreeProtocol):
     @property
     def findings(self) -> Findings:
         """The place in the tree; a root knows what its tree costs as soon as it has all tables."""
-        return msgspec.structs.replace(super().findings, bound=self.least)
+        return msgspec.structs.replace(super().findings, bound=self.optimum)
 
     # How large tables will be
 
@@ -177,9 +177,11 @@ class DPOP(TreeProtocol):
         else:
             self.send(self.parent, Dimensions(self._sizes, self._dearest, width, most))
 
-    def _check(self, child: str, told: Dimensions) -> None:
-        """Raise `ValueError` unless `told` may be true."""
-        if not (len(told.separator) <= MOST_AXES and told.induced_width >= 0 and told.most.bytes >= 0):
+    def _check(self, child: str, dimensions: Dimensions) -> None:
+        """Raise `ValueError` unless `dimensions` are possible."""
+        if not (
+            len(dimensions.separator) <= MOST_AXES and dimensions.induced_width >= 0 and dimensions.most.bytes >= 0
+        ):
             raise ValueError(f"{child} tells dimensions that cannot be")
 
     def _refuse(self, most: Need, width: int) -> None:
@@ -187,7 +189,7 @@ class DPOP(TreeProtocol):
         check_exact(self._dearest)
         if most.bytes > self.settings.memory:
             raise TooLargeError(
-                f"{most.robot} needs {_told(most.bytes)} for its tables, more than {self.settings.memory:,}: the"
+                f"{most.robot} needs {_bytes_text(most.bytes)} for its tables, more than {self.settings.memory:,}: the"
                 f" robots' pseudo-tree has induced width {width} (--set memory=BYTES raises the limit)"
             )
 
@@ -261,7 +263,7 @@ class DPOP(TreeProtocol):
         if is_hopeless(costs):
             self.conclude(Verdict.NO_SOLUTION)
         elif self.parent is None:
-            self.least = int(costs.item())
+            self.optimum = int(costs.item())
             self._choose_optimal([])
         else:
             for width, piece in packed(costs):
@@ -291,11 +293,11 @@ class DPOP(TreeProtocol):
             self.send(child, VALUE([agent_view[name] for name in self._axes[child]]))
 
 
-def _keep(sender: str, said: T, heard: dict[str, T], speakers: Sequence[str]) -> None:
+def _keep(sender: str, item: T, received: dict[str, T], speakers: Sequence[str]) -> None:
     """What one of `speakers` says once; raises `ValueError` for anybody else, and for more."""
-    if sender not in speakers or sender in heard:
+    if sender not in speakers or sender in received:
         raise ValueError(f"{sender} had nothing to say of this, or has said it already")
-    heard[sender] = said
+    received[sender] = item
 
 
 def _nearest(number: int) -> float:
@@ -306,7 +308,7 @@ def _nearest(number: int) -> float:
         return math.inf
 
 
-def _told(size: float) -> str:
+def _bytes_text(size: float) -> str:
     """So many bytes, in words."""
     if size == math.inf:
         return "more than 10^308 bytes"

@@ -104,7 +104,7 @@ def is_hopeless(costs: Codes) -> bool:
 
 def packed(costs: Codes) -> Iterator[tuple[Width, bytes]]:
     """`costs` for the wire, in pieces: no cost takes more bytes than the dearest one needs."""
-    width = width_of(_dearest(costs))
+    width = width_of(_max_finite(costs))
     flat = costs.reshape(-1)
     step = PIECE // width
     for start in range(0, flat.size, step):
@@ -143,8 +143,8 @@ class Arriving:
         if len(piece) % width or not 0 < len(piece) // width <= self._left:
             raise ValueError(f"{len(piece)} bytes, {width} a cost, are no piece of a table that lacks {self._left}")
         codes = np.frombuffer(piece, f"<u{width}")
-        if _dearest(codes) > self._dearest:
-            raise ValueError(f"a cost of {_dearest(codes)} is more than the most, {self._dearest}")
+        if _max_finite(codes) > self._dearest:
+            raise ValueError(f"a cost of {_max_finite(codes)} is more than the most, {self._dearest}")
         if self._costs is None:
             self._costs = np.empty(self._shape, codes.dtype)
         start = self._costs.size - self._left
@@ -163,7 +163,7 @@ def _block(table: Table, place: Sequence[int]) -> Array:
     return costs
 
 
-def _dearest(costs: Codes) -> int:
+def _max_finite(costs: Codes) -> int:
     """The largest that is finite; 0 if there is none."""
     flat = costs.reshape(-1)
     blocks = (flat[start : start + BLOCK] for start in range(0, flat.size, BLOCK))

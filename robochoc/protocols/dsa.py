@@ -35,7 +35,7 @@ from collections.abc import Mapping
 from typing import Literal
 
 from robochoc.model.message import Message
-from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, CycleSettings, Value, gain, said
+from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, CycleSettings, Value, gain, values_in
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 
 
@@ -72,9 +72,9 @@ class DSA(CycleProtocol):
         self.take(self.any_value())
         self.tell_value(self._choose)
 
-    def _choose(self, heard: Mapping[str, Message]) -> None:
+    def _choose(self, messages: Mapping[str, Message]) -> None:
         """All neighbours' values are known: move, or stay."""
-        burdens = self.problem.lexicographic_costs(said(heard))
+        burdens = self.problem.lexicographic_costs(values_in(messages))
         now, least = burdens[self.present], min(burdens)
         index = self.present
         if gain(now, least) > NO_GAIN or self._moves_sideways(now != (0, self.problem.charges[index])):

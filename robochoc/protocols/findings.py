@@ -13,7 +13,7 @@ from robochoc.model.message import Value
 from robochoc.model.outcome import PseudoTreeNode
 
 
-class Best(msgspec.Struct, frozen=True):
+class Incumbent(msgspec.Struct, frozen=True):
     """The cheapest assignment of all robots that this one has heard of, and its `cost`."""
 
     cost: float
@@ -36,7 +36,7 @@ class Findings(msgspec.Struct, frozen=True):
     `bound`: no assignment of the robots that it speaks for (a root: of its tree; the first robot: of all) costs less.
     """
 
-    best: Best | None = None
+    best: Incumbent | None = None
     bound: float | None = None
     place: PseudoTreeNode | None = None
     trail: Trail | None = None

@@ -22,12 +22,12 @@ def grouped(items: Iterable[T]) -> tuple[list[T], list[Run]]:
     return list(places), [(place, len(list(same))) for place, same in groupby(numbers)]
 
 
-def one_by_one(distinct: Sequence[T], runs: Sequence[Run]) -> list[T]:
-    """The list that `grouped` was given. Only for runs that are `fitting`."""
+def expanded(distinct: Sequence[T], runs: Sequence[Run]) -> list[T]:
+    """The list that `grouped` was given. Only for runs that are `fits`."""
     return [distinct[place] for place, count in runs for _ in range(count)]
 
 
-def fitting(kinds: int, runs: Sequence[Run], robots: int) -> bool:
+def fits(kinds: int, runs: Sequence[Run], robots: int) -> bool:
     """Return whether `runs` of so many kinds tell of so many robots."""
     return sum(count for _, count in runs) == robots and all(0 <= at < kinds and count > 0 for at, count in runs)
 

@@ -138,21 +138,21 @@ class MaxSum(CycleProtocol):
         self.tell(self.below, Domain(list(self.problem.values)))
         self.listen(self.above, self._build)
 
-    def _build(self, heard: Mapping[str, wire.Message]) -> None:
+    def _build(self, messages: Mapping[str, wire.Message]) -> None:
         """The domains of all in the own functions are known. All Q are 0 at first."""
-        domains = {name: told.values for name, told in heard.items() if isinstance(told, Domain)}
+        domains = {name: message.values for name, message in messages.items() if isinstance(message, Domain)}
         self.factors = Factor.joined(self.problem.tables(domains))
         self.edges = [[0.0] * len(self.preferred) for _ in self.factors]
         zeros = {name: [[0.0] * len(values)] * len(self._with(name)) for name, values in domains.items()}
         self._tell_r(zeros)
 
-    def _hear_q(self, heard: Mapping[str, wire.Message]) -> None:
+    def _hear_q(self, messages: Mapping[str, wire.Message]) -> None:
         """All Q have come."""
-        self._tell_r({name: told.rows for name, told in heard.items() if isinstance(told, Q)})
+        self._tell_r({name: told.rows for name, told in messages.items() if isinstance(told, Q)})
 
-    def _tell_r(self, heard: Mapping[str, Sequence[Row]]) -> None:
+    def _tell_r(self, messages: Mapping[str, Sequence[Row]]) -> None:
         """What the own functions say to their variables; to the own one without a message."""
-        rows = {name: iter(told) for name, told in heard.items()}
+        rows = {name: iter(told) for name, told in messages.items()}
         said: dict[str, list[Row]] = {name: [] for name in self.above}
         self._own = []
         for factor, own in zip(self.factors, self.edges, strict=False):
@@ -164,9 +164,9 @@ class MaxSum(CycleProtocol):
             self.send(name, R(said[name]))
         self.listen(self.below, self._decide)
 
-    def _decide(self, heard: Mapping[str, wire.Message]) -> None:
+    def _decide(self, messages: Mapping[str, wire.Message]) -> None:
         """All R have come: take the value that costs least, and say Q."""
-        told = {name: said.rows for name, said in heard.items() if isinstance(said, R)}
+        told = {name: said.rows for name, said in messages.items() if isinstance(said, R)}
         rows = [*self._own, *(row for rows in told.values() for row in rows)]
         z = self._z(rows)
         if min(z) == INFINITE:

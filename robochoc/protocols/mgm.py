@@ -32,7 +32,7 @@ from collections.abc import Mapping
 from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.wording import Wording, cost_text, counted, listed
-from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, Value, gain, said
+from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, Value, gain, values_in
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
@@ -107,14 +107,14 @@ class MGM(Gainers):
         self.take(self.any_value())
         self.tell_value(self._weigh)
 
-    def _weigh(self, heard: Mapping[str, wire.Message]) -> None:
+    def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
         """All neighbours' values are known: say what the best own move would save."""
-        self.best_unilateral(said(heard))
+        self.best_unilateral(values_in(messages))
         self.tell(self.problem.neighbours, Gain(*self.gain))
         self.listen(self.problem.neighbours, self._move)
 
-    def _move(self, heard: Mapping[str, wire.Message]) -> None:
+    def _move(self, messages: Mapping[str, wire.Message]) -> None:
         """All neighbours' gains are known: move, or let others."""
-        self.take(self.target if self.wins(heard) else self.present)
+        self.take(self.target if self.wins(messages) else self.present)
         if not self.over:
             self.tell_value(self._weigh)

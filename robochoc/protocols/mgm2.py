@@ -40,7 +40,7 @@ from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.wording import Wording, counted
 from robochoc.protocols import acts
-from robochoc.protocols.cycles import NO_GAIN, CycleSettings, Domain, Value, gain, said
+from robochoc.protocols.cycles import NO_GAIN, CycleSettings, Domain, Value, gain, values_in
 from robochoc.protocols.mgm import Gain, Gainers, saving_in_words
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -158,14 +158,14 @@ class MGM2(Gainers):
         self.tell(self.problem.neighbours, Domain(list(self.problem.values)))
         self.listen(self.problem.neighbours, self._meet)
 
-    def _meet(self, heard: Mapping[str, wire.Message]) -> None:
+    def _meet(self, messages: Mapping[str, wire.Message]) -> None:
         """All neighbours' domains are known: the first cycle begins."""
-        self.domains = {name: told.values for name, told in heard.items() if isinstance(told, Domain)}
+        self.domains = {name: message.values for name, message in messages.items() if isinstance(message, Domain)}
         self.tell_value(self._offer)
 
-    def _offer(self, heard: Mapping[str, wire.Message]) -> None:
+    def _offer(self, messages: Mapping[str, wire.Message]) -> None:
         """All neighbours' values are known: be an offerer, or not."""
-        self.view = said(heard)
+        self.view = values_in(messages)
         self.partner = None
         if self.chance() < self.settings.threshold:
             neighbours = self.problem.neighbours
@@ -180,9 +180,9 @@ class MGM2(Gainers):
         now = rows[self.domains[partner].index(self.view[partner])][self.present]
         return [[gain(now, burden) for burden in row] for row in rows]
 
-    def _answer(self, heard: Mapping[str, wire.Message]) -> None:
+    def _answer(self, messages: Mapping[str, wire.Message]) -> None:
         """All offers have come: an offerer takes none; others take the best, if it saves anything."""
-        offers = {name: told.gains for name, told in heard.items() if isinstance(told, Offer) and told.gains}
+        offers = {name: told.gains for name, told in messages.items() if isinstance(told, Offer) and told.gains}
         if self.partner is not None:
             self.tell(offers, Reject())
             self.listen((self.partner,), self._hear_answer)
@@ -213,9 +213,9 @@ class MGM2(Gainers):
             for place, offered in enumerate(row):
                 yield Move((broken + offered[0], cost + offered[1]), offerer, own, place)
 
-    def _hear_answer(self, heard: Mapping[str, wire.Message]) -> None:
+    def _hear_answer(self, messages: Mapping[str, wire.Message]) -> None:
         """The offer was taken, or this robot stands alone."""
-        (answer,) = heard.values()
+        (answer,) = messages.values()
         if isinstance(answer, Accept):
             self.target, self.gain = answer.place, (answer.broken, answer.cost)
         else:
@@ -228,9 +228,9 @@ class MGM2(Gainers):
         self.tell(self.problem.neighbours, Gain(*self.gain))
         self.listen(self.problem.neighbours, self._decide)
 
-    def _decide(self, heard: Mapping[str, wire.Message]) -> None:
+    def _decide(self, messages: Mapping[str, wire.Message]) -> None:
         """All neighbours' gains are known: move alone, or tell the partner whether to move together."""
-        wins = self.wins({name: told for name, told in heard.items() if name != self.partner})
+        wins = self.wins({name: told for name, told in messages.items() if name != self.partner})
         if self.partner is None:
             self._end_cycle(move=wins)
         else:
@@ -238,9 +238,9 @@ class MGM2(Gainers):
             self._wins = wins
             self.listen((self.partner,), self._go)
 
-    def _go(self, heard: Mapping[str, wire.Message]) -> None:
+    def _go(self, messages: Mapping[str, wire.Message]) -> None:
         """Both move, or neither."""
-        (told,) = heard.values()
+        (told,) = messages.values()
         self._end_cycle(move=self._wins and isinstance(told, Go) and told.go)
 
     def _end_cycle(self, *, move: bool) -> None:

@@ -15,7 +15,7 @@ import msgspec
 
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
-from robochoc.protocols.findings import NOTHING, Best, Findings
+from robochoc.protocols.findings import NOTHING, Findings, Incumbent
 from robochoc.protocols.inspectable import Inspectable
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import Traits
@@ -98,7 +98,7 @@ class Protocol(Inspectable, ABC):
         return {} if self.value is None else self.problem.solution(self.value)
 
     @property
-    def heard(self) -> Best | None:
+    def incumbent(self) -> Incumbent | None:
         """The cheapest assignment of all robots that this one has heard of, or has found; None: of none so far."""
         return None
 

@@ -50,11 +50,11 @@ from typing import assert_never, cast
 
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
-from robochoc.protocols.findings import NOTHING, Best, Findings
-from robochoc.protocols.interchangeable import fitting, one_by_one
+from robochoc.protocols.findings import NOTHING, Findings, Incumbent
+from robochoc.protocols.interchangeable import expanded, fits
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol, Settings
-from robochoc.protocols.sfb_bounds import BOUND, ForwardBounds, Rows, dearest
+from robochoc.protocols.sfb_bounds import BOUND, ForwardBounds, Rows, max_finite
 from robochoc.protocols.sfb_messages import Above, Below, Charges, CPAs, Domain, Explored, Solution
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
@@ -108,14 +108,14 @@ class Batch:
         """The lowest bound of what is to be sent yet."""
         return min((int(rows[:, BOUND].min()) for rows in (self.rows, self.ready) if len(rows)), default=None)
 
-    def take(self, count: int, least: int) -> Rows:
-        """Of the next `count` rows those that may still cost less than `least`."""
+    def take(self, count: int, upper_bound: int) -> Rows:
+        """Of the next `count` rows those that may still cost less than `upper_bound`."""
         rows, self.rows = self.rows[:count], self.rows[count:]
-        return rows[rows[:, BOUND] < least]
+        return rows[rows[:, BOUND] < upper_bound]
 
-    def part(self, count: int, least: int) -> Rows:
-        """The next `count` rows that are ready and may still cost less than `least`; the others go on waiting."""
-        rows = self.ready[self.ready[:, BOUND] < least]
+    def part(self, count: int, upper_bound: int) -> Rows:
+        """The next `count` rows that are ready and may still cost less than `upper_bound`; the others go on waiting."""
+        rows = self.ready[self.ready[:, BOUND] < upper_bound]
         self.ready = rows[count:]
         return rows[:count]
 
@@ -123,7 +123,7 @@ class Batch:
 class SFB(Protocol):
     """One agent. State: the `batches` that it is to explore, the oldest first, and the `best` solution.
 
-    `least` is what that costs; `under_way` are, for each message of CPAs to the next robot that has not been
+    `upper_bound` is what that costs; `under_way` are, for each message of CPAs to the next robot that has not been
     answered, the batch that it is of, and its lowest bound. `width` CPAs are extended next; `first_sent`: the first
     CPA has gone, alone. `bounds` is what this
     robot adds to CPAs: there once it knows everybody's values, and of use once it knows the `ceiling`.
@@ -149,7 +149,7 @@ class SFB(Protocol):
         self.next = order.names[self.rank + 1] if self.rank + 1 < len(order.names) else None
         self.domains: list[Domain] = []
         self.best: Solution | None = None
-        self.least = self.ceiling = 0
+        self.upper_bound = self.ceiling = 0
         self.batches: deque[Batch] = deque()
         self.under_way: deque[tuple[Batch, int]] = deque()
         self.width = 1
@@ -171,7 +171,7 @@ class SFB(Protocol):
             raise ValueError(f"{sender} says {type(message).__name__}, which it cannot say now")
         match cast("Above | Below | CPAs | Explored | Solution", message):
             case Above(domains, runs):
-                self._tell_below(one_by_one(domains, runs))
+                self._tell_below(expanded(domains, runs))
             case Below() as below:
                 self._tell_above(below.robots, below.most)
             case CPAs() as cpas:
@@ -185,23 +185,25 @@ class SFB(Protocol):
                 assert_never(never)
 
     def _expects(self, sender: str, message: Message) -> bool:
-        """Return whether `message` may come from `sender` at this point: from the robot before, or from the next one."""
+        """Return whether `sender`, the robot before or the next one, may send `message` at this point."""
         match message:
             case Above(domains, runs):
-                fits = fitting(len(domains), runs, self.rank)
-                return sender == self.previous and not self.domains and fits
+                fitting = fits(len(domains), runs, self.rank)
+                return sender == self.previous and not self.domains and fitting
             case Below(domains, charges, runs):
                 alike = len(domains) == len(charges) and all(map(_same_length, domains, charges))
-                fits = alike and fitting(len(domains), runs, len(self.order.names) - self.rank - 1)
-                return sender == self.next and bool(self.domains) and not self._priced and fits
+                fitting = alike and fits(len(domains), runs, len(self.order.names) - self.rank - 1)
+                return sender == self.next and bool(self.domains) and not self._priced and fitting
             case CPAs(_, _, least, ceiling):
                 return sender == self.previous and self._priced and least >= 0 and 0 < ceiling <= EXACT
             case Explored():
                 return sender == self.next and bool(self.under_way)
             case Solution(_, places):
                 sizes = [len(domain) for domain in self.domains]
-                fits = len(places) == len(sizes) and all(0 <= p < size for p, size in zip(places, sizes, strict=True))
-                return sender == self.next and fits
+                fitting = len(places) == len(sizes) and all(
+                    0 <= p < size for p, size in zip(places, sizes, strict=True)
+                )
+                return sender == self.next and fitting
             case _:
                 return False
 
@@ -236,7 +238,7 @@ class SFB(Protocol):
         own = self.problem.values, tuple(map(_whole, self.problem.costs({})))
         self.domains += [domain for domain, _ in below]
         self.bounds = ForwardBounds(self.problem, self.order, self.domains)
-        most += self.bounds.most + dearest(own[1])
+        most += self.bounds.most + max_finite(own[1])
         check_exact(most)
         if self.previous is not None:
             self.send(self.previous, Below.of([own, *below], most))
@@ -246,7 +248,7 @@ class SFB(Protocol):
 
     def _count_up_to(self, ceiling: int) -> None:
         self.bounds.count_up_to(ceiling)
-        self.least = self.ceiling = ceiling
+        self.upper_bound = self.ceiling = ceiling
 
     # The search
 
@@ -254,25 +256,25 @@ class SFB(Protocol):
         """Take in what is to be explored, and how cheap it has to be."""
         if not self.ceiling:
             self._count_up_to(cpas.ceiling)
-        self.least = min(self.least, cpas.least)
+        self.upper_bound = min(self.upper_bound, cpas.least)
         self.batches.append(Batch(self.bounds.read(cpas.rows, cpas.count)))
 
     def _extend(self, batch: Batch) -> None:
         """Add the own values to the next few CPAs, if none are ready, and send what may become a cheaper solution."""
         if self.next is None:
-            self._complete(batch.take(len(batch.rows), self.least))
+            self._complete(batch.take(len(batch.rows), self.upper_bound))
             return
         fit = max(1, self.share // self.bounds.width)
         if not len(batch.ready):
             many = max(1, fit // len(self.problem.values))
-            batch.ready = self.bounds.extended(batch.take(min(self.width, many), self.least), self.least)
+            batch.ready = self.bounds.extended(batch.take(min(self.width, many), self.upper_bound), self.upper_bound)
             self.width = min(2 * self.width, self.settings.batch)
-        rows = batch.part(fit if self.first_sent else 1, self.least)
+        rows = batch.part(fit if self.first_sent else 1, self.upper_bound)
         if len(rows):
             self.first_sent = True
             batch.sent += 1
             self.under_way.append((batch, int(rows[:, BOUND].min())))
-            self.send(self.next, CPAs(len(rows), rows.tobytes(), self.least, self.ceiling))
+            self.send(self.next, CPAs(len(rows), rows.tobytes(), self.upper_bound, self.ceiling))
 
     @property
     def share(self) -> int:
@@ -283,13 +285,13 @@ class SFB(Protocol):
         """The last robot's part: the cheapest of all that these become is a solution, if it is cheap enough."""
         if len(rows):
             cost, places = self.bounds.completed(rows)
-            if cost < self.least:
+            if cost < self.upper_bound:
                 self._process_solution(Solution(cost, places))
 
     def _process_solution(self, solution: Solution) -> None:
         """Hold the own value of a solution that is cheaper than all before, and tell it to those above."""
         self.best = solution
-        self.least = solution.cost
+        self.upper_bound = solution.cost
         self.value = solution.places[self.bounds.rank]
         if self.previous is not None:
             self.send(self.previous, solution)
@@ -304,12 +306,12 @@ class SFB(Protocol):
     # What is known so far
 
     @property
-    def heard(self) -> Best | None:
+    def incumbent(self) -> Incumbent | None:
         """The best solution that has come by here."""
         if self.best is None:
             return None
         chosen = zip(self.order.names, self.domains, self.best.places, strict=True)
-        return Best(self.best.cost, {name: values[place] for name, values, place in chosen})
+        return Incumbent(self.best.cost, {name: values[place] for name, values, place in chosen})
 
     @property
     def findings(self) -> Findings:
@@ -319,8 +321,8 @@ class SFB(Protocol):
         bound = None
         if self.previous is None:
             left = [batch.bound for batch in self.batches if batch.bound is not None]
-            bound = min([self.least, *left, *(least for _, least in self.under_way)])
-        return Findings(self.heard, bound)
+            bound = min([self.upper_bound, *left, *(least for _, least in self.under_way)])
+        return Findings(self.incumbent, bound)
 
 
 def _whole(cost: float) -> float:

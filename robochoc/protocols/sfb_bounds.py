@@ -102,18 +102,18 @@ class ForwardBounds:
         """How many bytes an extended partial assignment takes."""
         return (self._first + 1 + int(self._starts[-1])) * self._type.itemsize
 
-    def extended(self, rows: Rows, least: int) -> Rows:
-        """All partial assignments that `rows` and an own value make and that may cost less than `least`.
+    def extended(self, rows: Rows, upper_bound: int) -> Rows:
+        """All partial assignments that `rows` and an own value make and that may cost less than `upper_bound`.
 
         The lowest bounds first; where they are the same, those which leave others the most.
         """
         own = rows[:, self._first : self._first + self._own]
         before = rows[:, BOUND].astype(np.int64) - own.min(axis=1)  # the bound, without this robot's part
-        row, value = np.nonzero(before[:, None] + own < least)
+        row, value = np.nonzero(before[:, None] + own < upper_bound)
         vectors = self._vectors(rows, row, value)
         costs = rows[row, COST].astype(np.int64) + own[row, value]
         bounds = costs + self._cheapest(vectors).sum(axis=1, dtype=np.int64)
-        (kept,) = np.nonzero(bounds < least)
+        (kept,) = np.nonzero(bounds < upper_bound)
         kept = kept[np.lexsort((vectors[kept].sum(axis=1, dtype=np.int64), bounds[kept]))]
         extended = np.empty((len(kept), self._first + 1 + vectors.shape[1]), self._type)
         extended[:, BOUND] = bounds[kept]
@@ -159,6 +159,6 @@ class ForwardBounds:
         return VALUES + self.rank
 
 
-def dearest(charges: Sequence[float]) -> int:
+def max_finite(charges: Sequence[float]) -> int:
     """The most of `charges` that is not infinite."""
     return int(max((charge for charge in charges if charge < math.inf), default=0))

@@ -9,7 +9,7 @@ from typing import Self
 from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, along, cost_text, counted, incumbent_text, listed
-from robochoc.protocols.interchangeable import Run, cut_off, grouped, one_by_one
+from robochoc.protocols.interchangeable import Run, cut_off, expanded, grouped
 
 Domain = tuple[Value, ...]
 Charges = tuple[float, ...]
@@ -30,7 +30,7 @@ class Above(Message, frozen=True):
 
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
-        domains = one_by_one(self.domains, cut_off(self.runs, len(words.order)))
+        domains = expanded(self.domains, cut_off(self.runs, len(words.order)))
         return f"above you there are {_sizes(words.order, domains)}"
 
 
@@ -56,11 +56,11 @@ class Below(Message, frozen=True):
     @property
     def robots(self) -> list[tuple[Domain, Charges]]:
         """Each robot's domain and charges."""
-        return one_by_one(list(zip(self.domains, self.charges, strict=True)), self.runs)
+        return expanded(list(zip(self.domains, self.charges, strict=True)), self.runs)
 
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
-        domains = one_by_one(self.domains, cut_off(self.runs, len(words.order)))
+        domains = expanded(self.domains, cut_off(self.runs, len(words.order)))
         if not domains:
             return "nobody is below me"
         order = list(words.order)

@@ -33,7 +33,7 @@ from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.wording import Wording, cost_text, incumbent_text
 from robochoc.protocols import acts
-from robochoc.protocols.findings import Best, Findings
+from robochoc.protocols.findings import Findings, Incumbent
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -150,16 +150,18 @@ class SyncBB(Protocol):
                 assert_never(never)
 
     @property
-    def heard(self) -> Best | None:
+    def incumbent(self) -> Incumbent | None:
         """The best path."""
         return (
-            Best(self.best.bound, dict(zip(self.order.names, self.best.values, strict=True))) if self._known else None
+            Incumbent(self.best.bound, dict(zip(self.order.names, self.best.values, strict=True)))
+            if self._known
+            else None
         )
 
     @property
     def findings(self) -> Findings:
         """The best path; of the first robot also what every path costs that is still to come."""
-        return Findings(best=self.heard, bound=self._least if self.rank == 0 else None)
+        return Findings(best=self.incumbent, bound=self._lower_bound if self.rank == 0 else None)
 
     def _extend(self, first: int) -> None:
         """Add the first value from place `first` on with which the path is cheaper than the best one; none: back."""
@@ -194,7 +196,7 @@ class SyncBB(Protocol):
         self.value = self.problem.values.index(self.best.values[self.rank])
 
     @property
-    def _least(self) -> Cost | None:
+    def _lower_bound(self) -> Cost | None:
         """What every path costs at least, as the first robot can tell; None: it has not begun."""
         if self.over:
             return self.best.bound

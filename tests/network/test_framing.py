@@ -47,7 +47,7 @@ from robochoc.communication.network.profile import Profile
 from robochoc.journal.events import Received
 from robochoc.model.outcome import Metrics, PseudoTreeNode
 from robochoc.model.problem import ProblemKind
-from robochoc.protocols.findings import Best, Findings, Trail
+from robochoc.protocols.findings import Findings, Incumbent, Trail
 
 PROFILE = Profile("R1", ProblemKind.DISCSP, ("R0",), (), {"X": ((1, 3), (5, 5))}, {}, 1, 0, ("/R1/goal",))
 OUTSIDE = (Register, Welcome, Denied, Joined, Ask, Told, Sniff, Sniffable)
@@ -73,7 +73,9 @@ SPECIAL: dict[type[Word], st.SearchStrategy[Word]] = {
         st.dictionaries(TEXTS, NUMBERS, max_size=2),
         st.builds(Metrics, st.dictionaries(TEXTS, NUMBERS, max_size=2), NUMBERS, NUMBERS, NUMBERS),
         st.just(
-            Findings(best=Best(3, {"R1": (1, None)}), place=PseudoTreeNode("R0", ("R2",)), trail=Trail([(0, 1)], 4))
+            Findings(
+                best=Incumbent(3, {"R1": (1, None)}), place=PseudoTreeNode("R0", ("R2",)), trail=Trail([(0, 1)], 4)
+            )
         ),
         st.booleans(),
         st.dictionaries(TEXTS, st.builds(Exchanged, NUMBERS, NUMBERS, NUMBERS), max_size=2),

@@ -22,7 +22,7 @@ from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.afc import AFC
 from robochoc.protocols.awc import AWC
-from robochoc.protocols.findings import NOTHING, Best, Findings, Trail
+from robochoc.protocols.findings import NOTHING, Findings, Incumbent, Trail
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.sfb import SFB
@@ -355,8 +355,11 @@ def test_it_has_checked_what_cannot_be(lied: Callable[..., InMemoryNetwork], cha
         (traitors.reporting(lambda one: changed(one, exchanged={"RA": Exchanged(1, -1)})), "counts that cannot be"),
         (traitors.finding(Findings(bound=float("-inf"))), "it tells of costs that cannot be"),
         (traitors.finding(Findings(bound=float("nan"))), "it tells of costs that cannot be"),
-        (traitors.finding(Findings(best=Best(-1.0, {}))), "it tells of costs that cannot be"),
-        (traitors.finding(Findings(best=Best(1, {"\x1b[2J": (1,)}))), "it tells of a robot that is not of the team"),
+        (traitors.finding(Findings(best=Incumbent(-1.0, {}))), "it tells of costs that cannot be"),
+        (
+            traitors.finding(Findings(best=Incumbent(1, {"\x1b[2J": (1,)}))),
+            "it tells of a robot that is not of the team",
+        ),
         (traitors.finding(Findings(place=PseudoTreeNode("R9"))), "it tells of a robot that is not of the team"),
         (traitors.finding(Findings(trail=Trail([(0, -1)], 0))), "it tells of cycles that cannot be"),
     ],

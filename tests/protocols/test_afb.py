@@ -13,7 +13,7 @@ from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Te
 from robochoc.protocols.afb import AFB
 from robochoc.protocols.afb_bounds import Cost
 from robochoc.protocols.afb_messages import CPA, FBCPA, FBEstimate, NewSolution, Terminate
-from robochoc.protocols.findings import Best, Findings
+from robochoc.protocols.findings import Findings, Incumbent
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
@@ -139,13 +139,13 @@ def test_what_lower_robots_cost_at_least_is_in_the_estimate() -> None:
         ("RC", cpa((1, 1), (1, 1), least=[1, 3, 0])),
         ("RA", FBEstimate([1], [1, 3])),
     ]
-    assert agent(team, "RC").prices.estimates == [0]
+    assert agent(team, "RC").costs.estimates == [0]
 
 
 def test_an_n_ary_constraint_is_in_one_estimate_only() -> None:
     """The highest robot of the scope looks ahead, the lowest pays."""
     team = team_of(dict.fromkeys("ABC", (1, 2)), [priced("ABC", {}, 5)])
-    assert [agent(team, name).prices.estimates for name in ("RA", "RB", "RC")] == [[5], [0], [0]]
+    assert [agent(team, name).costs.estimates for name in ("RA", "RB", "RC")] == [[5], [0], [0]]
     assert replies(agent(team, "RB"), ("RA", cpa((1, 1), least=[5, 0])))[0] == (
         "RC",
         cpa((1, 1), (1, 1), least=[5, 0, 0]),
@@ -155,7 +155,7 @@ def test_an_n_ary_constraint_is_in_one_estimate_only() -> None:
 
 def test_of_a_robot_that_may_step_aside_nothing_is_expected() -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [priced("AB", {}, 5)])
-    assert agent(team, "RA", RunParameters(withdrawal_cost=9)).prices.estimates == [0]
+    assert agent(team, "RA", RunParameters(withdrawal_cost=9)).costs.estimates == [0]
 
 
 def test_what_a_cpa_has_in_common_with_the_last_one_is_not_priced_again() -> None:
@@ -341,7 +341,7 @@ def test_the_best_solution_and_a_bound_are_found_before_the_end() -> None:
     robot = agent(team, "RA")
     assert robot.findings == Findings(bound=3)
     replies(robot, ("RB", FBEstimate([1], [0, 0])), ("RB", solution(9, 1, 2)))
-    assert robot.findings == Findings(best=Best(9, {"RA": (1,), "RB": (2,)}), bound=3)
+    assert robot.findings == Findings(best=Incumbent(9, {"RA": (1,), "RB": (2,)}), bound=3)
     assert agent(team, "RB").findings == Findings()
 
 

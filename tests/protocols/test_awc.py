@@ -207,9 +207,9 @@ def test_a_nogood_that_does_not_stand_waits_until_its_robot_says_so() -> None:
     nogoods.add("RC", {"RA": (1,), "RB": (2,), "RC": (1,)})
     view = {"RA": (2,), "RB": (2,)}
     assert nogoods.standing(view) == []
-    nogoods.told("RB", (2,))
+    nogoods.update("RB", (2,))
     assert nogoods.standing({**view, "RA": (1,)}) == [], "it waits for RA alone, which has not said so"
-    nogoods.told("RA", (1,))
+    nogoods.update("RA", (1,))
     assert len(nogoods.standing({**view, "RA": (1,)})) == 1
 
 

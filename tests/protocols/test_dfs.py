@@ -59,7 +59,7 @@ class Greeter(TreeProtocol):
         for name in (*self.ancestors, *self.descendants):
             self.send(name, Hello())
 
-    def hear(self, sender: str, message: Message) -> None:
+    def handle(self, sender: str, message: Message) -> None:
         assert self.begun
         assert message == Hello()
         self.greeted.append(sender)

@@ -17,7 +17,7 @@ from robochoc.model.message import Message, encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import NOTHING
-from robochoc.protocols.interchangeable import one_by_one
+from robochoc.protocols.interchangeable import expanded
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.sfb import LARGEST, SFB, SFBSettings
 from robochoc.protocols.sfb_messages import Above, Below, CPAs, Explored, Solution
@@ -81,7 +81,7 @@ def test_robots_that_are_alike_are_told_of_once() -> None:
     domains = [BOTH] * 500 + [((7,),)] + [BOTH] * 499
     said = Above.of(domains)
     assert said == Above([BOTH, ((7,),)], [(0, 500), (1, 1), (0, 499)])
-    assert one_by_one(said.domains, said.runs) == domains
+    assert expanded(said.domains, said.runs) == domains
     assert len(encode(said)) < 60
 
 

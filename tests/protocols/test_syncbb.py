@@ -15,7 +15,7 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
-from robochoc.protocols.findings import Best, Findings
+from robochoc.protocols.findings import Findings, Incumbent
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.syncbb import Backtrack, BestPath, Cost, Path, SyncBB, Terminate
 from robochoc.solver.agent_problem import RunParameters, agent_problems
@@ -172,7 +172,7 @@ def test_the_best_path_and_a_bound_are_found_before_the_end() -> None:
     robot = agent(team_of(dict.fromkeys("AB", (1, 2)), constraints), "RA")
     assert robot.findings == Findings(bound=2)
     replies(robot, ("RB", Backtrack(best(6, 1, 1))))
-    assert robot.findings == Findings(best=Best(6, {"RA": (1,), "RB": (1,)}), bound=3)
+    assert robot.findings == Findings(best=Incumbent(6, {"RA": (1,), "RB": (1,)}), bound=3)
     assert agent(triangle(), "RB").findings == Findings()
 
 

@@ -16,7 +16,7 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Concluded, Sent, Settled, actor
 from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.abt import ABT
-from robochoc.protocols.findings import Best
+from robochoc.protocols.findings import Incumbent
 from robochoc.replay import CannotReplayError, ReplayOptions, RobotState, states_of
 from robochoc.replay.inspection import MOST_VALUES
 from robochoc.replay.reasons import MOST_BACKTRACKS, MOST_REASONS
@@ -239,7 +239,7 @@ class Odd(ABT):
         self.endless.append(self.endless)
         self._secret = {"key": deque(range(1000))}
         self.table = np.zeros((3, 4))
-        self.best = Best(3.0, {"RA": (1,)})
+        self.best = Incumbent(3.0, {"RA": (1,)})
 
 
 def test_what_a_user_keeps_is_shown_as_far_as_it_can_be() -> None:
@@ -249,7 +249,7 @@ def test_what_a_user_keeps_is_shown_as_far_as_it_can_be() -> None:
     assert then.more["secret"].startswith("{'key': deque([0, 1, 2, ")
     assert then.more["secret"].endswith(", ...])}")
     assert then.more["context"] == "<Grim cannot be shown: RuntimeError>"
-    assert then.more["best"] == "Best(cost=3, values={'RA': (1,)})"
+    assert then.more["best"] == "Incumbent(cost=3, values={'RA': (1,)})"
     assert then.more["endless"] == "[[[[...]]]]"
 
 

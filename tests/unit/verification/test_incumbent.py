@@ -17,7 +17,7 @@ from robochoc.journal.journal import improvements
 from robochoc.model.expression import Type, parse
 from robochoc.model.outcome import Metrics, Outcome, PseudoTreeNode, Verdict
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
-from robochoc.protocols.findings import Best, Findings, Trail
+from robochoc.protocols.findings import Findings, Incumbent, Trail
 from robochoc.run.incumbent import best_of, bound_of, course, tree_of
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.objective import Objective, withdrawal_cost
@@ -102,15 +102,15 @@ def test_what_breaks_something_hard_is_none() -> None:
 
 def test_the_cheapest_that_a_robot_has_heard_of_is_better_than_the_values_at_the_end() -> None:
     findings = {
-        "RA": Findings(best=Best(4, {"RA": (1,), "RB": (1,)})),
-        "RB": Findings(best=Best(3, {"RA": (1,), "RB": (2,)})),
+        "RA": Findings(best=Incumbent(4, {"RA": (1,), "RB": (1,)})),
+        "RB": Findings(best=Incumbent(3, {"RA": (1,), "RB": (2,)})),
     }
     found = best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2}), findings))
     assert found == ({"A": 1, "B": 2}, 3)
 
 
 def test_who_steps_aside_in_the_best_has_no_values_in_it() -> None:
-    findings = {"RA": Findings(best=Best(11, {"RA": (2,), "RB": (None,)}))}
+    findings = {"RA": Findings(best=Incumbent(11, {"RA": (2,), "RB": (None,)}))}
     found = best_of(CompiledTeam(PAIR), result({"RA": {}, "RB": {}}, findings), 11)
     assert found == ({"A": 2}, 11)
 
@@ -119,7 +119,7 @@ def test_who_has_nothing_to_show_and_no_value_steps_aside_in_the_best() -> None:
     """Its value is (), as that of one without neighbours that stays is."""
     forbids = Relation("R", 1, Semantics.CONFLICTS, ((1,),))
     team = team_of({"A": (1,), "B": (1,)}, [Constraint("C", forbids, ("A",), ("A",))])
-    findings = {"RB": Findings(best=Best(1, {"RA": (), "RB": ()}))}
+    findings = {"RB": Findings(best=Incumbent(1, {"RA": (), "RB": ()}))}
     assert best_of(CompiledTeam(team), result({"RA": {}, "RB": {}}, findings), 1) == ({"B": 1}, 1)
 
 
