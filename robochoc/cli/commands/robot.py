@@ -11,7 +11,8 @@ import click
 from robochoc.cli.options.local_problems import limits, local_options
 from robochoc.cli.options.network import identity_option, master_option, network_failures_told, patience_option
 from robochoc.cli.options.paths import InputPath
-from robochoc.cli.options.ros import robot_publisher, ros_options
+from robochoc.cli.options.ros import ros_options
+from robochoc.cli.options.ros_setup import robot_publisher
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.options.tokens import token_options
 from robochoc.cli.reports.failures import LIMIT, LOST, Failure
