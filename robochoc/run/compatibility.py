@@ -36,6 +36,7 @@ def refuse_unfit(team: Team, options: Options, protocol: type[Protocol]) -> None
         settings_of(protocol, options.settings)
     except SettingsError as wrong:
         raise UnsupportedError(f"--set: {wrong} (protocol {options.protocol})") from None
+    _refuse_kills(team, options)
     try:
         _check(team, options, protocol.traits)
     except _UnfitError as unfit:
@@ -112,6 +113,16 @@ def _check(team: Team, options: Options, traits: Traits) -> None:
     _refuse_network(team, options)
 
 
+def _refuse_kills(team: Team, options: Options) -> None:
+    """Raise `UnsupportedError` where no process of a robot can be killed."""
+    if options.kill and options.runtime is Runtime.SIMULATOR:
+        raise UnsupportedError("--kill ends a robot's process, and the simulator has none; drop --runtime simulator")
+    known = {name for events in range(len(team.scenario) + 1) for name in team_after_events(team, events).order}
+    for kill in options.kill:
+        if kill.robot not in known:
+            raise UnsupportedError(f"--kill: {kill.robot!r} is no robot of {team.name}")
+
+
 def _refuse_network(team: Team, options: Options) -> None:
     """What a run on a network cannot do, or only that can."""
     if options.runtime is Runtime.NETWORK:
@@ -124,6 +135,8 @@ def _refuse_network(team: Team, options: Options) -> None:
 
 def refuse_central(team: Team, options: Options) -> None:
     """Raise `UnsupportedError` for what the options ask of the central judge and it does not do."""
+    if options.kill:
+        raise UnsupportedError("--kill is for robots that solve it together, not for --protocol central")
     refuse(team, options.protocol, Traits(partially_known=True, costs=True))
     if options.count:
         refuse_scenario(team, "--count")

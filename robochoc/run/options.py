@@ -12,6 +12,7 @@ from robochoc.run.defaults import SATISFIES
 from robochoc.solver.compile import Limits
 
 if TYPE_CHECKING:
+    from robochoc.communication.kill_schedule import Kill
     from robochoc.communication.simulator.channel import ChannelModel
 
 CENTRAL = "central"
@@ -70,7 +71,8 @@ class Options:
     least cost. `settings` are the protocol's, as text; its chance is drawn from `seed` too. With `on_loss` set to
     withdraw, robots whose processes end leave the problem; up to `spares` of them come back. `patience`, in seconds: a
     robot whose process is stopped (on a network: that is out of reach) for longer is lost; None: stopped ones are
-    waited for. `filters` are the network's: the channel filters that messages go through.
+    waited for. `kill` names robots whose processes are
+    killed, and when. `filters` are the network's: the channel filters that messages go through.
     """
 
     protocol: str = SATISFIES
@@ -92,3 +94,4 @@ class Options:
     channel: ChannelModel | None = None
     settings: Mapping[str, str] = field(default_factory=dict)
     filters: tuple[str, ...] = ()
+    kill: tuple[Kill, ...] = ()
