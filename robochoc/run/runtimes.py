@@ -13,7 +13,7 @@ from robochoc.communication.run_result import Progress
 from robochoc.communication.session import Session
 from robochoc.journal.events import Observer
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName
+from robochoc.run.options import Options, Runtime, ScheduleName
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
@@ -46,7 +46,7 @@ def open_session(
         case Runtime.PROCESSES:
             from robochoc.communication.processes.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
 
-            survive = options.on_loss is OnLoss.WITHDRAW
+            survive = options.survives_losses
             run = ProcessesRun(team, protocol, survive=survive, patience_s=options.patience, **rest)
             if kills:
                 run.schedule_kills(kills, run.kill)
@@ -71,7 +71,7 @@ def _network(
         raise UnsupportedError(
             f"--runtime network needs {missing.name}; say: pip install 'robochoc[network]'"
         ) from None
-    survive, patience_s = options.on_loss is OnLoss.WITHDRAW, options.patience or PATIENCE_S
+    survive, patience_s = options.survives_losses, options.patience or PATIENCE_S
     settings = NetworkSettings(filters=options.filters, survive=survive, patience_s=patience_s)
     network = LocalNetwork(team, protocol, settings=settings, **rest)
     if kills:

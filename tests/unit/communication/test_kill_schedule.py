@@ -55,12 +55,12 @@ def test_a_run_reports_it(caplog: pytest.LogCaptureFixture) -> None:
     ("options", "why"),
     [
         (Options(kill=(Kill("RA", 1),), runtime=Runtime.SIMULATOR), "the simulator has none"),
-        (Options(kill=(Kill("RA", 1),), protocol="central"), "not for --protocol central"),
-        (Options(kill=(Kill("RZ", 1),)), "'RZ' is no robot of "),
+        (Options(kill=(Kill("RA", 1),), protocol="central"), "--kill is for robots .*not for --protocol central"),
+        (Options(kill=(Kill("RZ", 1),)), "names a robot that .* does not have"),
     ],
 )
 def test_kills_that_cannot_be(options: Options, why: str) -> None:
-    with pytest.raises(UnsupportedError, match=f"--kill.*{why}"):
+    with pytest.raises(UnsupportedError, match=why):
         solve(TEAM, options)
 
 
