@@ -6,16 +6,17 @@ import pytest
 
 from robochoc.communication.kill_schedule import Kill, KillSchedule
 from robochoc.communication.run_result import RobotsLostError
-from robochoc.generators.queens3d import queens3d
+from robochoc.formats import read_team
 from robochoc.model.outcome import Verdict
 from robochoc.run.options import OnLoss, Options, Runtime
 from robochoc.run.orchestrator import solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.problems import team_of
+from tests.support.program import ROOT
 
 TEAM = team_of({"A": (1, 2), "B": (1, 2)}, [])
-SEVEN = queens3d(7)
-"""49 robots, which search for longer than it takes to notice a loss."""
+SEVEN = read_team(ROOT / "instances" / "queens3d-7")
+"""49 robots with files, which search for longer than it takes to notice a loss."""
 AT_ONCE = (Kill("Robot2.6", 0),)
 
 
