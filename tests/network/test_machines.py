@@ -112,7 +112,9 @@ def test_robots_that_are_there_before_their_master(site: Deployment) -> None:
     master = site.master("--team", files)
     assert master.status() == 0, master.errors
     ended(robots)
-    assert master.output.startswith("files: solution, checked; on their owner's word alone: 1 of 1 constraint")
+    assert master.output.startswith(
+        "files: solution for all 3 robots, checked; by their owner alone: 1 of 1 constraint"
+    )
 
 
 # The directory
