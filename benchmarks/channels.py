@@ -18,11 +18,11 @@ from robochoc.communication.simulator.channel import CHANNELS
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.communication.simulator.timed import Timed
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.orders import Order, in_order
+from robochoc.model.orders import Order, with_order
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.run.registry import protocol_named
-from robochoc.verification.checker import cost
+from robochoc.verification.checker import assignment_cost
 
 DATA = Path(__file__).with_name("data") / "channels.csv"
 READING = Path(__file__).with_name("channels.md")
@@ -56,11 +56,11 @@ class Run(NamedTuple):
 
 
 def _constraints(problem: int) -> Team:
-    return in_order(random_csp(15, 5, 0.3, 0.48, problem, connected=True), Order.MAX_DEGREE)
+    return with_order(random_csp(15, 5, 0.3, 0.48, problem, connected=True), Order.MAX_DEGREE)
 
 
 def _costs(problem: int) -> Team:
-    return in_order(random_csp(10, 5, 0.3, 0, problem, connected=True, max_cost=100), Order.MAX_DEGREE)
+    return with_order(random_csp(10, 5, 0.3, 0, problem, connected=True, max_cost=100), Order.MAX_DEGREE)
 
 
 SERIES = (
@@ -92,7 +92,7 @@ def _run(series: Series, team: Team, problem: int, name: str, channel: str) -> R
     result = Simulation(team, protocol_named(name), Timed(problem, CHANNELS[channel])).search(messages=LIMIT)
     metrics = result.metrics
     figures = sum(metrics.messages.values()), metrics.bytes, metrics.ncccs, metrics.simulated_s
-    pays = cost(team, {name: value for own in result.assignments.values() for name, value in own.items()})
+    pays = assignment_cost(team, {name: value for own in result.assignments.values() for name, value in own.items()})
     return Run(series.name, problem, name, channel, str(result.verdict), pays, *figures)
 
 

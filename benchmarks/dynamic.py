@@ -20,21 +20,21 @@ from report import Row, Section, draw
 from rows import append_row, read_rows, written_rows
 
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.change import changed
+from robochoc.model.change import apply_changes
 from robochoc.model.orders import Order
-from robochoc.model.outcome import Epoch, Verdict
+from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import (
     AddConstraint,
     Change,
     Constraint,
-    Event,
     Relation,
     RemoveConstraint,
     Robot,
+    ScenarioEvent,
     Semantics,
     Team,
 )
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 
 RAW = ROOT / "out" / "bench" / "dynamic.csv"
 DATA = Path(__file__).with_name("data") / "dynamic.csv"
@@ -132,7 +132,9 @@ def journey(series: Series, rate: int, sequence: int) -> Team:
     first = CONSTRAINTS + {"mixed": 0, "restriction": -half, "relaxation": half}[series.kind]
     team = random_csp(AGENTS, DOMAIN, first / PAIRS, series.tightness, sequence)
     author = Author(team, series.tightness, Random(f"{series.kind} {rate} {sequence}"))
-    return replace(team, scenario=tuple(Event(tuple(author.changes(series.kind, count))) for _ in range(events)))
+    return replace(
+        team, scenario=tuple(ScenarioEvent(tuple(author.changes(series.kind, count))) for _ in range(events))
+    )
 
 
 class Author:
@@ -150,7 +152,7 @@ class Author:
             self._number += 1
             goes = kind == "relaxation" or (kind == "mixed" and self._number % 2 == 0)
             change = self._removal() if goes else self._addition()
-            self._team = changed(self._team, [change])
+            self._team = apply_changes(self._team, [change])
             yield change
 
     def _removal(self) -> RemoveConstraint:
@@ -228,7 +230,7 @@ def _solved(team: Team, key: tuple[str, float, int, int, str]) -> Iterator[Run]:
         yield Run(*key, number, count, str(epoch.verdict), *_figures(epoch))
 
 
-def _figures(epoch: Epoch) -> tuple[int, int, int, int]:
+def _figures(epoch: EpochOutcome) -> tuple[int, int, int, int]:
     metrics = epoch.metrics
     return sum(metrics.messages.values()), metrics.bytes, metrics.ncccs, metrics.checks
 

@@ -17,7 +17,7 @@ from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.journal.journal import Header, JournalFile, Recorder, lines_of, read_journal
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 
 MESSAGES = 1_000_000
 PAIRS = 2 * RUNS

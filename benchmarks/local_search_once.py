@@ -14,7 +14,7 @@ from random import Random
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats import PREDEFINED
-from robochoc.model.problem import Child, Constraint, Domain, Kind, Parent, Robot, Team, Variable
+from robochoc.model.problem import Child, Constraint, Domain, Parent, ProblemKind, Robot, Team, Variable
 from robochoc.run.incumbent import course
 from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
@@ -39,7 +39,7 @@ def soft_colouring(agents: int, degree: int, seed: int) -> Team:
     robots = (
         Robot(
             name=f"Robot{agent}",
-            kind=Kind.DISWCSP,
+            kind=ProblemKind.DISWCSP,
             variables=(Variable(f"V{agent}", COLOURS),),
             parents=tuple(above[agent]),
             children=tuple(below[agent]),

@@ -21,11 +21,11 @@ from robochoc.communication.run_result import RunResult
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.orders import Order, in_order
+from robochoc.model.orders import Order, with_order
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.run.registry import protocol_named
-from robochoc.verification.checker import cost
+from robochoc.verification.checker import assignment_cost
 
 DATA = Path(__file__).with_name("data") / "optimum.csv"
 READING = Path(__file__).with_name("optimum.md")
@@ -83,7 +83,7 @@ def _problems() -> Iterator[tuple[float, int]]:
 
 def _run(density: float, problem: int, name: str) -> Run:
     team = random_csp(AGENTS, DOMAIN, density, 0, problem, connected=True, max_cost=DEAREST)
-    team = in_order(team, Order.MAX_DEGREE)
+    team = with_order(team, Order.MAX_DEGREE)
     protocol = protocol_named(name)
     began = time.process_time()
     result = Simulation(team, protocol, Concurrent(problem)).search(LONGEST_S, LIMIT)
@@ -102,7 +102,7 @@ def _run(density: float, problem: int, name: str) -> Run:
 
 def _cost(team: Team, result: RunResult) -> float:
     """What the robots' values pay; the protocol's own claim plays no part in it."""
-    return cost(team, {name: value for own in result.assignments.values() for name, value in own.items()})
+    return assignment_cost(team, {name: value for own in result.assignments.values() for name, value in own.items()})
 
 
 def _table(density: float, runs: Sequence[Run]) -> list[Row]:

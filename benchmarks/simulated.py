@@ -8,7 +8,7 @@ from report import Row, Section
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Metrics
 from robochoc.model.problem import Team
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 
 SEEDS = range(10)
 KINDS = ("Ok", "Nogood", "AddLink")

@@ -18,8 +18,8 @@ from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import Network, components
-from robochoc.solver.enumeration import STEPS_BEFORE_ACE, STEPS_EACH, Budget, enumerated
-from robochoc.solver.propagation import propagated
+from robochoc.solver.enumeration import STEPS_BEFORE_ACE, STEPS_EACH, Budget, enumerate_solutions
+from robochoc.solver.propagation import propagate
 
 SIDES = (4, 5, 6, 7, 8, 9, 10, 11)
 ENOUGH = 10**10
@@ -53,9 +53,9 @@ def _row(side: int) -> Row:
     say(f"a row of {side}")
     robot = queens3d(side, robots="rows").robots[0]
     (part,) = components(robot.variables, robot.private)
-    network = propagated(part.network)
+    network = propagate(part.network)
     budget = Budget(ENOUGH)
-    found = enumerated(network, budget, limit=None, count_only=False)
+    found = enumerate_solutions(network, budget, limit=None, count_only=False)
     here = _median(lambda: _here_s(network))
     with AceProcess(always=True) as ace:
         ace.solve(_queens(4), strategy="static")
@@ -77,7 +77,7 @@ def _median(once: Callable[[], float]) -> float:
 
 def _here_s(network: Network) -> float:
     began = time.process_time()
-    enumerated(network, Budget(ENOUGH), limit=None, count_only=False)
+    enumerate_solutions(network, Budget(ENOUGH), limit=None, count_only=False)
     return time.process_time() - began
 
 

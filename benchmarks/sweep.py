@@ -21,12 +21,12 @@ from rows import written_rows
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.orders import Order, in_order
+from robochoc.model.orders import Order, with_order
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.registry import protocol_named
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 
 RAW = ROOT / "out" / "bench" / "sweep.csv"
 DATA = Path(__file__).with_name("data") / "sweep.csv"
@@ -164,7 +164,7 @@ def _run(series: Series, tightness: float, problem: int, variant: Variant) -> Ru
     team = random_csp(series.agents, series.domain, series.density, tightness, problem, connected=True)
     limit = LIMIT_SLOW if variant.protocol in SLOW else LIMIT
     protocol = protocol_named(variant.protocol)
-    figures = solved(in_order(team, variant.order), protocol, Concurrent(problem, series.delay), limit)
+    figures = solved(with_order(team, variant.order), protocol, Concurrent(problem, series.delay), limit)
     return Run(series.name, tightness, problem, variant.label, *figures)
 
 
@@ -173,7 +173,7 @@ def solved(team: Team, protocol: type[Protocol], schedule: Concurrent, limit: in
     result = Simulation(team, protocol, schedule).search(LONGEST_S, limit)
     if result.verdict is Verdict.SOLUTION:
         assignment = {name: value for own in result.assignments.values() for name, value in own.items()}
-        if faults := list(objections(team, assignment, ())):
+        if faults := list(violations(team, assignment, ())):
             raise FailedError(f"{protocol.__name__} on {team.name}: {faults[0]}")
     metrics = result.metrics
     return str(result.verdict), sum(metrics.messages.values()), metrics.bytes, metrics.ncccs, metrics.checks

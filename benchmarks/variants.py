@@ -18,7 +18,7 @@ from sweep import LIMIT, LIMIT_SLOW, solved
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.message import Envelope, Value
-from robochoc.model.orders import Order, in_order
+from robochoc.model.orders import Order, with_order
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.abt import ABT, Nogood
@@ -239,7 +239,7 @@ def _studied(study: Study, variant: Variant, truth: dict[int, str]) -> Figure:
     say(f"{study.name}: {variant.label}")
     limit = LIMIT_SLOW if variant.protocol in SLOW else LIMIT
     runs = [
-        solved(in_order(team, variant.order, seed), variant.protocol, variant.schedule(seed), limit)
+        solved(with_order(team, variant.order, seed), variant.protocol, variant.schedule(seed), limit)
         for seed, team in enumerate(study.teams)
     ]
     verdicts = [run[0] for run in runs]

@@ -51,13 +51,14 @@ class Problem:
         withdraw: str | None = None,
         settings: Mapping[str, object] = {},
         observer: Observer | None = None,
-        field: Environment | None = None,
+        environment: Environment | None = None,
         **options: Any,  # noqa: ANN401 - the other fields of `Options`, by their names
     ) -> Outcome:
         """Let the robots solve it together; see `robochoc.run.options.Options` for what else can be said.
 
-        Without a `protocol`, the one that suits the team. A `field` is told of each answer, and says what changes
-        next (`robochoc.run.scenario.Field`). Raises what `robochoc.run.orchestrator.solve` raises, and `ValueError` or
+        Without a `protocol`, the one that suits the team. An `environment` gets each answer, and returns
+        what changes next (`robochoc.run.scenario.Environment`).
+        Raises what `robochoc.run.orchestrator.solve` raises, and `ValueError` or
         `TypeError` where an option is none. A program that starts processes is to do so below
         `if __name__ == "__main__":`.
         """
@@ -69,7 +70,7 @@ class Problem:
             settings={name: str(value) for name, value in settings.items()},
             **options,
         )
-        return solve(self.team, asked, observer=observer, field=field)
+        return solve(self.team, asked, observer=observer, environment=environment)
 
 
 def load(path: Path | str) -> Problem:

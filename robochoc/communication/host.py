@@ -19,7 +19,7 @@ from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import DynamicProtocol, Protocol, Said, Settings
-from robochoc.solver.agent_problem import NO_BRIEF, AgentProblem, RunParameters
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
 
@@ -52,9 +52,9 @@ class Host:
     @classmethod
     def of(cls, protocol: type[Protocol], part: AgentProblem) -> Self:
         """A host for the robot whose part of the problem is `part`. Raises `UnsupportedError` (see `LocalProblem`)."""
-        return cls(protocol(LocalProblem(part), PriorityOrder(part.order, part.links)), part.brief)
+        return cls(protocol(LocalProblem(part), PriorityOrder(part.order, part.links)), part.parameters)
 
-    def __init__(self, protocol: Protocol, brief: RunParameters = NO_BRIEF) -> None:
+    def __init__(self, protocol: Protocol, brief: RunParameters = DEFAULT_PARAMETERS) -> None:
         self.protocol = protocol
         self.name = protocol.problem.agent
         self._equip(brief)
@@ -110,7 +110,7 @@ class Host:
             self._forget_said()
         else:
             self.protocol = type(self.protocol)(problem, order)
-            self._equip(part.brief)
+            self._equip(part.parameters)
             self._begun = False
         self.clock = self.bytes = self.largest = self._checks = self._step_began = 0
         self.sent = {}

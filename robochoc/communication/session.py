@@ -10,8 +10,8 @@ from typing import NamedTuple, Self
 from robochoc.communication.run_result import RunResult
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, AgentProblem, RunParameters, agent_problems
-from robochoc.solver.compiled_team import CompiledTeam, as_compiled
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters, agent_problems
+from robochoc.solver.compiled_team import CompiledTeam, ensure_compiled
 from robochoc.solver.explanation import Invalidated
 
 
@@ -28,7 +28,7 @@ class Epoch(NamedTuple):
     compiled: CompiledTeam
     void: Invalidated = Invalidated(frozenset(), frozenset())
     restarted: frozenset[str] = frozenset()
-    brief: RunParameters = NO_BRIEF
+    brief: RunParameters = DEFAULT_PARAMETERS
 
     @property
     def team(self) -> Team:
@@ -52,7 +52,7 @@ class Session(ABC):
     anew: bool = False
 
     def __init__(self, team: Team | CompiledTeam) -> None:
-        self.compiled = as_compiled(team)
+        self.compiled = ensure_compiled(team)
 
     def workable(self, team: Team) -> Team:
         """Return `team`, a later form of the one that the robots work on, as they can go on with it."""

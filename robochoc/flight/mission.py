@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts, row_and_column
 from robochoc.flight.layout import Axis, Layout, Point, layout_of
-from robochoc.model.outcome import Epoch, Outcome, Verdict
-from robochoc.model.priorities import natural
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.priorities import natural_key
 from robochoc.model.problem import AddAgent, Assignment, Robot, Team, Topic
 
 UNIT_M = 1.0
@@ -93,7 +93,7 @@ class MissionBuilder:
     ) -> None:
         self._robots = {robot.name: robot for robot in robots}
         self._names = [*names]
-        crafts = sorted(self._crafts(first), key=lambda craft: (natural(craft.name), craft.name))
+        crafts = sorted(self._crafts(first), key=lambda craft: (natural_key(craft.name), craft.name))
         self._places = {(craft.robot, craft.name): number for number, craft in enumerate(crafts)}
         self._crafts_in_order = crafts
         self.layout: Layout = layout_of(crafts, others)
@@ -103,7 +103,7 @@ class MissionBuilder:
         self._seen: set[str] = set()
         self.drones = tuple(map(self._drone, crafts, self.layout.homes))
 
-    def leg(self, epoch: Epoch, withdrawn: Iterable[str] = ()) -> Leg:
+    def leg(self, epoch: EpochOutcome, withdrawn: Iterable[str] = ()) -> Leg:
         """What `epoch`, the next one, asks of the drones. Who is not there any more lands at the edge."""
         values: Assignment = {} if epoch.verdict is Verdict.NO_SOLUTION else epoch.assignment
         here = {*(epoch.robots if self._robots else values or self._seen)} - {*withdrawn}
@@ -156,7 +156,9 @@ def mission_of(outcome: Outcome, team: Team | None = None, scale: float | None =
     `team` is as its files have it, before its scenario. `scale` is in metres a unit; without one, `UNIT_M`, or less
     where the field would be vast.
     """
-    epochs = outcome.epochs or (Epoch(outcome.verdict, team.order if team else (), assignment=outcome.assignment),)
+    epochs = outcome.epochs or (
+        EpochOutcome(outcome.verdict, team.order if team else (), assignment=outcome.assignment),
+    )
     decided = [epoch.assignment for epoch in epochs if epoch.verdict is not Verdict.NO_SOLUTION]
     first: dict[str, int] = {}
     for values in decided:
@@ -189,7 +191,7 @@ def _lowest(robots: Iterable[Robot], decided: Iterable[Craft]) -> list[Craft]:
     return [Craft("", level=lowest.level)] if highest - (lowest.level or 0) < _FAR_BELOW else []
 
 
-def _leaving(epochs: Sequence[Epoch], outcome: Outcome) -> int:
+def _leaving(epochs: Sequence[EpochOutcome], outcome: Outcome) -> int:
     """About how many leave before the end: a robot may fly several drones."""
     stay = {*epochs[-1].robots} - {*outcome.withdrawn}
     return len({*outcome.withdrawn, *(name for epoch in epochs for name in epoch.robots)} - stay)

@@ -19,7 +19,7 @@ from robochoc.formats.rules import (
     refuse_private_part,
 )
 from robochoc.formats.xml import attribute, line
-from robochoc.model.problem import INFINITE, Constraint, Kind, Model, Predicate, Relation, Term
+from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Predicate, ProblemKind, Relation, Term
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class Context:
     whoever refers to it is not to blame.
     """
 
-    kind: Kind
-    model: Model | None
+    kind: ProblemKind
+    model: ConstraintModel | None
     """The file's default for constraints that do not name theirs."""
     own: Collection[str]
     """The robot's own variables."""
@@ -41,8 +41,8 @@ class Context:
 def read_private(element: etree._Element, context: Context) -> Constraint | None:
     """An intra-agent constraint: over own variables only. See `_read` for the rest."""
     model = attribute(element, "model")
-    refuse_private_part(Model(model) if model else None)
-    constraint = _read(element, context, Model(model) if model else None)
+    refuse_private_part(ConstraintModel(model) if model else None)
+    constraint = _read(element, context, ConstraintModel(model) if model else None)
     if constraint:
         check_private(constraint, context.own)
     return constraint
@@ -52,13 +52,13 @@ def read_shared(element: etree._Element, context: Context) -> Constraint | None:
     """A constraint with a neighbour: over own variables and others'. See `_read` for the rest."""
     model = attribute(element, "model") or context.model
     refuse_no_model(model)
-    constraint = _read(element, context, Model(model) if model else None)
+    constraint = _read(element, context, ConstraintModel(model) if model else None)
     if constraint:
         check_shared(constraint, context.own)
     return constraint
 
 
-def _read(element: etree._Element, context: Context, model: Model | None) -> Constraint | None:
+def _read(element: etree._Element, context: Context, model: ConstraintModel | None) -> Constraint | None:
     """The constraint, or None where its definition has a mistake of its own. Raises `MistakeError`."""
     scope = _terms(element.get("scope") or "")
     given = element.find("parameters")

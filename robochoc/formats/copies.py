@@ -12,9 +12,9 @@ from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, 
 from itertools import product
 
 from robochoc.formats.diagnostics import Diagnostic, shortened
-from robochoc.formats.members import Members
-from robochoc.model.expression import Apply, Constant, Expression, Name, UndefinedValueError, compiled
-from robochoc.model.problem import INFINITE, Constraint, Domain, Model, Relation, Robot
+from robochoc.formats.team_members import Members
+from robochoc.model.expression import Apply, Constant, Expression, Name, UndefinedValueError, compile_expression
+from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Domain, Relation, Robot
 
 MAX_COMPARED = 1_000_000
 """So many tuples are tried at most to find a difference."""
@@ -32,7 +32,7 @@ def differing_copies(members: Members, misplaced: Collection[str]) -> Iterator[D
 def _differing(
     file: str, copies: Iterable[Constraint], child: Robot, domains: Mapping[str, Domain]
 ) -> Iterator[Diagnostic]:
-    held = _grouped(constraint for constraint in child.shared if constraint.model is Model.TKC)
+    held = _grouped(constraint for constraint in child.shared if constraint.model is ConstraintModel.TKC)
     for variables, group in _grouped(copies).items():
         what = f"the copy of '{shortened(group[0].name)}' over {shortened(' '.join(variables))}"
         originals = held.get(variables)
@@ -119,7 +119,7 @@ def _price(constraint: Constraint, variables: tuple[str, ...]) -> Callable[[tupl
     if isinstance(definition, Relation):
         slots = [(variables.index(term), 0) if isinstance(term, str) else (-1, term) for term in constraint.parameters]
         return lambda values: definition.cost([values[slot] if slot >= 0 else constant for slot, constant in slots])
-    holds = compiled(_applied(constraint), variables)
+    holds = compile_expression(_applied(constraint), variables)
 
     def price(values: tuple[int, ...]) -> float:
         try:

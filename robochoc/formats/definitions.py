@@ -13,7 +13,7 @@ from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.names import BEYOND, check_cost, check_integer, check_word, digits, in_short
 from robochoc.model.expression import Apply, Constant, Expression, ExpressionError, Name, Type, parse, text
 from robochoc.model.expression.parser import MAX_DEPTH, MAX_NODES
-from robochoc.model.problem import Domain, Kind, Predicate, Relation, Semantics, Term, Topic
+from robochoc.model.problem import Domain, Predicate, ProblemKind, Relation, Semantics, Term, Topic
 
 MAX_VALUES = 100_000
 """Of a domain."""
@@ -55,9 +55,9 @@ def refuse_predefined(name: str) -> None:
         raise MistakeError(f"'{shortened(name)}' is a predefined predicate", "give your own another name")
 
 
-def check_semantics(semantics: Semantics, kind: Kind) -> None:
+def check_semantics(semantics: Semantics, kind: ProblemKind) -> None:
     """Raise `MistakeError` where a robot of that `kind` cannot have such a relation."""
-    if semantics is Semantics.SOFT and kind is not Kind.DISWCSP:
+    if semantics is Semantics.SOFT and kind is not ProblemKind.DISWCSP:
         hint = 'write type="DisWCSP" in the presentation, or semantics="supports" or "conflicts"'
         raise MistakeError("a soft relation in a DisCSP", hint)
 

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from robochoc.model.priorities import natural
+from robochoc.model.priorities import natural_key
 from robochoc.system.plain_text import on_one_line as on_one_line  # noqa: PLC0414 - from here, too
 
 MAX_PER_FILE = 100
@@ -92,8 +92,8 @@ def shortened(text: str) -> str:
 
 
 def _place(diagnostic: Diagnostic) -> tuple[object, int]:
-    """The longest paths are 4096 characters; in longer ones `natural` could meet more digits than `int` accepts."""
-    return natural(diagnostic.file[:4096]), diagnostic.line
+    """The longest paths are 4096 characters; in longer ones `natural_key` could meet more digits than `int` accepts."""
+    return natural_key(diagnostic.file[:4096]), diagnostic.line
 
 
 def encodable(path: str) -> str:

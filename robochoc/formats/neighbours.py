@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from robochoc.formats.diagnostics import Diagnostic, shortened, suggestion
-from robochoc.formats.members import Members
+from robochoc.formats.team_members import Members
 from robochoc.model.priorities import CycleError, priority_order
 
 

@@ -15,8 +15,9 @@ from robochoc.formats.definitions import (
     refuse_predefined,
 )
 from robochoc.formats.diagnostics import MAX_PER_FILE, Diagnostic, MistakeError, shortened
+from robochoc.formats.field_types import AS_BUILT, ShapeError, check_shape
+from robochoc.formats.locations import ObjectPlaces, Place
 from robochoc.formats.names import check_name, check_robot_name, check_unique, check_weight, check_word
-from robochoc.formats.places import ObjectPlaces, Place
 from robochoc.formats.rules import (
     NEIGHBOURS_ONCE,
     check_constraint,
@@ -29,8 +30,7 @@ from robochoc.formats.rules import (
     refuse_private_part,
     repeated,
 )
-from robochoc.formats.shapes import AS_BUILT, ShapeError, check_shape
-from robochoc.model.problem import Constraint, Domain, Kind, Model, Predicate, Relation, Robot
+from robochoc.model.problem import Constraint, ConstraintModel, Domain, Predicate, ProblemKind, Relation, Robot
 
 Definition = Domain | Relation | Predicate
 
@@ -129,7 +129,7 @@ class Objects:
                 check_name(child.name)
                 check_told(child.variables, own)
             for constraint in child.constraints:
-                if constraint.model is Model.TKC:
+                if constraint.model is ConstraintModel.TKC:
                     message = f"a totally known constraint (TKC) with the child '{shortened(child.name)}'"
                     hint = "the child holds it; with the parent stands its part of a PKC only"
                     self._note(places.constraint(constraint), message, hint)
@@ -137,26 +137,26 @@ class Objects:
                     self._shared(constraint, own, robot.kind, places)
                 yield
             for copy in child.copies:
-                if copy.model is Model.PKC:
+                if copy.model is ConstraintModel.PKC:
                     message = f"a copy of a partially known constraint (PKC) of the child '{shortened(child.name)}'"
                     self._note(places.constraint(copy), message, "nobody knows another's part: leave the copy out")
                 else:
                     self._shared(copy, own, robot.kind, places)
                 yield
 
-    def _private(self, constraint: Constraint, own: Collection[str], kind: Kind, places: ObjectPlaces) -> None:
+    def _private(self, constraint: Constraint, own: Collection[str], kind: ProblemKind, places: ObjectPlaces) -> None:
         with self._at(places.constraint, constraint):
             refuse_private_part(constraint.model)
             if self._applied(constraint, kind, places):
                 check_private(constraint, own)
 
-    def _shared(self, constraint: Constraint, own: Collection[str], kind: Kind, places: ObjectPlaces) -> None:
+    def _shared(self, constraint: Constraint, own: Collection[str], kind: ProblemKind, places: ObjectPlaces) -> None:
         with self._at(places.constraint, constraint):
             refuse_no_model(constraint.model)
             if self._applied(constraint, kind, places):
                 check_shared(constraint, own)
 
-    def _applied(self, constraint: Constraint, kind: Kind, places: ObjectPlaces) -> bool:
+    def _applied(self, constraint: Constraint, kind: ProblemKind, places: ObjectPlaces) -> bool:
         """Look at a constraint, whoever holds it. False: its definition is to blame. Raises `MistakeError`."""
         definition = constraint.definition
         check_word(constraint.name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from robochoc.model.outcome import Epoch, Metrics, Outcome, PseudoTreeNode, Thoroughness, Verdict
+from robochoc.model.outcome import CheckCounts, EpochOutcome, Metrics, Outcome, PseudoTreeNode, Verdict
 
 
 class ResultError(ValueError):
@@ -114,7 +114,7 @@ def result_json(outcome: Outcome) -> bytes:
     return msgspec.json.encode(form)
 
 
-def _epoch(epoch: Epoch) -> _EpochForm:
+def _epoch(epoch: EpochOutcome) -> _EpochForm:
     spent = epoch.metrics
     return _EpochForm(
         verdict=epoch.verdict,
@@ -134,10 +134,10 @@ def _epoch(epoch: Epoch) -> _EpochForm:
     )
 
 
-def _epoch_of(form: _EpochForm) -> Epoch:
+def _epoch_of(form: _EpochForm) -> EpochOutcome:
     counts = form.bytes, form.ncccs, form.checks, form.wall_s
     metrics = Metrics({"messages": form.messages}, *counts, simulated_s=form.simulated_s or 0.0)
-    return Epoch(
+    return EpochOutcome(
         verdict=form.verdict,
         robots=tuple(form.robots),
         opened_by=form.opened_by,
@@ -184,6 +184,6 @@ def read_result(content: bytes) -> Outcome:
         confirmed=form.confirmed,
         channel=form.channel,
         claimed_by=form.claimed_by,
-        checked=Thoroughness(form.checked.by_both, form.checked.by_owner) if form.checked else None,
+        checked=CheckCounts(form.checked.by_both, form.checked.by_owner) if form.checked else None,
         epochs=tuple(map(_epoch_of, form.epochs)),
     )

@@ -14,19 +14,19 @@ from robochoc.formats.definitions import check_semantics, refuse_predefined
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, Report, shortened, suggestion
 from robochoc.formats.extension import check_count, read_domain, read_relation
 from robochoc.formats.intension import read_predicate, read_topic
-from robochoc.formats.members import Member
+from robochoc.formats.locations import FilePlaces
 from robochoc.formats.names import check_robot_name, check_unique
-from robochoc.formats.places import FilePlaces
 from robochoc.formats.rules import NEIGHBOURS_ONCE, check_told, refuse_nothing_to_decide, repeated
+from robochoc.formats.team_members import Member
 from robochoc.formats.xml import attribute, line, parsed_xml, read_xml
 from robochoc.model.problem import (
     Child,
     Constraint,
+    ConstraintModel,
     Domain,
-    Kind,
-    Model,
     Parent,
     Predicate,
+    ProblemKind,
     Relation,
     Robot,
     Semantics,
@@ -86,11 +86,11 @@ class _Reader:
 
     def whole(self) -> RobotFile:
         presentation = next(self._instance.iterchildren("presentation"))
-        kind = Kind(attribute(presentation, "type"))
+        kind = ProblemKind(attribute(presentation, "type"))
         variables = self._variables(self._domains())
         topics = self._topics()
         model = attribute(presentation, "constraintModel")
-        context = Context(kind, Model(model) if model else None, self._own, self._definitions(kind))
+        context = Context(kind, ConstraintModel(model) if model else None, self._own, self._definitions(kind))
         private = self._constraints(self._instance, context, read_private)
         copies: dict[str, tuple[Constraint, ...]] = {}
         parents = tuple(self._parents(context))
@@ -149,7 +149,7 @@ class _Reader:
                 topics[topic.name] = topic
         return tuple(topics.values())
 
-    def _definitions(self, kind: Kind) -> dict[str, Relation | Predicate | None]:
+    def _definitions(self, kind: ProblemKind) -> dict[str, Relation | Predicate | None]:
         definitions: dict[str, Relation | Predicate | None] = {}
         for element in self._elements("relations", "relation", "nbRelations"):
             self._define(element, read_relation, definitions)
@@ -201,8 +201,8 @@ class _Reader:
         for agent in self._agents("agents_children"):
             name = attribute(agent, "name")
             held = self._constraints(agent, context, read_shared)
-            parts = tuple(constraint for constraint in held if constraint.model is Model.PKC)
-            kept = tuple(constraint for constraint in held if constraint.model is Model.TKC)
+            parts = tuple(constraint for constraint in held if constraint.model is ConstraintModel.PKC)
+            kept = tuple(constraint for constraint in held if constraint.model is ConstraintModel.TKC)
             if kept:
                 copies[name] = kept
             scopes = itertools.chain.from_iterable(constraint.variables for constraint in held)

@@ -13,7 +13,17 @@ from collections.abc import Collection, Iterator, Sequence
 from robochoc.formats.definitions import shown
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.names import check_cost, check_integer, is_name
-from robochoc.model.problem import INFINITE, Child, Constraint, Kind, Model, Parent, Predicate, Relation, Term
+from robochoc.model.problem import (
+    INFINITE,
+    Child,
+    Constraint,
+    ConstraintModel,
+    Parent,
+    Predicate,
+    ProblemKind,
+    Relation,
+    Term,
+)
 
 NEIGHBOURS_ONCE = "list every neighbour once, as parent or as child"
 """What to do about neighbours that are `repeated`."""
@@ -31,23 +41,23 @@ def check_terms(terms: Sequence[Term]) -> None:
             raise MistakeError(f"'{shortened(term)}' is neither a variable's name nor an integer", hint)
 
 
-def check_constraint(constraint: Constraint, kind: Kind) -> None:
+def check_constraint(constraint: Constraint, kind: ProblemKind) -> None:
     """Raise `MistakeError` unless its definition takes its terms, and a robot of that `kind` may charge its cost."""
     if not constraint.variables:
         raise MistakeError("a constraint without variables in its scope", 'write scope="V1.1 V2.1"')
     _check_application(constraint.definition, constraint.scope, constraint.parameters)
     if constraint.cost == INFINITE:
         return
-    if kind is not Kind.DISWCSP:
+    if kind is not ProblemKind.DISWCSP:
         raise MistakeError("a cost in a DisCSP", 'write type="DisWCSP" in the presentation, or delete the cost')
     if isinstance(constraint.definition, Relation):
         raise MistakeError("a cost on a relation", 'a soft relation names the costs of its tuples: semantics="soft"')
     check_cost(constraint.cost)
 
 
-def refuse_private_part(model: Model | None) -> None:
+def refuse_private_part(model: ConstraintModel | None) -> None:
     """Raise `MistakeError` for a private constraint of which a neighbour would hold a part."""
-    if model is Model.PKC:
+    if model is ConstraintModel.PKC:
         raise MistakeError("a private constraint with model PKC", "a private constraint is its robot's alone: no model")
 
 
@@ -59,7 +69,7 @@ def check_private(constraint: Constraint, own: Collection[str]) -> None:
             raise MistakeError(f"a private constraint over '{shortened(name)}', which is not the robot's own", hint)
 
 
-def refuse_no_model(model: Model | str | None) -> None:
+def refuse_no_model(model: ConstraintModel | str | None) -> None:
     """Raise `MistakeError` for a shared constraint of which nobody says who knows it."""
     if not model:
         raise MistakeError("a shared constraint lacks its model", 'write model="TKC" or model="PKC"')
@@ -133,13 +143,13 @@ def repeated(name: str, parents: Sequence[Parent], children: Sequence[Child]) ->
 
 def check_brought(constraint: Constraint) -> None:
     """Raise `MistakeError` for a partially known constraint that a scenario adds to two robots."""
-    if constraint.model is Model.PKC:
+    if constraint.model is ConstraintModel.PKC:
         message = "a partially known constraint (PKC) in a scenario"
         raise MistakeError(message, 'each side would need its part: write model="TKC"')
 
 
 def check_newcomers_constraint(constraint: Constraint) -> None:
     """Raise `MistakeError` for a partially known constraint of a robot that a scenario adds."""
-    if constraint.model is Model.PKC:
+    if constraint.model is ConstraintModel.PKC:
         message = "a partially known constraint (PKC) of a robot that a scenario adds"
         raise MistakeError(message, 'the parent could not bring its part: write model="TKC"')

@@ -14,17 +14,17 @@ from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeE
 from robochoc.formats.robot import RobotFile, read_robot_file
 from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
 from robochoc.formats.xml import attribute, line, read_xml
-from robochoc.model.change import ChangeError, changed
+from robochoc.model.change import ChangeError, apply_changes
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
     Change,
-    Event,
     RemoveAgent,
     RemoveConstraint,
     RemoveValue,
     Robot,
+    ScenarioEvent,
     Team,
 )
 from robochoc.system.files import resolved
@@ -38,7 +38,7 @@ def has_scenario(folder: Path) -> bool:
     return os.path.lexists(folder / SCENARIO)
 
 
-def read_scenario(folder: Path, team: Team | None, files: Mapping[str, RobotFile]) -> tuple[Event, ...]:
+def read_scenario(folder: Path, team: Team | None, files: Mapping[str, RobotFile]) -> tuple[ScenarioEvent, ...]:
     """The events of the scenario in `folder`, each of which the team as it stands then can take.
 
     `team` is None when the robots' `files` have mistakes: then only the scenario's own mistakes are looked for. Files
@@ -68,7 +68,7 @@ class _Reader:
         self._missed: set[str] = set()
         """Robots, variables and constraints that could not be added."""
 
-    def events(self) -> tuple[Event, ...]:
+    def events(self) -> tuple[ScenarioEvent, ...]:
         """All events. Raises `InvalidInputError`."""
         try:
             events = tuple([self._event(one) for one in read_xml(self._path, "scenario").iterchildren("event")])
@@ -79,7 +79,7 @@ class _Reader:
             raise InvalidInputError(dict.fromkeys(self._elsewhere))
         return events
 
-    def _event(self, element: etree._Element) -> Event:
+    def _event(self, element: etree._Element) -> ScenarioEvent:
         changes: list[Change] = []
         for child in element:
             with self._report.at(line(child)):
@@ -91,7 +91,7 @@ class _Reader:
             self._report.add(line(element), *NOBODY_LEFT)
             self._team = None
         after = attribute(element, "after")
-        return Event(tuple(changes), None if after == "solved" else int(after.split()[0]))
+        return ScenarioEvent(tuple(changes), None if after == "solved" else int(after.split()[0]))
 
     def _changes(self, element: etree._Element) -> Iterator[tuple[int, Change]]:
         """The changes that `element` stands for, each with its line."""
@@ -154,7 +154,7 @@ class _Reader:
         """Change the team. Raises `MistakeError` where it cannot take that."""
         while self._team is not None:
             try:
-                self._team = changed(self._team, [change])
+                self._team = apply_changes(self._team, [change])
             except ChangeError as bad:
                 if isinstance(change, AddAgent) and bad.line:
                     self._blame(change.robot, bad, place)

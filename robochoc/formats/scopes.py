@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from robochoc.formats.diagnostics import Diagnostic, shortened, suggestion
-from robochoc.formats.members import Members
-from robochoc.model.problem import Constraint, Model, Parent, Robot
+from robochoc.formats.team_members import Members
+from robochoc.model.problem import Constraint, ConstraintModel, Parent, Robot
 
 
 def misplaced(members: Members) -> Iterator[Diagnostic]:
@@ -45,7 +45,7 @@ def _place(members: Members, robot: Robot, parent: Parent, constraint: Constrain
     if parent.name not in others:
         message = f"the scope has no variable of the parent '{parent.name}', under which it stands"
         return message, f"move it to '{min(others)}'; '{parent.name}' is {members.place(parent.name)}"
-    if constraint.model is Model.PKC and len(others) > 1:
+    if constraint.model is ConstraintModel.PKC and len(others) > 1:
         message = "a PKC constraint over more than two robots"
         return message, f"only '{robot.name}' and '{parent.name}' ({members.place(parent.name)}) can share its parts"
     lowest = [max(others, key=rank.__getitem__) for rank in members.ranks]

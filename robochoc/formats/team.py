@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
-from robochoc.formats.members import Members
 from robochoc.formats.robot import RobotFile, read_robot_file
 from robochoc.formats.scenario import SCENARIO, has_scenario, read_scenario
+from robochoc.formats.team_members import Members
 from robochoc.formats.validation import between, note_valid
-from robochoc.model.priorities import natural, priority_order
+from robochoc.model.priorities import natural_key, priority_order
 from robochoc.model.problem import Robot, Team
 
 _NEXT_STEP = "give a folder with one XML file per robot; 'robochoc generate queens3d --n 4' writes one"
@@ -111,7 +111,7 @@ def _listing(folder: Path) -> list[os.DirEntry[str]]:
     """What is in `folder`, in natural order. Raises `InvalidInputError`."""
     try:
         with os.scandir(folder) as entries:
-            return sorted(entries, key=lambda entry: natural(entry.name))
+            return sorted(entries, key=lambda entry: natural_key(entry.name))
     except NotADirectoryError:
         step = f"a robot's team is its folder: {folder.parent}" if folder.suffix == ".xml" else _NEXT_STEP
         raise _invalid(folder, "is not a folder", step) from None

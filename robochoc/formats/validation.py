@@ -16,7 +16,8 @@ from typing import TypeVar
 
 from robochoc.formats.copies import differing_copies
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, shortened
-from robochoc.formats.members import Member, Members
+from robochoc.formats.field_types import AS_BUILT, ShapeError, check_shape
+from robochoc.formats.locations import ObjectPlaces, Place
 from robochoc.formats.names import check_integer
 from robochoc.formats.neighbours import (
     cycles,
@@ -27,18 +28,17 @@ from robochoc.formats.neighbours import (
     shared_variables,
 )
 from robochoc.formats.objects import Objects, repeated_robots
-from robochoc.formats.places import ObjectPlaces, Place
 from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
 from robochoc.formats.scopes import misplaced, misplaced_parts, untold
-from robochoc.formats.shapes import AS_BUILT, ShapeError, check_shape
-from robochoc.model.change import ChangeError, changed
+from robochoc.formats.team_members import Member, Members
+from robochoc.model.change import ChangeError, apply_changes
 from robochoc.model.priorities import priority_order
-from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, Event, RemoveValue, Robot, Team
+from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, RemoveValue, Robot, ScenarioEvent, Team
 
 MAX_BETWEEN = 1000
 """So many mistakes between the robots of one team are told."""
 
-_NOTHING = Event(())
+_NOTHING = ScenarioEvent(())
 _Ended = TypeVar("_Ended")
 
 _valid: dict[int, weakref.ref[Team]] = {}
@@ -92,23 +92,25 @@ def check_robot(robot: Robot) -> None:
         raise InvalidInputError(_numbered(found))
 
 
-def check_event(team: Team, event: Event) -> None:
+def check_event(team: Team, event: ScenarioEvent) -> None:
     """Raise `InvalidInputError` when `event`, which happens to `team`, brings what no team could have.
 
     What this team cannot take is no mistake here: it may have lost the robots that somebody has counted on.
     """
     place = Place("an event")
-    found = list(_of_the_shape(event, Event, place)) or [
+    found = list(_of_the_shape(event, ScenarioEvent, place)) or [
         mistake for change in event.changes for mistake in _of_the_change(_robots(team, event), change, place)
     ]
     if found:
         raise InvalidInputError(_numbered(found))
 
 
-def held_to_rules(field: Callable[[Team, _Ended, float | None], Event | None]) -> Callable[..., Event | None]:
+def held_to_rules(
+    field: Callable[[Team, _Ended, float | None], ScenarioEvent | None],
+) -> Callable[..., ScenarioEvent | None]:
     """Return `field`, which says what happens to a team, with its events held against the rules before they happen."""
 
-    def checked(team: Team, ended: _Ended, left_s: float | None) -> Event | None:
+    def checked(team: Team, ended: _Ended, left_s: float | None) -> ScenarioEvent | None:
         event = field(team, ended, left_s)
         if event:
             check_event(team, event)
@@ -222,7 +224,7 @@ def _of_the_scenario(team: Team) -> Iterator[Diagnostic]:
             found += mistakes
             if not mistakes:
                 try:
-                    now = changed(now, [change])
+                    now = apply_changes(now, [change])
                 except ChangeError as bad:
                     found.append(place.mistake(bad.message, bad.hint))
         if not found and not now.robots:
@@ -232,7 +234,7 @@ def _of_the_scenario(team: Team) -> Iterator[Diagnostic]:
             return
 
 
-def _of_the_time(event: Event, place: Place) -> Iterator[Diagnostic]:
+def _of_the_time(event: ScenarioEvent, place: Place) -> Iterator[Diagnostic]:
     try:
         check_integer(event.after or 0)
     except MistakeError as mistake:
@@ -241,7 +243,7 @@ def _of_the_time(event: Event, place: Place) -> Iterator[Diagnostic]:
         yield place.mistake("an event after less than no message", "expected None, or a number of messages")
 
 
-def _robots(team: Team, event: Event = _NOTHING) -> dict[str, Robot]:
+def _robots(team: Team, event: ScenarioEvent = _NOTHING) -> dict[str, Robot]:
     """Who is there, and who comes with `event`."""
     coming = [change.robot for change in event.changes if isinstance(change, AddAgent)]
     return {robot.name: robot for robot in (*team.robots, *coming)}

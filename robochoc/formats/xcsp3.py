@@ -8,7 +8,7 @@ from lxml import etree
 
 from robochoc.model.problem import Team
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.merged import identifiers, merged
+from robochoc.solver.team_network import identifiers, team_network
 
 
 def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
@@ -19,7 +19,7 @@ def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
     lend a `solver`. Raises `UnsupportedError`, and `SolverLostError` when pycsp3, which writes it in a process of its
     own, fails.
     """
-    network, costs = merged(team)
+    network, costs = team_network(team)
     names = list(team.variables)
     charged = [f"cost{number}" for number in range(1, len(costs) + 1)]
     with nullcontext(solver) if solver else AceProcess(java=False) as writer:

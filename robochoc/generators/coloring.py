@@ -11,7 +11,7 @@ from random import Random
 
 from robochoc.formats import PREDEFINED
 from robochoc.generators.random_csp import MOST_AGENTS, MOST_VALUES, graph, team_on
-from robochoc.model.problem import Constraint, Kind, Team
+from robochoc.model.problem import Constraint, ProblemKind, Team
 
 
 def coloring(agents: int, colors: int, degree: float, seed: int = 0, *, connected: bool = False) -> Team:
@@ -33,4 +33,4 @@ def coloring(agents: int, colors: int, degree: float, seed: int = 0, *, connecte
         for edge, scope in scopes.items()
     }
     name = f"coloring-{agents}-{colors}-{float(degree)}-{seed}{'-connected' * connected}"
-    return team_on(name, agents, colors, constraints, Kind.DISWCSP)
+    return team_on(name, agents, colors, constraints, ProblemKind.DISWCSP)

@@ -28,8 +28,8 @@ from robochoc.model.problem import (
     Child,
     Constraint,
     Domain,
-    Kind,
     Parent,
+    ProblemKind,
     Relation,
     Robot,
     Semantics,
@@ -82,10 +82,10 @@ def random_csp(
         constraints[edge] = Constraint(f"C{edge[0]}.{edge[1]}", relation, scope, scope)
     costs = "" if max_cost is None else f"-cost{max_cost}"
     name = f"random-{agents}-{domain}-{float(density)}-{float(tightness)}{costs}-{seed}{'-connected' * connected}"
-    return team_on(name, agents, domain, constraints, Kind.DISCSP if max_cost is None else Kind.DISWCSP)
+    return team_on(name, agents, domain, constraints, ProblemKind.DISCSP if max_cost is None else ProblemKind.DISWCSP)
 
 
-def team_on(name: str, agents: int, domain: int, constraints: Mapping[Edge, Constraint], kind: Kind) -> Team:
+def team_on(name: str, agents: int, domain: int, constraints: Mapping[Edge, Constraint], kind: ProblemKind) -> Team:
     """The team of `Robot1`, `Robot2`, ..., where `Robot3` owns `V3`, and the lower one of an edge its constraint."""
     values = Domain("D", (range(1, domain + 1),))
     above: dict[int, list[Parent]] = {number: [] for number in range(1, agents + 1)}

@@ -17,7 +17,7 @@ from robochoc.formats import InvalidInputError, robot_in, robot_xml
 from robochoc.formats.names import is_name
 from robochoc.journal.events import Given
 from robochoc.model.problem import INFINITE, Constraint, Domain, Relation, Robot, Team, Variable
-from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.explanation import Invalidated
 
 NOTHING_VOID = Invalidated(frozenset(), frozenset())
@@ -39,7 +39,7 @@ class TeamWriter:
     def given(
         self,
         team: Team,
-        brief: RunParameters = NO_BRIEF,
+        brief: RunParameters = DEFAULT_PARAMETERS,
         void: Invalidated = NOTHING_VOID,
         *,
         fresh: Collection[str] = (),
@@ -52,7 +52,7 @@ class TeamWriter:
             robots={},
             seed=brief.seed,
             settings=dict(brief.settings),
-            aside=brief.aside,
+            aside=brief.withdrawal_cost,
             fresh=tuple(sorted(fresh)),
             void_keys=tuple(sorted(void.keys)),
             void_agents=tuple(sorted(void.agents)),

@@ -20,7 +20,7 @@ from robochoc.journal.entries import Ended, Header, Line
 from robochoc.journal.events import AnyEvent, Began, Decided, Given, Heard, Improved, Refused, Sent, actor
 from robochoc.journal.given import GivenProblemError, TeamReader
 from robochoc.model.outcome import Outcome
-from robochoc.model.priorities import natural
+from robochoc.model.priorities import natural_key
 from robochoc.model.problem import INFINITE
 from robochoc.system.files import Growing
 from robochoc.verification.objective import Objective
@@ -253,7 +253,7 @@ def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[A
                 continue
         if cost < best and now is not None:
             best = cost
-            values = {name: value for robot in sorted(now, key=natural) for name, value in now[robot].items()}
+            values = {name: value for robot in sorted(now, key=natural_key) for name, value in now[robot].items()}
             yield Improved(t=event.t, cost=best, assignment=values)
 
 

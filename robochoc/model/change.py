@@ -18,8 +18,8 @@ from robochoc.model.problem import (
     Change,
     Child,
     Constraint,
+    ConstraintModel,
     Domain,
-    Model,
     Parent,
     RemoveAgent,
     RemoveConstraint,
@@ -47,12 +47,12 @@ class ChangeError(ValueError):
         self.line = line
 
 
-def changed(team: Team, changes: Iterable[Change]) -> Team:
+def apply_changes(team: Team, changes: Iterable[Change]) -> Team:
     """`team` after `changes`, one after the other. Raises `ChangeError`."""
     for change in changes:
         match change:
             case RemoveAgent(name):
-                team = without(team, [_robot(team, name).name])
+                team = without_robots(team, [_robot(team, name).name])
             case AddAgent(robot):
                 team = _with_robot(team, robot)
             case RemoveValue(variable, value):
@@ -68,23 +68,23 @@ def changed(team: Team, changes: Iterable[Change]) -> Team:
     return team
 
 
-def changed_by(team: Team, events: int) -> Team:
+def team_after_events(team: Team, events: int) -> Team:
     """`team` after so many events of its scenario; changes that it cannot take, of robots that are lost, are left out.
 
     It has no scenario any more.
     """
     now = replace(team, scenario=()) if team.scenario else team
     for event in team.scenario[:events]:
-        now, _ = possible(now, event.changes)
+        now, _ = apply_possible_changes(now, event.changes)
     return now
 
 
-def possible(team: Team, changes: Iterable[Change]) -> tuple[Team, list[Change]]:
+def apply_possible_changes(team: Team, changes: Iterable[Change]) -> tuple[Team, list[Change]]:
     """`team` after those of `changes` that it can take, one after the other, and which these are."""
     taken = []
     for change in changes:
         with suppress(ChangeError):
-            team = changed(team, [change])
+            team = apply_changes(team, [change])
             taken.append(change)
     return team, taken
 
@@ -108,7 +108,7 @@ def describe_change(change: Change) -> str:
             assert_never(never)
 
 
-def concerns(team: Team, change: Change) -> set[str]:
+def affected_robots(team: Team, change: Change) -> set[str]:
     """The robots of `team` that `change` is about."""
     match change:
         case RemoveAgent(name):
@@ -123,7 +123,7 @@ def concerns(team: Team, change: Change) -> set[str]:
             assert_never(never)
 
 
-def without(team: Team, names: Iterable[str]) -> Team:
+def without_robots(team: Team, names: Iterable[str]) -> Team:
     """`team` without the robots `names`, their variables, and every constraint that they share."""
     gone = set(names)
     lost = {variable.name for name in gone for variable in team[name].variables}
@@ -140,7 +140,7 @@ def without(team: Team, names: Iterable[str]) -> Team:
     return _still_showing(replace(team, robots=tuple(robots)))
 
 
-def still_showing(team: Team, before: Team) -> Team:
+def keep_interfaces(team: Team, before: Team) -> Team:
     """Return `team`, what is left of `before`: its robots still show all that they showed there, to nobody."""
     return replace(team, robots=tuple(replace(robot, shown=before[robot.name].interface) for robot in team.robots))
 
@@ -157,7 +157,7 @@ def _still_showing(team: Team) -> Team:
     return team
 
 
-def rejoined(team: Team, robot: Robot) -> Team:
+def rejoin(team: Team, robot: Robot) -> Team:
     """`team` with `robot` in the place of its namesake, as far as its neighbours are there. Raises `ChangeError`.
 
     Links that its neighbours have with it stay, and it tells them what their constraints need, whether its file says
@@ -182,7 +182,7 @@ def rejoined(team: Team, robot: Robot) -> Team:
     private = [
         one.name
         for one in (*robot.shared, *(c for child in robot.children for c in child.constraints))
-        if one.model is Model.PKC
+        if one.model is ConstraintModel.PKC
     ]
     if private:
         raise ChangeError(

@@ -18,8 +18,8 @@ from enum import StrEnum
 from random import Random
 from typing import assert_never
 
-from robochoc.model.priorities import natural, priority_order
-from robochoc.model.problem import Child, Constraint, Model, Parent, Predicate, Relation, Robot, Team
+from robochoc.model.priorities import natural_key, priority_order
+from robochoc.model.problem import Child, Constraint, ConstraintModel, Parent, Predicate, Relation, Robot, Team
 
 Graph = Mapping[str, frozenset[str]]
 """The neighbours of each robot."""
@@ -41,16 +41,16 @@ class OrderError(Exception):
     """The team cannot follow the order; says why in one sentence."""
 
 
-def in_order(team: Team, order: Order | Sequence[str] | None, seed: int = 0) -> Team:
+def with_order(team: Team, order: Order | Sequence[str] | None, seed: int = 0) -> Team:
     """`team` in the order called, or listed as, `order`; None: as it is. Raises `OrderError`."""
     if order is None:
         return team
-    return reordered(team, order_of(team, order, seed) if isinstance(order, Order) else order)
+    return with_priorities(team, compute_order(team, order, seed) if isinstance(order, Order) else order)
 
 
-def order_of(team: Team, order: Order, seed: int = 0) -> tuple[str, ...]:
+def compute_order(team: Team, order: Order, seed: int = 0) -> tuple[str, ...]:
     """The names of `team`'s robots in the order called `order`, highest priority first. `seed` is for `random`."""
-    graph = neighbours(team)
+    graph = constraint_graph(team)
     match order:
         case Order.GIVEN:
             names = team.order
@@ -71,15 +71,15 @@ def order_of(team: Team, order: Order, seed: int = 0) -> tuple[str, ...]:
     return names
 
 
-def favourable(team: Team) -> Team:
+def with_dom_deg_order(team: Team) -> Team:
     """`team` in an order that soon shows who has to step aside, if it can be turned around."""
     try:
-        return in_order(team, Order.DOM_DEG)
+        return with_order(team, Order.DOM_DEG)
     except OrderError:
         return team
 
 
-def neighbours(team: Team) -> Graph:
+def constraint_graph(team: Team) -> Graph:
     """For each robot those that share a constraint with it, and those that the files link to it without one."""
     near: dict[str, set[str]] = {robot.name: set() for robot in team.robots}
     for robot in team.robots:
@@ -96,12 +96,12 @@ def neighbours(team: Team) -> Graph:
 
 def _lexicographic(graph: Graph) -> tuple[str, ...]:
     """`Robot2.1` before `Robot10.1`."""
-    return tuple(sorted(graph, key=natural))
+    return tuple(sorted(graph, key=natural_key))
 
 
 def _max_degree(graph: Graph) -> tuple[str, ...]:
     """Those with the most neighbours first."""
-    return tuple(sorted(graph, key=lambda name: (-len(graph[name]), natural(name))))
+    return tuple(sorted(graph, key=lambda name: (-len(graph[name]), natural_key(name))))
 
 
 def _min_width(graph: Graph) -> tuple[str, ...]:
@@ -155,7 +155,7 @@ def _dom_deg(graph: Graph, team: Team) -> tuple[str, ...]:
 
     def key(name: str) -> tuple[bool, Fraction, object]:
         degree = len(graph[name])
-        return not degree, Fraction(size[name], degree or 1), natural(name)
+        return not degree, Fraction(size[name], degree or 1), natural_key(name)
 
     return tuple(sorted(graph, key=key))
 
@@ -164,13 +164,13 @@ def _random(graph: Graph, seed: int) -> tuple[str, ...]:
     """Each order is as likely as any other. Uses `Random.random` alone, which Python promises never to change."""
     chance = Random(seed)  # noqa: S311 - an order, not a secret
     lots = {name: chance.random() for name in _lexicographic(graph)}
-    return tuple(sorted(lots, key=lambda name: (lots[name], natural(name))))
+    return tuple(sorted(lots, key=lambda name: (lots[name], natural_key(name))))
 
 
 # The team, turned around
 
 
-def reordered(team: Team, names: Sequence[str]) -> Team:
+def with_priorities(team: Team, names: Sequence[str]) -> Team:
     """`team` with the priorities of `names` (all its robots, the highest first): the same constraints and solutions.
 
     Each totally known constraint stands with the robot of its scope that is now the lowest, and the others are that
@@ -220,7 +220,7 @@ class _Turned:
 
     def _holder(self, robot: Robot, constraint: Constraint) -> str:
         """Who holds `constraint`, which `robot` has held so far."""
-        if constraint.model is Model.PKC:
+        if constraint.model is ConstraintModel.PKC:
             return robot.name
         return max(_owners(self._old, constraint), key=self._rank.__getitem__)
 
@@ -230,7 +230,7 @@ class _Turned:
             needed = self._needed_before[robot.name]
             for parent in robot.parents:
                 below = _child(self._old[parent.name], robot.name)
-                parts = [one for one in (*parent.constraints, *below.constraints) if one.model is Model.PKC]
+                parts = [one for one in (*parent.constraints, *below.constraints) if one.model is ConstraintModel.PKC]
                 if parts and self._rank[robot.name] < self._rank[parent.name]:
                     raise OrderError(
                         f"{robot.name} shares a partially known constraint (PKC, {parts[0].name}) with its parent"

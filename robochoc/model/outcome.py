@@ -69,7 +69,7 @@ class PseudoTreeNode:
 
 
 @dataclass(frozen=True)
-class Epoch:
+class EpochOutcome:
     """One epoch of a problem that changes over time, or whose robots were lost.
 
     `robots` are those of the team then, in the files' order; `opened_by` says in a few words what opened the epoch;
@@ -94,7 +94,7 @@ ALL_ROBOTS = "all robots"
 """Who claims what any one of them could have made untrue. No robot has such a name."""
 
 
-class Thoroughness(NamedTuple):
+class CheckCounts(NamedTuple):
     """How many constraints were checked by who holds them and by another robot too, and how many by their owner alone.
 
     Of robots that no one else sees into: across machines.
@@ -139,7 +139,7 @@ class Outcome:
     """The pseudo-tree that the robots have built, if their protocol builds one."""
     confirmed: bool = False
     """Whether the central judge, who was asked, comes to the same `no-solution` or the same least cost."""
-    epochs: tuple[Epoch, ...] = ()
+    epochs: tuple[EpochOutcome, ...] = ()
     """What happened in each epoch; empty where there was but one, as nothing changed."""
     channel: str | None = None
     """The name of the channel model by which time was simulated, if it was."""
@@ -149,7 +149,7 @@ class Outcome:
 
     claimed_by: str | None = None
     """Across machines: whose word the verdict rests on, as nobody could check it; a robot, or `ALL_ROBOTS`."""
-    checked: Thoroughness | None = None
+    checked: CheckCounts | None = None
     """Across machines: who has checked the constraints of an answer."""
 
     @property

@@ -15,7 +15,7 @@ class CycleError(ValueError):
         self.cycle = tuple(cycle)
 
 
-def natural(name: str) -> tuple[tuple[int, str], ...]:
+def natural_key(name: str) -> tuple[tuple[int, str], ...]:
     """A key for natural order: `Robot2.1` before `Robot10.1`. Numbers compare by length first, however long."""
     parts = re.split(r"0*([0-9]+)", name)
     return tuple((len(part) if place % 2 else 0, part) for place, part in enumerate(parts))
@@ -31,7 +31,7 @@ def priority_order(parents: Mapping[str, Iterable[str]]) -> tuple[str, ...]:
     for name, above in waiting.items():
         for parent in above:
             children[parent].append(name)
-    ready = [(natural(name), name) for name, above in waiting.items() if not above]
+    ready = [(natural_key(name), name) for name, above in waiting.items() if not above]
     heapq.heapify(ready)
     order: list[str] = []
     while ready:
@@ -40,7 +40,7 @@ def priority_order(parents: Mapping[str, Iterable[str]]) -> tuple[str, ...]:
         for child in children[name]:
             waiting[child].discard(name)
             if not waiting[child]:
-                heapq.heappush(ready, (natural(child), child))
+                heapq.heappush(ready, (natural_key(child), child))
     if len(order) < len(waiting):
         raise CycleError(_a_cycle({name: above for name, above in waiting.items() if above}))
     return tuple(order)
@@ -48,9 +48,9 @@ def priority_order(parents: Mapping[str, Iterable[str]]) -> tuple[str, ...]:
 
 def _a_cycle(waiting: Mapping[str, set[str]]) -> list[str]:
     """Walk up through robots that wait for a parent; where the walk meets itself is a cycle."""
-    walk = [min(waiting, key=natural)]
+    walk = [min(waiting, key=natural_key)]
     while True:
-        above = min(waiting[walk[-1]] & waiting.keys(), key=natural)
+        above = min(waiting[walk[-1]] & waiting.keys(), key=natural_key)
         if above in walk:
             return walk[walk.index(above) :][::-1]
         walk.append(above)

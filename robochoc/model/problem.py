@@ -16,7 +16,7 @@ from enum import StrEnum
 from functools import cached_property
 
 from robochoc.model.expression import Expression, UndefinedValueError, evaluate
-from robochoc.model.ranges import joined
+from robochoc.model.ranges import merge_ranges
 
 Assignment = Mapping[str, int]
 """Values of variables, by name."""
@@ -28,14 +28,14 @@ INFINITE = math.inf
 """The cost of breaking a hard constraint."""
 
 
-class Kind(StrEnum):
+class ProblemKind(StrEnum):
     """What a team minimises: nothing (satisfaction), or the sum of costs."""
 
     DISCSP = "DisCSP"
     DISWCSP = "DisWCSP"
 
 
-class Model(StrEnum):
+class ConstraintModel(StrEnum):
     """Who knows a shared constraint (Brito and Meseguer, CP 2003): all of it, or each robot its part."""
 
     TKC = "TKC"
@@ -61,7 +61,7 @@ class Domain:
     ranges: tuple[range, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "ranges", joined(self.ranges))
+        object.__setattr__(self, "ranges", merge_ranges(self.ranges))
 
     def __iter__(self) -> Iterator[int]:
         for part in self.ranges:
@@ -146,7 +146,7 @@ class Constraint:
     definition: Relation | Predicate
     scope: tuple[Term, ...]
     parameters: tuple[Term, ...]
-    model: Model | None = Model.TKC
+    model: ConstraintModel | None = ConstraintModel.TKC
     cost: float = INFINITE
     line: int = field(default=0, compare=False)
 
@@ -209,7 +209,7 @@ class Robot:
 
     name: str
     variables: tuple[Variable, ...]
-    kind: Kind = Kind.DISCSP
+    kind: ProblemKind = ProblemKind.DISCSP
     private: tuple[Constraint, ...] = ()
     parents: tuple[Parent, ...] = ()
     children: tuple[Child, ...] = ()
@@ -287,7 +287,7 @@ Change = RemoveAgent | AddAgent | RemoveValue | AddValue | AddConstraint | Remov
 
 
 @dataclass(frozen=True)
-class Event:
+class ScenarioEvent:
     """Changes that happen together, one after the other; they open an epoch.
 
     `after` so many messages of the epoch before (None, or if there are not so many: once that is solved).
@@ -303,7 +303,7 @@ class Team:
 
     name: str
     robots: tuple[Robot, ...]
-    scenario: tuple[Event, ...] = ()
+    scenario: tuple[ScenarioEvent, ...] = ()
     """How the problem changes over time: then it is a DDisCSP, and this its function delta."""
 
     @cached_property
@@ -326,9 +326,9 @@ class Team:
         return bool(self.scenario)
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> ProblemKind:
         """A team with costs is a DisWCSP as a whole; one that all have left is a DisCSP."""
-        return self.robots[0].kind if self.robots else Kind.DISCSP
+        return self.robots[0].kind if self.robots else ProblemKind.DISCSP
 
     @cached_property
     def order(self) -> tuple[str, ...]:

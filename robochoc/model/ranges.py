@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-def joined(ranges: tuple[range, ...]) -> tuple[range, ...]:
+def merge_ranges(ranges: tuple[range, ...]) -> tuple[range, ...]:
     """Return `ranges`, in which those that follow one another without a gap are one. Nothing else is changed.
 
     What is no set (ranges that overlap, are empty or have a step) stays as it is, for whoever checks it.

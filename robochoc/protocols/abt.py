@@ -26,7 +26,7 @@ forbids (`_refuse_below`). Such a value is forgotten once it is refused, as that
 same again, is sure to come. Without a PKC nothing changes.
 
 >>> from robochoc.generators.queens3d import queens3d
->>> from robochoc.run.orchestrator import Options, Runtime, solve
+>>> from robochoc.run import Options, Runtime, solve
 >>> outcome = solve(queens3d(4), Options(protocol="abt", runtime=Runtime.SIMULATOR))
 >>> outcome.verdict.value, outcome.witness
 ('no-solution', 'Robot1.1')
@@ -169,7 +169,7 @@ class ABT(Backtracking):
             if self.value is None:
                 self._backtrack()
                 continue
-            for neighbour in (*self.lower, *self.problem.partners):
+            for neighbour in (*self.lower, *self.problem.pkc_parents):
                 self.send(neighbour, Ok(self.problem.values[self.value]))
             return
 
@@ -189,7 +189,7 @@ class ABT(Backtracking):
 
     def _learn(self, nogood: Nogood) -> None:
         """Store a nogood that was told against all values that look alike to it."""
-        for index in self.problem.alike(nogood.value):
+        for index in self.problem.interchangeable(nogood.value):
             self.store.add(index, nogood.lhs)
 
     def _refuse_below(self) -> None:
@@ -199,7 +199,7 @@ class ABT(Backtracking):
         for child, told in list(self.below.items()):
             if self.allowed.get(child) == self.value:
                 continue
-            refused = self.problem.refuses(self.value, child, told)
+            refused = self.problem.part_conflict(self.value, child, told)
             if refused is None:
                 self.allowed[child] = self.value
             else:

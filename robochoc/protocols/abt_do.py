@@ -192,7 +192,7 @@ class ABTDORetro(Backtracking):
             self.owed.add(sender)  # it has forgotten the value
             return
         self._check_add_link(nogood)
-        for index in self.problem.alike(nogood.value):
+        for index in self.problem.interchangeable(nogood.value):
             self.store.add(index, nogood.lhs)
         self.value = None
         self._choose_new_order(sender, nogood)

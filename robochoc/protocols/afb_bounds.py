@@ -90,7 +90,7 @@ class Prices:
     @cached_property
     def _ahead(self) -> list[Cost]:
         """What each own value costs at least with lower robots only (h)."""
-        return self._problem.least(self._below)
+        return self._problem.lower_bounds(self._below)
 
 
 class Told(NamedTuple):

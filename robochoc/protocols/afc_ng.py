@@ -167,13 +167,13 @@ class AFCng(Protocol):
         """Accept a nogood that agrees with the view; otherwise it is obsolete."""
         if not self._compatible(nogood.lhs):
             return
-        for index in self.problem.alike(nogood.value):
+        for index in self.problem.interchangeable(nogood.value):
             self.store.add(index, nogood.lhs)
         if self.value is not None and self.store[self.value] is not None:
             self.value = None
 
     def _process_solved(self, solution: Mapping[str, Value]) -> None:
-        (self.value,) = self.problem.alike(solution[self.problem.agent])
+        (self.value,) = self.problem.interchangeable(solution[self.problem.agent])
         self.solved = True
 
     # The search

@@ -186,7 +186,7 @@ class AgileABT(Backtracking):
         if current is None or contradicts(nogood.value, current) or not self._coherent(nogood):
             return
         self._check_add_link(nogood)
-        for index in self.problem.alike(nogood.value):
+        for index in self.problem.interchangeable(nogood.value):
             self.store.add(index, nogood.lhs)
         self.value = None
 

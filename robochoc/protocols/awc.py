@@ -239,7 +239,7 @@ class AWC(Protocol):
 
     def _violations(self, index: int) -> int:
         """How many constraints and nogoods the value at `index` breaks, whatever the priorities."""
-        return self.problem.violated(index, self.view) + len(self._standing[index])
+        return self.problem.violation_count(index, self.view) + len(self._standing[index])
 
     def _allowed(self) -> list[int]:
         return [index for index in range(len(self.problem.values)) if self._reason(index) is None]
@@ -268,7 +268,7 @@ class AWC(Protocol):
         self._standing = [[] for _ in self.problem.values]
         for others, own in self.nogoods.standing(self.view):
             if own not in self._alike:
-                self._alike[own] = list(self.problem.alike(own))
+                self._alike[own] = list(self.problem.interchangeable(own))
             for index in self._alike[own]:
                 self._standing[index].append(others)
 

@@ -23,7 +23,7 @@ from robochoc.protocols import acts
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol, Settings
-from robochoc.solver.compiled import Burden, LocalProblem
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 T = TypeVar("T")
 
@@ -92,7 +92,7 @@ class CycleProtocol(Protocol):
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.problem.neighbours:
-            burdens = self.problem.burdens({})
+            burdens = self.problem.lexicographic_costs({})
             self.take(burdens.index(min(burdens)))
             self.cycle = self.settings.cycles
         else:
@@ -160,10 +160,10 @@ class CycleProtocol(Protocol):
         return Findings(trail=Trail(list(self._trail), self.cycle))
 
 
-NO_GAIN: Burden = (0, 0)
+NO_GAIN: LexicographicCost = (0, 0)
 
 
-def gain(before: Burden, after: Burden) -> Burden:
+def gain(before: LexicographicCost, after: LexicographicCost) -> LexicographicCost:
     """By how much `after` is less. Pairs of differences compare like what they are differences of."""
     return before[0] - after[0], before[1] - after[1]
 

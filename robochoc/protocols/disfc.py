@@ -108,7 +108,7 @@ class DisFC(Protocol):
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
-        self.places = problem.places
+        self.places = problem.filter_places
         self.counter = 0
         self.view: dict[str, int] = {}
         self.filters: dict[str, bytes] = {}
@@ -180,7 +180,7 @@ class DisFC(Protocol):
                 self._backtrack()
                 continue
             self.counter += 1
-            for neighbour in (*self.lower, *self.problem.partners):
+            for neighbour in (*self.lower, *self.problem.pkc_parents):
                 self._tell(neighbour, self.value)
             return
 

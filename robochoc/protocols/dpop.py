@@ -73,7 +73,7 @@ from robochoc.protocols.protocol import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooLargeError
-from robochoc.solver.exact import EXACT, refuse_inexact
+from robochoc.solver.exact_costs import EXACT, check_exact
 
 GIB = 1 << 30
 MOST_AXES = 1_000
@@ -184,7 +184,7 @@ class DPOP(TreeProtocol):
 
     def _refuse(self, most: Need, width: int) -> None:
         """The root knows what the tables of the whole tree need. Raises `TooLargeError`."""
-        refuse_inexact(self._dearest)
+        check_exact(self._dearest)
         if most.bytes > self.settings.memory:
             raise TooLargeError(
                 f"{most.robot} needs {_told(most.bytes)} for its tables, more than {self.settings.memory:,}: the"

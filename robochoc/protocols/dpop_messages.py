@@ -12,7 +12,7 @@ from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols import acts
 from robochoc.protocols.dpop_tables import Width, piece_in_words
-from robochoc.solver.exact import EXACT
+from robochoc.solver.exact_costs import EXACT
 
 Size = Annotated[int, msgspec.Meta(ge=2)]
 Cost = Annotated[int, msgspec.Meta(ge=0, le=EXACT)]

@@ -74,7 +74,7 @@ class DSA(CycleProtocol):
 
     def _choose(self, heard: Mapping[str, Message]) -> None:
         """All neighbours' values are known: move, or stay."""
-        burdens = self.problem.burdens(said(heard))
+        burdens = self.problem.lexicographic_costs(said(heard))
         now, least = burdens[self.present], min(burdens)
         index = self.present
         if gain(now, least) > NO_GAIN or self._moves_sideways(now != (0, self.problem.charges[index])):

@@ -115,13 +115,13 @@ class DynABT(ABT, DynamicProtocol):
 
     def _learn(self, nogood: abt.Nogood) -> None:
         because = frozenset(nogood.because) if isinstance(nogood, Nogood) else NOTHING
-        for index in self.problem.alike(nogood.value):
+        for index in self.problem.interchangeable(nogood.value):
             self.store.add(index, nogood.lhs, because)
 
     def _consistent(self, index: int, view: Mapping[str, Value]) -> bool:
         if self.store[index] is not None:
             return False
-        conflict = self.problem.explained(index, view)
+        conflict = self.problem.conflict_with_key(index, view)
         if conflict is None:
             return True
         lhs, key = conflict

@@ -35,7 +35,7 @@ from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, Value, gain, said
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import Burden, LocalProblem
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 
 def saving_in_words(broken: int, cost: float) -> str:
@@ -66,11 +66,11 @@ class Gainers(CycleProtocol):
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
         self.target = 0
-        self.gain: Burden = NO_GAIN
+        self.gain: LexicographicCost = NO_GAIN
 
     def best_unilateral(self, view: Mapping[str, wire.Value]) -> None:
         """The best move of this robot alone, which may be to stay (BestUnilateralGain)."""
-        burdens = self.problem.burdens(view)
+        burdens = self.problem.lexicographic_costs(view)
         least = min(burdens)
         self.gain = gain(burdens[self.present], least)
         self.target = self.present

@@ -44,7 +44,7 @@ from robochoc.protocols.cycles import NO_GAIN, CycleSettings, Domain, Value, gai
 from robochoc.protocols.mgm import Gain, Gainers, saving_in_words
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import Burden, LocalProblem
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 Gains = list[list[tuple[int, int | float]]]
 
@@ -112,7 +112,7 @@ class Go(wire.Message, frozen=True):
 class Move(NamedTuple):
     """A joint move: what it saves, and with whom; the own value's place, and the partner's."""
 
-    gain: Burden
+    gain: LexicographicCost
     partner: str
     own: int
     place: int
@@ -176,7 +176,7 @@ class MGM2(Gainers):
 
     def _gains(self, partner: str) -> Gains:
         """What would be saved if the partner took each of its values, and this robot each of its own."""
-        rows = [self.problem.burdens({**self.view, partner: value}) for value in self.domains[partner]]
+        rows = [self.problem.lexicographic_costs({**self.view, partner: value}) for value in self.domains[partner]]
         now = rows[self.domains[partner].index(self.view[partner])][self.present]
         return [[gain(now, burden) for burden in row] for row in rows]
 
@@ -204,7 +204,9 @@ class MGM2(Gainers):
 
     def _joint(self, offerer: str, gains: Gains) -> Iterator[Move]:
         """All moves that are offered, with what they save both: to the offerer's share comes what it has no part in."""
-        burdens = self.problem.burdens({name: value for name, value in self.view.items() if name != offerer})
+        burdens = self.problem.lexicographic_costs(
+            {name: value for name, value in self.view.items() if name != offerer}
+        )
         now = burdens[self.present]
         for own, (burden, row) in enumerate(zip(burdens, gains, strict=True)):
             broken, cost = gain(now, burden)

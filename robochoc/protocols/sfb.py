@@ -34,7 +34,7 @@ tables that are made before the search (see `LocalProblem.tables`), so all const
 >>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.solver.agent_problem import RunParameters
->>> result = Simulation(queens3d(4), SFB, Concurrent(seed=0), brief=RunParameters(aside=1)).run()
+>>> result = Simulation(queens3d(4), SFB, Concurrent(seed=0), brief=RunParameters(withdrawal_cost=1)).run()
 >>> sum(bool(values) for values in result.assignments.values())  # of 16, and no more can fly
 10
 >>> result.findings["Robot1.1"].bound
@@ -58,7 +58,7 @@ from robochoc.protocols.sfb_bounds import BOUND, ForwardBounds, Rows, dearest
 from robochoc.protocols.sfb_messages import Above, Below, Charges, CPAs, Domain, Explored, Solution
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.exact import EXACT, refuse_inexact
+from robochoc.solver.exact_costs import EXACT, check_exact
 
 MIB = 1 << 20
 LARGEST = 4 * MIB
@@ -237,7 +237,7 @@ class SFB(Protocol):
         self.domains += [domain for domain, _ in below]
         self.bounds = ForwardBounds(self.problem, self.order, self.domains)
         most += self.bounds.most + dearest(own[1])
-        refuse_inexact(most)
+        check_exact(most)
         if self.previous is not None:
             self.send(self.previous, Below.of([own, *below], most))
         else:

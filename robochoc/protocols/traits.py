@@ -33,7 +33,7 @@ class Traits:
         dynamic: It continues when the problem changes (then it is a `DynamicProtocol`).
         concludes: The verdicts with which one robot alone may end the search. Other verdicts are refused.
         tables: It computes with tables of floats, and refuses costs that could add up to 2^53 or more
-            (`solver/exact.py`).
+            (`solver/exact_costs.py`).
         privacy: What neighbours do not learn.
         use_when: When to choose it, in a few words, for `robochoc protocols`.
     """

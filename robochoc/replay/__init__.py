@@ -1,19 +1,19 @@
 """Playing a recorded run again: the same protocol objects, the same packets, and what comes of them."""
 
-from robochoc.replay.ending import Contradiction
-from robochoc.replay.insight import Choice, State, states_of
-from robochoc.replay.rebuild import CannotReplayError, Means
-from robochoc.replay.replay import Difference, Replayed, Stopped, replay
+from robochoc.replay.claims import Contradiction
+from robochoc.replay.rebuild import CannotReplayError, ReplayOptions
+from robochoc.replay.replay import Difference, ReplayResult, StoppedRobot, replay
+from robochoc.replay.robot_states import Choice, RobotState, states_of
 
 __all__ = [
     "CannotReplayError",
     "Choice",
     "Contradiction",
     "Difference",
-    "Means",
-    "Replayed",
-    "State",
-    "Stopped",
+    "ReplayOptions",
+    "ReplayResult",
+    "RobotState",
+    "StoppedRobot",
     "replay",
     "states_of",
 ]

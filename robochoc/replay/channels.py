@@ -30,7 +30,7 @@ _UNFIT = (msgspec.MsgspecError, RecursionError, UnicodeError, TypeError, Overflo
 _encode = msgspec.msgpack.Encoder().encode
 
 
-class Words:
+class MessageDecoder:
     """The messages of one protocol, made again from their recorded fields."""
 
     def __init__(self, protocol: type[Protocol]) -> None:
@@ -84,13 +84,13 @@ class Words:
         return _encode(msgspec.convert(fields, self._union, str_keys=True))
 
 
-class Channels:
+class RecordedChannels:
     """The messages of one run, or epoch, by channel.
 
     `events` are the run's. What robots say again is put in, and handed on rather than what was recorded.
     """
 
-    def __init__(self, events: Iterable[AnyEvent], words: Words) -> None:
+    def __init__(self, events: Iterable[AnyEvent], words: MessageDecoder) -> None:
         self._words = words
         self._recorded: dict[Edge, deque[Sent]] = {}
         self._again: dict[Edge, deque[bytes]] = {}

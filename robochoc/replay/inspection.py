@@ -11,7 +11,7 @@ from itertools import islice
 from typing import Any
 
 from robochoc.model.message import Message, Value
-from robochoc.model.priorities import natural
+from robochoc.model.priorities import natural_key
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.afc import AFC
 from robochoc.protocols.awc import AWC, NogoodList
@@ -21,8 +21,8 @@ from robochoc.protocols.nogood import NogoodStore
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.sbt import SBT
-from robochoc.replay.glance import glance
-from robochoc.replay.phrases import CountedPhrases, Phrases, as_value, cut
+from robochoc.replay.safe_repr import safe_repr
+from robochoc.replay.value_text import NumberedValueText, ValueText, as_value, cut
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.compiled import LocalProblem
 
@@ -41,13 +41,13 @@ _KNOWN = {"problem", "order", "outbox", "value", "verdict", "chance", "settings"
 _EMPTY = {"nothing", "none"}
 
 
-class Look:
+class Inspector:
     """Looks at one robot, which knows `part` of the problem."""
 
     def __init__(self, part: AgentProblem) -> None:
         self._part = part
         self._problem = LocalProblem(part)  # one of its own: what is checked here counts for nobody
-        self._own = Phrases(part.interfaces)
+        self._own = ValueText(part.interfaces)
         self.agent = part.robot.name
         self._ranks = {name: rank for rank, name in enumerate(part.order)}
         self._heard: dict[str, Message] = {}
@@ -79,7 +79,7 @@ class Look:
     def _rank(self, robot: str) -> tuple[int, object]:
         """In the priority order; those who are not in it come last."""
         rank = self._ranks.get(robot)
-        return (0, rank) if rank is not None else (1, natural(robot))
+        return (0, rank) if rank is not None else (1, natural_key(robot))
 
     def said(self, sender: str, message: Message, receiver: str = "") -> str:
         """What `sender` has said, to this robot if to no other `receiver`."""
@@ -96,7 +96,7 @@ class Look:
         for name in VIEWS:
             if isinstance(fields.get(name), Mapping | list | tuple):
                 fields[name] = self._own.all(self._pairs(fields[name], self._part.order)) or "nobody has any value"
-        told = {name: thing if isinstance(thing, str) else glance(thing) for name, thing in fields.items()}
+        told = {name: thing if isinstance(thing, str) else safe_repr(thing) for name, thing in fields.items()}
         return cut(", ".join(text if name == "value" else f"{name}: {text}" for name, text in told.items()))
 
     def domain(self, protocol: Protocol) -> list[tuple[str, str | None]]:
@@ -113,10 +113,10 @@ class Look:
         """The value at `index`, with what it costs where anything does."""
         text = self._own.told(self.agent, protocol.problem.values[index])
         if isinstance(protocol, BoundingProtocol):
-            return f"{text} (LB {glance(protocol.lower[index])}, UB {glance(protocol.upper[index])})"
+            return f"{text} (LB {safe_repr(protocol.lower[index])}, UB {safe_repr(protocol.upper[index])})"
         if protocol.traits.costs:
             cost = self._problem.cost(index, self._seen(protocol))
-            return f"{text} (costs {glance(cost)})" if cost < INFINITE else text
+            return f"{text} (costs {safe_repr(cost)})" if cost < INFINITE else text
         return text
 
     def against(self, protocol: Protocol, index: int) -> str | None:
@@ -130,7 +130,7 @@ class Look:
         if isinstance(store, NogoodStore):
             lhs = store[index]
             return None if lhs is None else (self._others(protocol).all(lhs) or ALWAYS, lhs)
-        broken = self._problem.explained(index, self._seen(protocol))
+        broken = self._problem.conflict_with_key(index, self._seen(protocol))
         if broken is not None:
             lhs, key = broken
             return f"{self._own.all(lhs) or 'its own constraints'}, by {cut(key.partition(':')[2])}", lhs
@@ -148,25 +148,25 @@ class Look:
     def more(self, protocol: Protocol) -> dict[str, str]:
         """Everything else that the protocol keeps; of ours what is not only for itself, and not empty."""
         ours = type(protocol).__module__.startswith("robochoc.")
-        skipped = {*_KNOWN, carefully(lambda: self._view_in(protocol), "")}
+        skipped = {*_KNOWN, safely(lambda: self._view_in(protocol), "")}
         told: dict[str, str] = {}
         if type(protocol.order) is not PriorityOrder:
-            told["order"] = glance(protocol.order)
+            told["order"] = safe_repr(protocol.order)
         if protocol.verdict is not None:
             told["verdict"] = str(protocol.verdict)
         for name, thing in vars(protocol).items():
             if name in skipped or (ours and name.startswith("_")) or len(told) == MOST_ELSE:
                 continue
-            shown = glance(thing)
+            shown = safe_repr(thing)
             if not (ours and shown in _EMPTY):
                 told.setdefault(name.lstrip("_"), shown)
         return told
 
     # What is known of others
 
-    def _others(self, protocol: Protocol) -> Phrases:
+    def _others(self, protocol: Protocol) -> ValueText:
         """How others' values are said: some protocols never tell them, but number them."""
-        return CountedPhrases(self._part.interfaces) if isinstance(protocol, DisFC) else self._own
+        return NumberedValueText(self._part.interfaces) if isinstance(protocol, DisFC) else self._own
 
     def _view_in(self, protocol: Protocol) -> str:
         """The attribute that holds what is known of others' values; empty where there is none."""
@@ -217,7 +217,7 @@ class Look:
         return self._own.all(lhs), self._own.against(self.agent, own)
 
 
-def carefully(look: Callable[[], Any], otherwise: Any) -> Any:  # noqa: ANN401 - whatever is looked at
+def safely(look: Callable[[], Any], otherwise: Any) -> Any:  # noqa: ANN401 - whatever is looked at
     """What `look` finds; `otherwise`, if the protocol is not what it seemed to be: a user's may keep anything."""
     try:
         return look()

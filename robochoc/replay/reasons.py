@@ -10,9 +10,9 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.nogood import NogoodStore
 from robochoc.protocols.protocol import Protocol
-from robochoc.replay.inspection import ALWAYS, MOST_VALUES, Look, carefully
-from robochoc.replay.phrases import as_value
-from robochoc.replay.steps import Step
+from robochoc.replay.inspection import ALWAYS, MOST_VALUES, Inspector, safely
+from robochoc.replay.steps import RecordedStep
+from robochoc.replay.value_text import as_value
 
 MOST_REASONS = 8
 MOST_BACKTRACKS = 3
@@ -47,11 +47,11 @@ class _DeadEnd(NamedTuple):
 class Reasons:
     """Looks at a robot before a step, in it, whenever the robot speaks, and after it."""
 
-    def __init__(self, look: Look, protocol: Protocol) -> None:
+    def __init__(self, look: Inspector, protocol: Protocol) -> None:
         self._look = look
         self._protocol = protocol
         self._value = protocol.value
-        self._text = carefully(lambda: self._named(protocol.value), None)
+        self._text = safely(lambda: self._named(protocol.value), None)
         self._dead_ends: list[_DeadEnd] = []
 
     def listen(self, receiver: str, message: Message) -> None:
@@ -61,14 +61,14 @@ class Reasons:
             return
         if self._store() is not None and self._protocol.value is not None:
             return  # it has a value, and rules out another robot's
-        ruled_out = carefully(self._ruled_out, [])
+        ruled_out = safely(self._ruled_out, [])
         if self._dead_ends and self._dead_ends[-1].ruled_out == ruled_out:
             self._dead_ends[-1].receivers.append(receiver)  # of AWC all in the nogood are told
         elif len(self._dead_ends) <= MOST_BACKTRACKS:
-            said = carefully(lambda: self._look.said(self._look.agent, message, receiver), "")
+            said = safely(lambda: self._look.said(self._look.agent, message, receiver), "")
             self._dead_ends.append(_DeadEnd(ruled_out, kind, said, [receiver]))
 
-    def told(self, heard: Sequence[tuple[Sent, Message]], step: Step) -> list[str]:
+    def told(self, heard: Sequence[tuple[Sent, Message]], step: RecordedStep) -> list[str]:
         """Why the value is another one now, after `heard` was taken in, or the search over; empty: neither is so."""
         concluded = [event.verdict for event in step.done if isinstance(event, Concluded)]
         if self._protocol.value == self._value and not concluded:
@@ -134,7 +134,7 @@ class Reasons:
         index = self._protocol.value
         if index is None:
             return "it has no value now"
-        first = carefully(lambda: self._is_first(index), False)
+        first = safely(lambda: self._is_first(index), False)
         text = self._named(index) or ""
         if text.startswith("steps aside"):
             return f"it {text}"

@@ -12,11 +12,11 @@ from robochoc.communication.session import Epoch
 from robochoc.journal.events import Given, Lost
 from robochoc.journal.given import GivenProblemError, TeamReader, brief_of, void_of
 from robochoc.journal.journal import Header
-from robochoc.model.change import ChangeError, changed_by, still_showing, without
-from robochoc.model.orders import Order, OrderError, order_of, reordered
+from robochoc.model.change import ChangeError, keep_interfaces, team_after_events, without_robots
+from robochoc.model.orders import Order, OrderError, compute_order, with_priorities
 from robochoc.model.problem import Robot, Team
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
-from robochoc.replay.steps import Run
+from robochoc.replay.steps import RecordedRun
 from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_by_name
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.agent_problem import AgentProblem, RunParameters
@@ -49,7 +49,7 @@ class CannotReplayError(Exception):
         self.broken = broken
 
 
-class Means(NamedTuple):
+class ReplayOptions(NamedTuple):
     """What a replay may use.
 
     `team` is the one in the files, for runs whose journals do not say what robots were given; `protocols` are, by
@@ -66,7 +66,7 @@ class Means(NamedTuple):
     solver: AceProcess | None = None
 
 
-class Ensemble(NamedTuple):
+class RebuiltRobots(NamedTuple):
     """The robots of one run, ready to begin: the protocol, their hosts, and what each of them knows.
 
     Those in `mindful` go on with what they found out in the epoch before. `compiled` is what they were made of.
@@ -80,13 +80,13 @@ class Ensemble(NamedTuple):
     compiled: CompiledTeam
 
 
-class Cast:
+class Rebuilder:
     """Makes the robots of one run after the other; those that go on from one epoch to the next are the same.
 
     `only` names those that are to play (None: all).
     """
 
-    def __init__(self, header: Header | None, means: Means, only: Collection[str] | None = None) -> None:
+    def __init__(self, header: Header | None, means: ReplayOptions, only: Collection[str] | None = None) -> None:
         self._header = header
         self._means = means
         self._only = only
@@ -95,7 +95,7 @@ class Cast:
         self._before: Mapping[str, CompiledRobot] = {}
         self._lost: set[str] = set()
 
-    def enter(self, run: Run) -> Ensemble:
+    def enter(self, run: RecordedRun) -> RebuiltRobots:
         """The robots of `run`. Raises `CannotReplayError`."""
         protocol = self._protocol(run)
         try:
@@ -112,9 +112,9 @@ class Cast:
         kept = issubclass(protocol, DynamicProtocol)
         mindful = [name for name in parts if kept and name in before and name not in epoch.restarted]
         lossless = run.given is None or run.given.quiet
-        return Ensemble(protocol, self._hosts, parts, lossless, mindful, epoch.compiled)
+        return RebuiltRobots(protocol, self._hosts, parts, lossless, mindful, epoch.compiled)
 
-    def _protocol(self, run: Run) -> type[Protocol]:
+    def _protocol(self, run: RecordedRun) -> type[Protocol]:
         """The class that the run names; of a master's journal, the header's."""
         asked = self._header.protocol if self._header else None
         if run.began is None:
@@ -135,7 +135,7 @@ class Cast:
         except UnknownProtocolError as unknown:
             raise CannotReplayError(str(unknown)) from unknown
 
-    def _epoch(self, run: Run, protocol: type[Protocol]) -> Epoch:
+    def _epoch(self, run: RecordedRun, protocol: type[Protocol]) -> Epoch:
         if run.given is not None and not (run.given.why and self._means.team):
             return self._as_given(run.given)
         return self._as_filed(run, protocol)
@@ -144,7 +144,7 @@ class Cast:
         compiled = self._compiled(self._reader.team(given))
         return Epoch(compiled, void_of(given), frozenset(given.fresh), brief_of(given))
 
-    def _as_filed(self, run: Run, protocol: type[Protocol]) -> Epoch:
+    def _as_filed(self, run: RecordedRun, protocol: type[Protocol]) -> Epoch:
         """What the files say, for a run whose journal does not; robots that were lost before are left out."""
         if self._means.team is None:
             raise CannotReplayError(
@@ -154,7 +154,7 @@ class Cast:
         if run.began is not None and isinstance(run.began.epoch, int):
             raise CannotReplayError("the journal does not say what the robots were given when their problem changed")
         try:
-            filed = self._ordered(changed_by(self._means.team, events=0))
+            filed = self._ordered(team_after_events(self._means.team, events=0))
             team = self._left(filed)
         except (OrderError, ChangeError, ValueError) as why:
             raise CannotReplayError(f"the team cannot be brought into the order of the run: {why}") from why
@@ -164,22 +164,22 @@ class Cast:
             return Epoch(self._compiled(team), brief=RunParameters(seed, self._means.settings))
         there = [robot for robot in filed.robots if run.given is not None or robot.name in team]
         aside = withdrawal_cost(replace(filed, robots=tuple(there))) if protocol.traits.costs else None
-        return Epoch(self._compiled(team), brief=RunParameters(seed, aside=aside))
+        return Epoch(self._compiled(team), brief=RunParameters(seed, withdrawal_cost=aside))
 
     def _ordered(self, team: Team) -> Team:
         """Return `team` in the order of the run. Raises `OrderError`, `ValueError`."""
         order = self._header.order if self._header else None
         if isinstance(order, str):
-            order = order_of(team, Order(order), self._header.seed if self._header else 0)
+            order = compute_order(team, Order(order), self._header.seed if self._header else 0)
         if isinstance(order, tuple):
-            return reordered(team, order)
+            return with_priorities(team, order)
         return team
 
     def _left(self, team: Team) -> Team:
         """Return `team` without the robots that were lost before. On a network the others show what they did show."""
-        left = without(team, [name for name in self._lost if name in team])
+        left = without_robots(team, [name for name in self._lost if name in team])
         on_network = self._header is not None and self._header.runtime == "network"
-        return still_showing(left, team) if on_network else left
+        return keep_interfaces(left, team) if on_network else left
 
     def _compiled(self, team: Team) -> CompiledTeam:
         """Return `team` with those compiled who play; what did not change is not compiled again."""

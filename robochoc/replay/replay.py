@@ -20,10 +20,10 @@ from robochoc.journal.entries import STAMPED_LATE
 from robochoc.journal.events import AnyEvent, Event, Received, Sent, Settled
 from robochoc.journal.journal import Header, Journal
 from robochoc.model.message import Envelope, Message
-from robochoc.replay.channels import Channels, Words
-from robochoc.replay.ending import Contradiction, Played, contradictions, played
-from robochoc.replay.rebuild import Cast, Ensemble, Means
-from robochoc.replay.steps import RobotEvent, Run, Step, runs_of, steps_of
+from robochoc.replay.channels import MessageDecoder, RecordedChannels
+from robochoc.replay.claims import Contradiction, ReplayedRun, contradictions, played
+from robochoc.replay.rebuild import Rebuilder, RebuiltRobots, ReplayOptions
+from robochoc.replay.steps import RecordedRun, RecordedStep, RobotEvent, runs_of, steps_of
 
 SIMULATED = "simulator"
 """The runtime whose schedules may delay messages: then a clock takes up more than the sender's."""
@@ -51,7 +51,7 @@ class Difference(msgspec.Struct, frozen=True, kw_only=True):
     raised: str = ""
 
 
-class Stopped(msgspec.Struct, frozen=True, kw_only=True):
+class StoppedRobot(msgspec.Struct, frozen=True, kw_only=True):
     """A robot that could be followed as far as its step number `step` only, in run number `run`, and why."""
 
     run: int
@@ -61,7 +61,7 @@ class Stopped(msgspec.Struct, frozen=True, kw_only=True):
 
 
 @dataclass(frozen=True)
-class Replayed:
+class ReplayResult:
     """What a replay has come to.
 
     `steps` and `messages` (sent) are those that were played and found the same; `unfinished` steps are there in part
@@ -76,7 +76,7 @@ class Replayed:
     messages: int
     unfinished: int
     difference: Difference | None
-    stopped: tuple[Stopped, ...]
+    stopped: tuple[StoppedRobot, ...]
     damage: str | None
     ended: bool
     contradictions: tuple[Contradiction, ...] = ()
@@ -122,32 +122,32 @@ class ReplayStopsError(Exception):
 
 
 def replay(
-    journal: Journal, means: Means | None = None, *, progress: Callable[[Progress], None] | None = None
-) -> Replayed:
+    journal: Journal, means: ReplayOptions | None = None, *, progress: Callable[[Progress], None] | None = None
+) -> ReplayResult:
     """Play `journal` again, up to the first difference. Raises `CannotReplayError`."""
-    return _Replay(journal, means or Means(), progress).whole()
+    return _Replay(journal, means or ReplayOptions(), progress).whole()
 
 
-class Scene:
+class RunReplay:
     """One run being played again."""
 
-    def __init__(self, run: Run, ensemble: Ensemble, header: Header | None) -> None:
+    def __init__(self, run: RecordedRun, ensemble: RebuiltRobots, header: Header | None) -> None:
         self.run = run
         self.ensemble = ensemble
-        self.words = Words(ensemble.protocol)
-        self.channels = Channels(run.events, self.words)
+        self.words = MessageDecoder(ensemble.protocol)
+        self.channels = RecordedChannels(run.events, self.words)
         self._simulated = header is None or header.runtime == SIMULATED
         self._stamped_late = header is not None and header.version == STAMPED_LATE
         self._begun: set[str] = set()
         self.heard: list[tuple[Sent, Message]] = []
         """What was taken in by the step that was played last."""
 
-    def steps(self) -> Iterator[Step]:
+    def steps(self) -> Iterator[RecordedStep]:
         """The steps in their order, for who plays each before the next.
 
         Across machines clocks differ, so that something may seem to be received before it was sent: then it waits.
         """
-        waiting: dict[str, deque[Step]] = {}
+        waiting: dict[str, deque[RecordedStep]] = {}
         for step in steps_of(self.run.events):
             if step.robot in waiting or not self.channels.can_hand_on(step.received):
                 waiting.setdefault(step.robot, deque()).append(step)
@@ -157,7 +157,7 @@ class Scene:
         for steps in waiting.values():
             yield from steps
 
-    def _now_possible(self, waiting: dict[str, deque[Step]]) -> Iterator[Step]:
+    def _now_possible(self, waiting: dict[str, deque[RecordedStep]]) -> Iterator[RecordedStep]:
         """Of the steps that wait, those that need no longer; playing one may set another free."""
         moved = True
         while moved:
@@ -170,7 +170,7 @@ class Scene:
                     del waiting[name]
 
     def play(
-        self, step: Step, number: int, listen: Callable[[str, Message], None] = lambda *_: None
+        self, step: RecordedStep, number: int, listen: Callable[[str, Message], None] = lambda *_: None
     ) -> Difference | None:
         """Play the step, its robot's number `number`; return the difference, if there is one.
 
@@ -237,7 +237,7 @@ class Scene:
             told[-1] = msgspec.structs.replace(told[-1], clock=received.clock)
 
     def _difference(
-        self, step: Step, told: Sequence[AnyEvent], raised: str
+        self, step: RecordedStep, told: Sequence[AnyEvent], raised: str
     ) -> tuple[RobotEvent | None, AnyEvent | None] | None:
         """The first pair of events that are not the same."""
         recorded = [*step.received, *step.done]
@@ -279,26 +279,26 @@ def _as_it_was_told(event: AnyEvent) -> int:
 class _Replay:
     """One journal, all its runs."""
 
-    def __init__(self, journal: Journal, means: Means, progress: Callable[[Progress], None] | None) -> None:
+    def __init__(self, journal: Journal, means: ReplayOptions, progress: Callable[[Progress], None] | None) -> None:
         self._journal = journal
-        self._cast = Cast(journal.header, means)
+        self._cast = Rebuilder(journal.header, means)
         self._progress = progress
         self._began = time.monotonic()
         self._counts: dict[str, int] = {}
         self._steps = self._messages = self._unfinished = self._runs = 0
-        self._stopped: list[Stopped] = []
-        self._played: list[Played] = []
+        self._stopped: list[StoppedRobot] = []
+        self._played: list[ReplayedRun] = []
         self._gone: set[str] = set()
         """Robots of which it is not known what they have in mind."""
 
-    def whole(self) -> Replayed:
+    def whole(self) -> ReplayResult:
         difference = None
         for run in runs_of(self._journal.events):
             self._show(f"run {run.number + 1}: making the robots")
             ensemble = self._cast.enter(run)
             self._runs += 1
             self._counts.update({name: 0 for name in ensemble.hosts if name not in self._counts})
-            difference = self._run(Scene(run, ensemble, self._journal.header))
+            difference = self._run(RunReplay(run, ensemble, self._journal.header))
             if difference:
                 break
             self._played.append(played(run, ensemble, self._journal.outcome))
@@ -306,7 +306,7 @@ class _Replay:
         if difference is None:
             whole = not (self._stopped or self._unfinished or self._journal.damage)
             found = contradictions(self._journal, self._played, whole=whole)
-        return Replayed(
+        return ReplayResult(
             runs=self._runs,
             robots=len(self._counts),
             steps=self._steps,
@@ -320,7 +320,7 @@ class _Replay:
             truncated=self._journal.truncated,
         )
 
-    def _run(self, scene: Scene) -> Difference | None:
+    def _run(self, scene: RunReplay) -> Difference | None:
         self._gone.intersection_update(scene.ensemble.mindful)
         for step in scene.steps():
             number = self._counts.get(step.robot, 0)
@@ -331,7 +331,7 @@ class _Replay:
                 difference = scene.play(step, number)
             except ReplayStopsError as stops:
                 self._gone.add(step.robot)
-                self._stopped.append(Stopped(run=scene.run.number, robot=step.robot, step=number, why=str(stops)))
+                self._stopped.append(StoppedRobot(run=scene.run.number, robot=step.robot, step=number, why=str(stops)))
                 continue
             if difference:
                 return difference

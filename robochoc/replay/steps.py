@@ -27,7 +27,7 @@ RobotEvent = Received | Heard | Decided | Concluded | Sent | Settled
 """What a robot tells of itself, in its own order."""
 
 
-class Run(NamedTuple):
+class RecordedRun(NamedTuple):
     """A run, or an epoch of it, counted from 0; a journal of a master's has no `Began`, and no `Given`, of it."""
 
     number: int
@@ -36,7 +36,7 @@ class Run(NamedTuple):
     events: list[AnyEvent]
 
 
-class Step(NamedTuple):
+class RecordedStep(NamedTuple):
     """One step of one robot: what it took in, what it did then, and whether all of that is there."""
 
     robot: str
@@ -45,16 +45,16 @@ class Step(NamedTuple):
     whole: bool
 
 
-def runs_of(events: Iterable[AnyEvent]) -> Iterator[Run]:
+def runs_of(events: Iterable[AnyEvent]) -> Iterator[RecordedRun]:
     """The runs, one after the other; those in which no robot has been given, or has done, anything are left out."""
     number = 0
-    run = Run(0, None, None, [])
+    run = RecordedRun(0, None, None, [])
     for event in events:
         if isinstance(event, Began):
             if _is_one(run):
                 yield run
                 number += 1
-            run = Run(number, event, None, [])
+            run = RecordedRun(number, event, None, [])
         elif isinstance(event, Given):
             run = run._replace(given=event)
         else:
@@ -63,12 +63,12 @@ def runs_of(events: Iterable[AnyEvent]) -> Iterator[Run]:
         yield run
 
 
-def _is_one(run: Run) -> bool:
+def _is_one(run: RecordedRun) -> bool:
     """Whether anybody has, or could have, done anything in it."""
     return run.given is not None or any(actor(event) is not None for event in run.events)
 
 
-def steps_of(events: Iterable[AnyEvent]) -> Iterator[Step]:
+def steps_of(events: Iterable[AnyEvent]) -> Iterator[RecordedStep]:
     """The steps of one run in the order of their ends; then those that have none."""
     open_still: dict[str, list[RobotEvent]] = {}
     for event in events:
@@ -84,6 +84,6 @@ def steps_of(events: Iterable[AnyEvent]) -> Iterator[Step]:
         yield _step(robot, own, whole=False)
 
 
-def _step(robot: str, events: Sequence[RobotEvent], *, whole: bool) -> Step:
+def _step(robot: str, events: Sequence[RobotEvent], *, whole: bool) -> RecordedStep:
     received = list(takewhile(lambda one: isinstance(one, Received), events))
-    return Step(robot, received, events[len(received) :], whole)  # type: ignore[arg-type]  # see takewhile
+    return RecordedStep(robot, received, events[len(received) :], whole)  # type: ignore[arg-type]  # see takewhile

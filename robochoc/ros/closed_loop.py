@@ -14,9 +14,9 @@ from dataclasses import replace
 from robochoc.flight.crafts import crafts_of
 from robochoc.flight.mission import VAST_M, Drone, Leg, Mission, MissionBuilder, all_robots, mission_of
 from robochoc.flight.reports import Report
-from robochoc.model.change import possible
-from robochoc.model.outcome import Epoch, Outcome
-from robochoc.model.problem import Assignment, Change, Event, Robot, Team
+from robochoc.model.change import apply_possible_changes
+from robochoc.model.outcome import EpochOutcome, Outcome
+from robochoc.model.problem import Assignment, Change, Robot, ScenarioEvent, Team
 from robochoc.ros.sink import Sink
 from robochoc.ros.sink_publisher import SinkPublisher
 from robochoc.ros.situation import BATTERY, Situation
@@ -64,7 +64,7 @@ class ClosedLoop:
     Raises `NameClashError`, `NoMappingError`, `NothingToPublishError`; calls raise `SinkError` and `SourceError`.
     """
 
-    events: list[Event]
+    events: list[ScenarioEvent]
     """What the robots' situation has changed."""
     publishers: list[SinkPublisher]
     """What was published, for each of the sinks."""
@@ -96,7 +96,7 @@ class ClosedLoop:
                 publisher for publisher in self.publishers if feedback.simulated or not publisher.live
             ]
 
-    def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
+    def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
         """Publish what `epoch` has decided for `team`, and see what follows of it within `left_s` seconds."""
         self._happened += not self._lost
         self._lost = bool(epoch.lost)
@@ -157,10 +157,10 @@ class ClosedLoop:
     def _coming(self, team: Team) -> Team:
         """`team` after all that is already known to come."""
         for event in self.team.scenario[self._happened :]:
-            team, _ = possible(team, event.changes)
+            team, _ = apply_possible_changes(team, event.changes)
         return team
 
-    def _sensed(self, feedback: Feedback, team: Team, builder: MissionBuilder) -> Event | None:
+    def _sensed(self, feedback: Feedback, team: Team, builder: MissionBuilder) -> ScenarioEvent | None:
         """The event that follows of a decision: the first reports that change `team`."""
         if self._situation is None:
             self._situation = Situation(builder.drones, builder.scale, self._battery)
@@ -170,9 +170,9 @@ class ClosedLoop:
             found = self._situation.changes(team, report)
             if found:
                 changes += found
-                team, _ = possible(team, found)
+                team, _ = apply_possible_changes(team, found)
                 until_s = report.at_s + TOGETHER_S if until_s is None else until_s
-        return Event(tuple(changes)) if changes else None
+        return ScenarioEvent(tuple(changes)) if changes else None
 
 
 def drones_of(team: Team) -> tuple[Drone, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robochoc.flight.crafts import crafts_of
 from robochoc.flight.mission import Drone, Goal, Leg, MissionBuilder
-from robochoc.model.outcome import Epoch, Verdict
+from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import Assignment, Robot
 
 _ANSWERED = (Verdict.SOLUTION, Verdict.OPTIMAL)
@@ -28,7 +28,7 @@ def leg_of_robot(robot: Robot, why: str, assignment: Assignment, scale: float | 
     builder = MissionBuilder([robot], assignment, scale=scale)
     known = {craft.name for craft in crafts_of(robot, assignment) if craft.cell}
     if assignment:
-        goals = builder.leg(Epoch(Verdict(verdict), (robot.name,), assignment=dict(assignment))).goals
+        goals = builder.leg(EpochOutcome(Verdict(verdict), (robot.name,), assignment=dict(assignment))).goals
     else:
         goals = {number: Goal(drone.home, lands=True) for number, drone in enumerate(builder.drones)}
     return Leg(why, Verdict(verdict), {n: goal for n, goal in goals.items() if builder.drones[n].name in known})

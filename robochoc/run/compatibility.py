@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 from robochoc.communication.host import SettingsError, settings_of
-from robochoc.model.change import changed_by
-from robochoc.model.problem import Kind, Model, Team
+from robochoc.model.change import team_after_events
+from robochoc.model.problem import ConstraintModel, ProblemKind, Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.run.registry import offers
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.exact import EXACT, refuse_inexact
-from robochoc.solver.weighted import HIGHEST
+from robochoc.solver.exact_costs import EXACT, check_exact
+from robochoc.solver.weighted import MAX_TOTAL_COST
 from robochoc.verification.objective import withdrawal_cost
 
 PAIR = 2
@@ -69,7 +69,7 @@ def _takes(team: Team, options: Options, traits: Traits) -> bool:
     try:
         _check(team, options, traits)
         if traits.tables:
-            refuse_inexact(_most(team, aside=options.withdraw is not None))
+            check_exact(_most(team, aside=options.withdraw is not None))
     except UnsupportedError:
         return False
     return True
@@ -85,7 +85,7 @@ def _judge_takes(team: Team, options: Options) -> bool:
         refuse_central(team, replace(options, protocol=CENTRAL))
     except UnsupportedError:
         return False
-    return _most(team, aside=options.withdraw is not None) <= HIGHEST
+    return _most(team, aside=options.withdraw is not None) <= MAX_TOTAL_COST
 
 
 def _check(team: Team, options: Options, traits: Traits) -> None:
@@ -95,14 +95,14 @@ def _check(team: Team, options: Options, traits: Traits) -> None:
         refuse_scenario(team, "--withdraw")
     if traits.costs or options.withdraw is Withdrawal.FEWEST:
         for events in range(len(team.scenario) + 1):
-            _refuse_dear(changed_by(team, events), aside=options.withdraw is not None)
+            _refuse_dear(team_after_events(team, events), aside=options.withdraw is not None)
     if options.withdraw is Withdrawal.FEWEST:
         _refuse_fewest(team, options, traits)
     else:
         for events in range(len(team.scenario) + 1):
-            refuse(changed_by(team, events), options.protocol, traits)
+            refuse(team_after_events(team, events), options.protocol, traits)
     if options.withdraw is Withdrawal.MAXIMAL:
-        if team.kind is Kind.DISWCSP:
+        if team.kind is ProblemKind.DISWCSP:
             raise UnsupportedError(
                 f"{team.name} is a DisWCSP; --withdraw maximal knows no costs, --withdraw fewest does"
             )
@@ -127,7 +127,7 @@ def refuse_central(team: Team, options: Options) -> None:
     refuse(team, options.protocol, Traits(partially_known=True, costs=True))
     if options.count:
         refuse_scenario(team, "--count")
-        if team.kind is Kind.DISWCSP:
+        if team.kind is ProblemKind.DISWCSP:
             raise UnsupportedError(
                 f"{team.name} is a DisWCSP, where every assignment that breaks nothing hard is a solution; --count is"
                 " for problems without costs"
@@ -164,12 +164,12 @@ def refuse_scenario(team: Team, option: str) -> None:
 
 def refuse(team: Team, name: str, traits: Traits) -> None:
     """Raise `UnsupportedError` for what whoever is called `name` cannot take of `team`."""
-    if team.kind is Kind.DISWCSP and not traits.costs:
+    if team.kind is ProblemKind.DISWCSP and not traits.costs:
         raise _UnfitError(f"{team.name} is a DisWCSP, and {name} does not minimise costs")
     for robot in team.robots:
         parts = (part for child in robot.children for part in child.constraints)
         for constraint in (*robot.shared, *parts):
-            if constraint.model is Model.PKC and not traits.partially_known:
+            if constraint.model is ConstraintModel.PKC and not traits.partially_known:
                 raise _UnfitError(
                     f"{robot.name} shares a partially known constraint (PKC, {constraint.name}), which {name}"
                     " does not support"
@@ -193,7 +193,7 @@ def _refuse_fewest(team: Team, options: Options, traits: Traits) -> None:
     """Who steps aside is a question of costs: a protocol for these answers it alone, any other is asked first."""
     if traits.costs and not traits.complete:
         raise _UnfitError(f"--withdraw fewest has to be proven, and {options.protocol} proves nothing", complete=True)
-    if team.kind is Kind.DISCSP:
+    if team.kind is ProblemKind.DISCSP:
         refuse(team, options.protocol, traits)
     refuse(team, "--withdraw fewest", Traits(costs=True, n_ary=traits.n_ary or not traits.costs))
 

@@ -1,92 +1,221 @@
-"""What a search has come to: the answer that its result holds, held against every constraint of every file."""
+"""The answer of a search: its verdict, and its assignment once that was checked.
+
+`evaluate` is the same wherever the robots are; how an assignment is checked is given to it. On this machine the files
+are at hand: `check_with_files`. Across machines the robots check (`run/networked/machines.py`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from robochoc.communication.run_result import RunResult
-from robochoc.model.outcome import Epoch, Outcome, Verdict
-from robochoc.model.problem import Kind, Team
-from robochoc.protocols.traits import Traits
+from robochoc.model.outcome import CheckCounts, EpochOutcome, Metrics, Outcome, PseudoTreeNode, Verdict
+from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.incumbent import absent, best_of, bound_of, joined, tree_of
+from robochoc.run.withdrawal import Phase
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.verification.checker import RefutedError, cost, could_join, objections
+from robochoc.verification.checker import RefutedError, assignment_cost, needlessly_withdrawn, violations
 
 
-def evaluate(epoch: Epoch, team: Team, result: RunResult, traits: Traits, compiled: CompiledTeam) -> Epoch:
-    """`epoch`, with the answer of a search by a protocol that has `traits`; as it is where there is none.
+class CheckedAssignment(NamedTuple):
+    """An assignment that was checked.
 
-    `team` is what the answer is held against, as the files have it; `compiled` is what the robots have worked on.
-
-    A protocol that minimises has one whenever it is asked; whether that is proven depends on the protocol, and on
-    whether it came to its end. A solution of a team without costs needs no proof. Raises `RefutedError`.
+    `withdrawn` are the robots without values. `verified`: no hard constraint is broken. `check_counts` is set where
+    robots have checked. `reason` says why there is no assignment, or why it was not checked.
     """
-    epoch = replace(epoch, tree=tree_of(result.findings))
+
+    assignment: dict[str, int]
+    cost: float | None = None
+    withdrawn: tuple[str, ...] = ()
+    verified: bool = True
+    check_counts: CheckCounts | None = None
+    reason: str | None = None
+
+
+Check = Callable[[], CheckedAssignment | None]
+"""Returns what a search has found, once it was checked; None if all that it has found breaks a hard constraint."""
+
+
+class Search(NamedTuple):
+    """A search that is over: its result, and how its assignment is checked."""
+
+    result: RunResult
+    check: Check
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a phase of a run comes to. Most fields are those of `model.outcome.Outcome`.
+
+    `withdrawn` are the robots that withdrew so that the others have a solution; those that were lost are not among
+    them. `ended`: the protocol has come to its end, no limit was reached.
+    """
+
+    verdict: Verdict
+    metrics: Metrics = field(default_factory=Metrics)
+    witness: str | None = None
+    assignment: dict[str, int] = field(default_factory=dict)
+    cost: float | None = None
+    withdrawn: tuple[str, ...] = ()
+    bound: float | None = None
+    tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
+    verified: bool = False
+    confirmed: bool = False
+    checked: CheckCounts | None = None
+    reason: str | None = None
+    epochs: tuple[EpochOutcome, ...] = ()
+    ended: bool = False
+
+    def then(self, second: Answer) -> Answer:
+        """Return the answer of two phases: that of the `second`, with what both have cost."""
+        return replace(
+            second,
+            metrics=self.metrics + second.metrics,
+            witness=second.witness or self.witness,
+            reason=second.reason or self.reason,
+            epochs=self.epochs,
+        )
+
+    def as_epoch(self, robots: tuple[str, ...], opened_by: str = "the start", lost: Sequence[str] = ()) -> EpochOutcome:
+        """Return the epoch that ended with this answer."""
+        return EpochOutcome(
+            verdict=self.verdict,
+            robots=robots,
+            opened_by=opened_by,
+            assignment=self.assignment,
+            cost=self.cost,
+            metrics=self.metrics,
+            verified=self.verified,
+            witness=self.witness,
+            lost=tuple(lost),
+            bound=self.bound,
+            tree=self.tree,
+            confirmed=self.confirmed,
+        )
+
+    def as_outcome(self, header: Outcome, lost: tuple[str, ...]) -> Outcome:
+        """Return `header`, which says what was run, with this answer; the robots `lost` are withdrawn as well."""
+        return replace(
+            header,
+            verdict=self.verdict,
+            assignment=self.assignment,
+            cost=self.cost,
+            withdrawn=(*lost, *self.withdrawn),
+            metrics=self.metrics,
+            verified=self.verified,
+            witness=self.witness,
+            reason=self.reason,
+            lost=lost,
+            bound=self.bound,
+            tree=self.tree,
+            confirmed=self.confirmed,
+            epochs=self.epochs,
+            checked=self.checked,
+        )
+
+
+def evaluate(phase: Phase, search: Search, kind: ProblemKind) -> Answer:
+    """Return the answer of a `search` in `phase`, for a problem of this `kind`.
+
+    A protocol that minimises costs has an assignment whenever it is asked. Whether that is proven depends on the
+    protocol, and on whether it came to its end. A solution of a problem without costs needs no proof.
+
+    Raises:
+        RefutedError: when the check refutes what the protocol claims.
+    """
+    result = search.result
     ended = result.verdict is Verdict.SOLUTION
-    if result.lost or result.verdict is Verdict.NO_SOLUTION or not (ended or traits.costs):
-        return epoch
-    if ended and (traits.complete or not traits.costs):
-        return _with(epoch, team, joined(result.assignments), _best_verdict(team))
-    found = best_of(compiled, result)
-    epoch = replace(epoch, bound=bound_of(result.findings))
+    answer = Answer(result.verdict, result.metrics, result.witness, tree=tree_of(result.findings), ended=ended)
+    if result.lost or result.verdict is Verdict.NO_SOLUTION or not (ended or phase.traits.costs):
+        return answer
+    bound = None if is_proven(phase, result) else _bound_of(phase, result)
+    found = search.check()
     if found is None:
-        return replace(epoch, verdict=Verdict.UNKNOWN)
-    return _with(epoch, team, found.assignment, Verdict.SOLUTION if team.kind is Kind.DISCSP else result.verdict)
-
-
-def evaluate_withdrawal(
-    outcome: Outcome, team: Team, result: RunResult, compiled: CompiledTeam, aside: float | None
-) -> Outcome:
-    """`outcome`, with the robots that step aside as `result` has it: so that nobody could be added, or the fewest.
-
-    `aside` is what it cost that a robot of weight 1 does so; None where nothing was minimised. Robots that were lost
-    before are withdrawn as well. Raises `RefutedError`.
-    """
-    outcome = replace(outcome, verdict=Verdict.UNKNOWN, verified=False, confirmed=False, tree=tree_of(result.findings))
-    ended = result.verdict is Verdict.SOLUTION
-    assignment: Mapping[str, int] | None = joined(result.assignments) if ended else None
-    if aside is not None and not ended:
-        least = bound_of(result.findings)
-        outcome = replace(outcome, bound=None if least is None else least // aside)
-        found = best_of(compiled, result, aside)
-        assignment = found.assignment if found else None
-    if assignment is None:
-        return outcome
-    out = absent(team, assignment)
-    check(team, assignment, out, maximal=ended)
-    if ended:
-        proven = aside is not None and (out or team.kind is Kind.DISWCSP)
-        outcome = replace(outcome, verdict=Verdict.OPTIMAL if proven else Verdict.SOLUTION)
-    paid = cost(team, assignment)
+        return replace(answer, verdict=Verdict.UNKNOWN, bound=bound)
     return replace(
-        outcome, assignment=_in_order(team, assignment), withdrawn=(*outcome.withdrawn, *out), cost=paid, verified=True
+        answer,
+        verdict=_verdict_of(phase, result, kind, found),
+        assignment=found.assignment,
+        cost=found.cost,
+        withdrawn=found.withdrawn,
+        bound=bound,
+        verified=found.verified,
+        checked=found.check_counts,
+        reason=found.reason,
     )
 
 
-def check(team: Team, assignment: Mapping[str, int], withdrawn: Sequence[str] = (), *, maximal: bool = True) -> None:
-    """Hold the claim against every constraint of every file: also that nobody could be added (`maximal`).
+def is_proven(phase: Phase, result: RunResult) -> bool:
+    """Return whether the protocol claims more than to have found something: a solution, or one of minimum cost."""
+    return result.verdict is Verdict.SOLUTION and (phase.traits.complete or not phase.traits.costs)
 
-    Raises `RefutedError`.
+
+def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: CompiledTeam) -> CheckedAssignment | None:
+    """Return what a search has found, checked against every constraint of every file.
+
+    Args:
+        phase: the phase of the search.
+        result: its result.
+        team: the team as its files have it.
+        compiled: the same team, as the robots worked on it: in the order of the run, with compiled domains.
+
+    Returns:
+        The assignment that the protocol claims, or the best one known; None if all of these break hard constraints.
+
+    Raises:
+        RefutedError: when the assignment breaks a constraint, or a robot withdrew that need not.
     """
-    faults = [*objections(team, assignment, withdrawn)]
+    proven = is_proven(phase, result)
+    if proven:
+        assignment = joined(result.assignments)
+    else:
+        best = best_of(compiled, result, phase.parameters.withdrawal_cost)
+        if best is None:
+            return None
+        assignment = best.assignment
+    withdrawn = absent(team, assignment) if phase.withdrawal else ()
+    check(team, assignment, withdrawn, maximal=proven)
+    in_order = {name: assignment[name] for name in team.variables if name in assignment}
+    return CheckedAssignment(in_order, assignment_cost(team, assignment), withdrawn)
+
+
+def check(team: Team, assignment: Mapping[str, int], withdrawn: Sequence[str] = (), *, maximal: bool = True) -> None:
+    """Check an assignment against every constraint of every file.
+
+    Args:
+        team: the team as its files have it.
+        assignment: the values of all robots that have not withdrawn.
+        withdrawn: the robots that have.
+        maximal: whether it is claimed that none of those could be added.
+
+    Raises:
+        RefutedError: when something is wrong.
+    """
+    faults = [*violations(team, assignment, withdrawn)]
     if maximal:
-        faults += [f"{name} has stepped aside and could be added" for name in could_join(team, assignment, withdrawn)]
+        faults += [
+            f"{name} has stepped aside and could be added" for name in needlessly_withdrawn(team, assignment, withdrawn)
+        ]
     if faults:
         raise RefutedError(f"the checker refutes the answer for {team.name}: {faults[0]} ({len(faults)} objections)")
 
 
-def _best_verdict(team: Team) -> Verdict:
-    """What the answer of a complete protocol is."""
-    return Verdict.OPTIMAL if team.kind is Kind.DISWCSP else Verdict.SOLUTION
+def _verdict_of(phase: Phase, result: RunResult, kind: ProblemKind, found: CheckedAssignment) -> Verdict:
+    """Return the verdict on what was found."""
+    if is_proven(phase, result):
+        minimum = phase.traits.costs and phase.traits.complete and (found.withdrawn or kind is ProblemKind.DISWCSP)
+        return Verdict.OPTIMAL if minimum else Verdict.SOLUTION
+    if not found.verified:
+        return Verdict.UNKNOWN
+    if kind is ProblemKind.DISCSP and not phase.withdrawal:
+        return Verdict.SOLUTION
+    return result.verdict
 
 
-def _in_order(team: Team, assignment: Mapping[str, int]) -> dict[str, int]:
-    """`assignment` in the order of the files, whatever order the robots worked in."""
-    return {name: assignment[name] for name in team.variables if name in assignment}
-
-
-def _with(epoch: Epoch, team: Team, assignment: dict[str, int], verdict: Verdict) -> Epoch:
-    check(team, assignment)
-    assignment = _in_order(team, assignment)
-    return replace(epoch, verdict=verdict, assignment=assignment, cost=cost(team, assignment), verified=True)
+def _bound_of(phase: Phase, result: RunResult) -> float | None:
+    """Return the lower bound of the cost; where robots may withdraw, of the weight of those that do."""
+    bound = bound_of(result.findings)
+    withdrawal_cost = phase.parameters.withdrawal_cost
+    return bound if bound is None or withdrawal_cost is None else bound // withdrawal_cost

@@ -1,10 +1,10 @@
-"""Epoch by epoch: what a team goes through while its problem changes (the paper's dynamic DisCSP, Section 3.1).
+"""A problem that changes over time, epoch by epoch (the paper's dynamic DisCSP, Section 3.1).
 
-An epoch ends when its problem is solved, when the scenario's next event comes, or when robots are lost. What changes
-the problem opens the next one. A protocol that can (`DynamicProtocol`) goes on with what still stands; any other
+An epoch ends when its problem is solved, when the scenario's next event comes, or when robots are lost. The next epoch
+begins with the changed problem. A protocol that can (`DynamicProtocol`) goes on with what still holds; any other
 begins anew, so that the two can be compared.
 
-What is to come may be known from the beginning, as a scenario, or be told epoch by epoch, by a `Environment`.
+The changes are known from the beginning, as a scenario, or come epoch by epoch, from an `Environment`.
 """
 
 from __future__ import annotations
@@ -13,97 +13,71 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple
 
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.formats import InvalidInputError, read_robot
-from robochoc.journal.events import Began, Observer
-from robochoc.journal.given import TeamWriter
 from robochoc.model.change import (
     ChangeError,
-    changed,
-    changed_by,
-    concerns,
+    affected_robots,
+    apply_changes,
+    apply_possible_changes,
     describe_change,
-    possible,
-    rejoined,
-    without,
+    rejoin,
+    team_after_events,
+    without_robots,
 )
-from robochoc.model.orders import reordered
-from robochoc.model.outcome import Epoch as Answered
-from robochoc.model.outcome import Verdict
-from robochoc.model.problem import AddAgent, Change, Event, Robot, Team
-from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
+from robochoc.model.orders import with_priorities
+from robochoc.model.outcome import EpochOutcome, Verdict
+from robochoc.model.problem import AddAgent, Change, Robot, ScenarioEvent, Team
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import Invalidated, invalidated_by
 
 Compile = Callable[[Team], CompiledTeam]
 
-Environment = Callable[[Team, Answered, float | None], Event | None]
-"""Where decisions go and changes come from, while the team waits: the robots' surroundings.
+Environment = Callable[[Team, EpochOutcome, float | None], ScenarioEvent | None]
+"""The robots' surroundings: a function that gets each epoch's answer, and returns the next change of the problem.
 
-It is given each epoch's team and how that epoch ended, once the answer was held against every constraint, and how many
-seconds there are left (None: no limit; 0: nothing that comes is heeded any more). It says what happens next, or None:
-nothing. An event of its own comes after those of the files; changes in it that cannot be are passed over.
+Args:
+    Team: the epoch's team.
+    EpochOutcome: how the epoch ended, once the answer was checked against every constraint.
+    float | None: how many seconds are left (None: no limit; 0: what it returns is ignored).
+
+Returns:
+    The next event, or None: nothing more happens. It comes after the events of the files; changes in it that are not
+    possible then are left out.
 """
 
 
-class Played(NamedTuple):
-    """An epoch that is over: its team, as the files have it, how it ended, what had opened it.
-
-    `compiled` is that team as the robots have worked on it.
-    """
-
-    team: Team
-    result: RunResult
-    opened_by: str
-    compiled: CompiledTeam
-
-
-class Opening(NamedTuple):
-    """A run that begins, or an epoch: its number, what has opened it, and what the robots are to solve."""
+class EpochStart(NamedTuple):
+    """An epoch that begins: its number, and what has opened it in a few words."""
 
     epoch: Epoch
     number: int = 0
-    by: str = ""
-
-    @classmethod
-    def of(cls, team: CompiledTeam, brief: RunParameters) -> Self:
-        """Return a run of `team` as it is."""
-        return cls(Epoch(team, brief=brief))
+    opened_by: str = ""
 
 
-class Announcer:
-    """Tells `observer`, if there is one, of what begins, and what the robots are given for it."""
+class FinishedEpoch(NamedTuple):
+    """An epoch whose search is over.
 
-    def __init__(self, observer: Observer | None) -> None:
-        self._observer = observer
-        self._writer = TeamWriter()
+    `team` is its team as the files have it, `epoch` the same as the robots worked on it, with compiled domains.
+    """
 
-    def __call__(self, protocol: type[Protocol], opening: Opening, session: Session | None = None) -> None:
-        """A run of `protocol` begins; or an epoch in `session`, which has been open before (None: it comes after)."""
-        if self._observer is None:
-            return
-        epoch, number, by = opening
-        detail: dict[str, Any] = {"epoch": number, "opened_by": by} if number else {}
-        if protocol.traits.costs:
-            detail["minimises"] = True
-        self._observer(Began(t=0, protocol=protocol.__name__, **detail))
-        fresh = epoch.team.order if session and session.anew else epoch.restarted
-        lossless = session is None or session.lossless
-        self._observer(self._writer.given(epoch.team, epoch.brief, epoch.void, fresh=fresh, quiet=lossless))
+    team: Team
+    epoch: Epoch
+    opened_by: str
+    result: RunResult
 
 
 class ScenarioRun:
-    """A team on its way through its scenario, and through losses.
+    """A team that goes through its scenario, and through losses.
 
-    `order` is the priority order asked for (None: the files'). `compile_` compiles a team.
-    `left_s` says how many seconds there are left, `messages` how many may be sent in all (None: no limit). Of the
-    robots that are lost, `spares` come back: their files are read again, what has happened meanwhile happens to
-    them too, and they join at the end of the order. `brief` is what robots are told beside the problem.
-    `withdrawn` names those that are out, `regrets` says why somebody could not come back.
+    Attributes:
+        team: the team as it is now, in the order of its files.
+        withdrawn: the robots that were lost, and have not come back.
+        failed_returns: why lost robots could not come back, a sentence each.
     """
 
     def __init__(
@@ -115,11 +89,23 @@ class ScenarioRun:
         *,
         messages: int | None = None,
         spares: int = 0,
-        brief: RunParameters = NO_BRIEF,
+        parameters: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
-        self.team = self._full = changed_by(team, events=0)
+        """Begin with `team` as it is before the first event.
+
+        Args:
+            team: the team with its scenario.
+            order: the priority order asked for (None: the files').
+            compile_: compiles the domains of a team.
+            left_s: returns how many seconds are left (None: no limit).
+            messages: how many messages may be sent in all epochs together (None: no limit).
+            spares: how many lost robots come back. Their files are read again, the events that have happened meanwhile
+                happen to them too, and they join at the end of the order.
+            parameters: what all robots are given beside the problem.
+        """
+        self.team = self._full = team_after_events(team, events=0)
         self.withdrawn: list[str] = []
-        self.regrets: list[str] = []
+        self.failed_returns: list[str] = []
         self._files = team
         self._happened = 0
         self._order = order
@@ -127,44 +113,46 @@ class ScenarioRun:
         self._left_s = left_s
         self._messages = messages
         self._spares = spares
-        self._brief = brief
-        self._lossy = False
-        self._loose = False
+        self._parameters = parameters
+        self._after_losses = False
+        self._has_added_events = False
 
-    def arranged(self) -> Team:
-        """The team as the robots see it: in the order of the run. Raises `OrderError`."""
-        return self.team if self._order is None else reordered(self.team, self._order)
+    def ordered_team(self) -> Team:
+        """Return the team as the robots see it: in the order of the run. Raises `OrderError`."""
+        return self.team if self._order is None else with_priorities(self.team, self._order)
 
     def compiled(self) -> CompiledTeam:
         """Return the team as the robots see it, compiled. Raises `OrderError`, and what compiling raises."""
-        return self._compile(self.arranged())
+        return self._compile(self.ordered_team())
 
-    def go(self, session: Session, announce: Callable[[Opening], None]) -> Iterator[Played]:
-        """One epoch after the other; the last is the one whose verdict counts. A time limit may end it earlier.
+    def epochs(self, session: Session, on_start: Callable[[EpochStart], None]) -> Iterator[FinishedEpoch]:
+        """Yield one epoch after the other. The verdict of the last one counts. A limit may end the run earlier.
 
-        `session` was opened with the `compiled` team. Before each epoch, `announce` is told of it.
+        Args:
+            session: a session that was opened with the `compiled` team.
+            on_start: is called before each epoch.
         """
         opened = "the start"
-        epoch = Epoch(session.compiled, brief=self._brief)
+        epoch = Epoch(session.compiled, brief=self._parameters)
         for number in count():
-            announce(Opening(epoch, number, opened))
+            on_start(EpochStart(epoch, number, opened))
             result = self._search(session)
-            yield Played(self.team, result, opened, epoch.compiled)
+            yield FinishedEpoch(self.team, epoch, opened, result)
             if result.lost:
-                fresh = self._back_after(result.lost)
-                opened = _loss(result.lost, fresh)
+                joining = self._lose(result.lost)
+                opened = _describe_loss(result.lost, joining)
             elif self._next is None or (result.verdict is Verdict.UNKNOWN and self.is_over):
                 return
             else:
-                opened = self._described(self._next)
-                fresh = self._added_by(self._next)
-            self._take_stock(fresh)
+                opened = self._describe(self._next)
+                joining = self._apply(self._next)
+            self._update_team(joining)
             if result.lost and not self.team.robots and self._next is None:
                 return
-            epoch = self._go_over(session, fresh)
+            epoch = self._change(session, joining)
 
     def _search(self, session: Session) -> RunResult:
-        if not self.team.robots:  # all have left, and others may come: nobody is against it
+        if not self.team.robots:  # all have left, and others may come: no constraint is broken
             return RunResult.of(Verdict.SOLUTION, None, {}, (), 0)
         if self.is_over:
             return RunResult.of(Verdict.UNKNOWN, None, {}, (), 0)
@@ -176,8 +164,8 @@ class ScenarioRun:
         return result
 
     @property
-    def _next(self) -> Event | None:
-        """The event that comes next."""
+    def _next(self) -> ScenarioEvent | None:
+        """The event that comes next; None where no more is known."""
         return self._files.scenario[self._happened] if self._happened < len(self._files.scenario) else None
 
     @property
@@ -185,38 +173,38 @@ class ScenarioRun:
         """Whether the time is over, or all messages have been sent."""
         return self._left_s() == 0 or (self._messages is not None and self._messages <= 0)
 
-    def expect(self, event: Event) -> None:
-        """`event` will happen, too, after all that is known to come. What of it cannot be is left out then."""
+    def add_event(self, event: ScenarioEvent) -> None:
+        """Add `event` to the end of the scenario. Changes in it that are not possible then are left out."""
         self._files = replace(self._files, scenario=(*self._files.scenario, event))
-        self._loose = True
+        self._has_added_events = True
 
-    def leave(self, lost: Collection[str]) -> None:
-        """The robots `lost` are out for good."""
+    def remove(self, lost: Collection[str]) -> None:
+        """Remove the robots `lost` for good."""
         self.withdrawn += lost
-        self._take_stock(())
+        self._update_team(())
 
-    def _described(self, event: Event) -> str:
-        """What of `event` can still happen, in a few words."""
+    def _describe(self, event: ScenarioEvent) -> str:
+        """Return in a few words what of `event` can still happen."""
         out = set(self.withdrawn)
-        changes = possible(self._full, event.changes)[1] if self._loose else event.changes
-        words = [describe_change(change) for change in changes if out.isdisjoint(concerns(self._full, change))]
+        changes = apply_possible_changes(self._full, event.changes)[1] if self._has_added_events else event.changes
+        words = [describe_change(change) for change in changes if out.isdisjoint(affected_robots(self._full, change))]
         return ", ".join(words) or "nothing"
 
-    def _added_by(self, event: Event) -> Collection[str]:
-        """Let `event` happen; returns who comes. After losses, what cannot be any more is left out."""
+    def _apply(self, event: ScenarioEvent) -> Collection[str]:
+        """Let `event` happen, and return the robots that join. After losses, impossible changes are left out."""
         self._happened += 1
         changes: Sequence[Change] = event.changes
-        if self._lossy:
-            self._full = changed_by(self._files, self._happened)
-        elif self._loose:
-            self._full, changes = possible(self._full, changes)
+        if self._after_losses:
+            self._full = team_after_events(self._files, self._happened)
+        elif self._has_added_events:
+            self._full, changes = apply_possible_changes(self._full, changes)
         else:
-            self._full = changed(self._full, changes)
+            self._full = apply_changes(self._full, changes)
         return [change.robot.name for change in changes if isinstance(change, AddAgent)]
 
-    def _back_after(self, lost: Mapping[str, str]) -> Collection[str]:
-        """Those of `lost` that come back; the others are out."""
-        self._lossy = True
+    def _lose(self, lost: Mapping[str, str]) -> Collection[str]:
+        """Return those of `lost` that come back; the others are withdrawn."""
+        self._after_losses = True
         back: list[str] = []
         for name in lost:
             if self._spares:
@@ -225,40 +213,41 @@ class ScenarioRun:
                     self._read_again(name)
                     back.append(name)
                 except (InvalidInputError, ChangeError, OSError) as why:
-                    self.regrets.append(f"{name} could not come back: {why}")
+                    self.failed_returns.append(f"{name} could not come back: {why}")
         self.withdrawn += [name for name in lost if name not in back]
         if back:
-            self._full = changed_by(self._files, self._happened)
+            self._full = team_after_events(self._files, self._happened)
             self._order = self._order or self.team.order
         return back
 
-    def _take_stock(self, fresh: Collection[str]) -> None:
-        """Who is there now, and in which order: whoever is in `fresh` comes last."""
-        self.withdrawn = [name for name in self.withdrawn if name in self._full and name not in fresh]
-        self.team = without(self._full, self.withdrawn)
+    def _update_team(self, joining: Collection[str]) -> None:
+        """Update the team and its order: the robots that are `joining` come last."""
+        self.withdrawn = [name for name in self.withdrawn if name in self._full and name not in joining]
+        self.team = without_robots(self._full, self.withdrawn)
         if self._order is not None:
-            stay = [name for name in self._order if name in self.team and name not in fresh]
+            stay = [name for name in self._order if name in self.team and name not in joining]
             self._order = (*stay, *(name for name in self.team.order if name not in stay))
 
-    def _go_over(self, session: Session, fresh: Collection[str]) -> Epoch:
-        """Have `session` work on the team as it is now."""
-        now = session.workable(self.arranged())
+    def _change(self, session: Session, joining: Collection[str]) -> Epoch:
+        """Let `session` work on the team as it is now; returns the epoch that begins."""
+        now = session.workable(self.ordered_team())
         keys, agents = invalidated_by(session.compiled.team, now)
-        stale = Invalidated(keys, agents | set(fresh))
-        epoch = Epoch(self._compile(now), stale, frozenset(fresh), self._brief)
+        stale = Invalidated(keys, agents | set(joining))
+        epoch = Epoch(self._compile(now), stale, frozenset(joining), self._parameters)
         session.change(epoch)
         return epoch
 
     def _read_again(self, name: str) -> None:
-        """Take what the file of `name` says now for what it said from the beginning."""
+        """Replace the robot `name` by what its file says now, as if it had said so from the beginning."""
         robot = read_robot(Path(self.team[name].file))
         if name in self._files:
-            self._files = rejoined(self._files, robot)
+            self._files = rejoin(self._files, robot)
         else:
-            self._files = replace(self._files, scenario=tuple(_with_newcomer(e, robot) for e in self._files.scenario))
+            self._files = replace(self._files, scenario=tuple(_with_joining(e, robot) for e in self._files.scenario))
 
 
-def _loss(lost: Iterable[str], back: Collection[str]) -> str:
+def _describe_loss(lost: Iterable[str], back: Collection[str]) -> str:
+    """Return in a few words which robots were lost, and which of them came `back`."""
     out = [name for name in lost if name not in back]
     words = [f"the loss of {', '.join(out)}"] if out else []
     if back:
@@ -266,7 +255,7 @@ def _loss(lost: Iterable[str], back: Collection[str]) -> str:
     return "; ".join(words)
 
 
-def _with_newcomer(event: Event, robot: Robot) -> Event:
-    """`event`, in which whoever comes under the name of `robot` is that robot."""
+def _with_joining(event: ScenarioEvent, robot: Robot) -> ScenarioEvent:
+    """Return `event`; where a robot of that name joins, it is `robot`."""
     changes = (AddAgent(robot) if isinstance(c, AddAgent) and c.robot.name == robot.name else c for c in event.changes)
     return replace(event, changes=tuple(changes))

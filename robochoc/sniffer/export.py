@@ -13,7 +13,7 @@ import msgspec
 
 from robochoc.sniffer.acl import text
 from robochoc.sniffer.columns import NOT_YET
-from robochoc.sniffer.feed import Feed
+from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.trace import Trace
 from robochoc.view.label import printable
 
@@ -33,16 +33,16 @@ class TooMuchToDrawError(ValueError):
     """More messages than a diagram can have."""
 
 
-def acl_texts(feed: Feed, messages: Sequence[int]) -> Iterator[bytes]:
+def acl_texts(data: PageData, messages: Sequence[int]) -> Iterator[bytes]:
     """The messages in FIPA ACL as text (FIPA00070), one after the other, each on a line of its own."""
     for message in messages:
-        yield f"{text(feed.speech.acl_of(message))}\n".encode()
+        yield f"{text(data.acl_messages.acl_of(message))}\n".encode()
 
 
-def table(feed: Feed, messages: Sequence[int]) -> Iterator[bytes]:
+def table(data: PageData, messages: Sequence[int]) -> Iterator[bytes]:
     """The messages as CSV, a row each, after the headings."""
     yield _row(HEADINGS)
-    trace, of, steps = feed.trace, feed.trace.messages, feed.trace.steps
+    trace, of, steps = data.trace, data.trace.messages, data.trace.steps
     for message in messages:
         taken = of.taken[message]
         seen = taken != NOT_YET
@@ -57,13 +57,13 @@ def table(feed: Feed, messages: Sequence[int]) -> Iterator[bytes]:
                 trace.robots[of.sender[message]],
                 trace.robots[of.receiver[message]],
                 trace.kinds[of.kind[message]],
-                feed.protocols.act_of(message).performative,
+                data.protocols.act_of(message).performative,
                 of.bytes[message],
                 int(of.clock[message]),
                 int(steps.clock[taken]) if seen else "",
                 " ".join(map(str, trace.causes(message))),
-                feed.words(message),
-                _encode(feed.speech.plain(message)).decode(),
+                data.words(message),
+                _encode(data.acl_messages.plain(message)).decode(),
             )
         )
 
@@ -74,14 +74,14 @@ def _row(cells: Sequence[object]) -> bytes:
     return line.getvalue().encode()
 
 
-def mermaid(feed: Feed, messages: Sequence[int]) -> bytes:
+def mermaid(data: PageData, messages: Sequence[int]) -> bytes:
     """The messages as a sequence diagram of mermaid, with notes where robots decide; Markdown pages can hold it.
 
     Raises `TooMuchToDrawError`.
     """
     if len(messages) > MOST_ARROWS:
         raise TooMuchToDrawError(f"{len(messages):,} messages are too many for a diagram: at most {MOST_ARROWS}")
-    trace, of = feed.trace, feed.trace.messages
+    trace, of = data.trace, data.trace.messages
     robots = sorted({*(of.sender[one] for one in messages), *(of.receiver[one] for one in messages)})
     lines = ["sequenceDiagram"]
     lines += [f"    participant R{robot} as {_label(trace.robots[robot])}" for robot in robots]
@@ -103,12 +103,12 @@ def mermaid(feed: Feed, messages: Sequence[int]) -> bytes:
     return diagram.encode()
 
 
-def drawable(feed: Feed, messages: Sequence[int]) -> Sequence[int]:
+def drawable(data: PageData, messages: Sequence[int]) -> Sequence[int]:
     """So many of the first of `messages` that a diagram can hold them."""
     part = messages[:MOST_ARROWS]
     while part:
         try:
-            mermaid(feed, part)
+            mermaid(data, part)
         except TooMuchToDrawError:
             part = part[: len(part) // 2]
         else:

@@ -27,7 +27,7 @@ _TITLE = "<title>Sniffer</title>"
 def page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title: str = "Sniffer") -> bytes:
     """The page, UTF-8. The same answers make the same page.
 
-    `embedded` are the feed's answers by name (`columns`, `details:0`), zlib-compressed: their names are ours, what
+    `embedded` are the page's data by name (`columns`, `details:0`), zlib-compressed: their names are ours, what
     they hold is strangers'. `title` is plain text, of anybody's. Meshcat's viewer, a megabyte, is left out of an
     embedded page without a `scene`.
     """
@@ -52,7 +52,7 @@ def _script(script: str) -> str:
 
 
 def _block(name: str, content: bytes) -> str:
-    """An answer of the feed as a script that no browser runs."""
+    """An answer of `PageData` as a script that no browser runs."""
     text = base64.b64encode(content).decode()
     return f'<script id="feed:{escape(name)}" type="application/octet-stream">{text}</script>'
 

@@ -1,4 +1,4 @@
-"""The sniffer's server: the page, and the feed that it draws, for this machine alone.
+"""The sniffer's server: the page, and the data that it draws, for this machine alone.
 
 The page lives under a path that cannot be guessed, as others may use this machine too. What a browser is told unasked
 is small and replaced by what is newer before it is sent: a slow or stopped one makes nothing wait, and nothing grow.
@@ -18,8 +18,8 @@ import msgspec
 from tornado.web import Application
 from tornado.websocket import WebSocketClosedError
 
-from robochoc.sniffer.feed import BadRequestError
 from robochoc.sniffer.page import page
+from robochoc.sniffer.page_data import BadRequestError
 from robochoc.sniffer.session import NotBegunError, Session
 from robochoc.view.address import loopback_socket, secret_path, url_of
 from robochoc.view.loopback import SecretHandler, SecretPage, SecretSocket, application, in_browser, served
@@ -71,7 +71,7 @@ class Server:
         self._listener = listener
         self._seen = seen
         self._reader = ThreadPoolExecutor(1, "reader")
-        self._insight = ThreadPoolExecutor(1, "insight")
+        self._states_thread = ThreadPoolExecutor(1, "states")
         self._wanted = asyncio.Event()
         self._changed = asyncio.Event()
         self.version = 0
@@ -88,7 +88,7 @@ class Server:
             following.cancel()
             self.session.stop()
             self._reader.shutdown(wait=False, cancel_futures=True)
-            self._insight.shutdown(wait=False, cancel_futures=True)
+            self._states_thread.shutdown(wait=False, cancel_futures=True)
 
     # What handlers ask
 
@@ -107,7 +107,7 @@ class Server:
 
     async def look_into(self, answer: Callable[[], R]) -> R:
         """What `answer` says, in the thread that takes its time."""
-        return await asyncio.get_running_loop().run_in_executor(self._insight, answer)
+        return await asyncio.get_running_loop().run_in_executor(self._states_thread, answer)
 
     async def change(self, since: int) -> None:
         """Wait until there is something newer than version `since`."""
@@ -167,7 +167,7 @@ class _Known(SecretHandler):
 
 
 class _Answer(_Known):
-    """One answer of the feed."""
+    """One answer to the page."""
 
     async def get(self, _token: str, what: str) -> None:
         try:

@@ -13,14 +13,14 @@ import msgspec
 
 from robochoc.model.problem import Robot
 from robochoc.sniffer.cache import Cache
-from robochoc.sniffer.feed import DETAILS, BadRequestError, Feed
-from robochoc.sniffer.following import Following
+from robochoc.sniffer.growing_file import GrowingFile, open_to_read
+from robochoc.sniffer.live_trace import LiveTrace
+from robochoc.sniffer.page_data import DETAILS, BadRequestError, PageData
 from robochoc.sniffer.trace import Trace
-from robochoc.sniffer.window import Window, opened
 
 if TYPE_CHECKING:
-    from robochoc.sniffer.insight import Insight
-    from robochoc.sniffer.moves import Stage
+    from robochoc.sniffer.robot_states import RobotStates
+    from robochoc.sniffer.scene import TraceScene
 
 _KEPT_BYTES = 1 << 26
 
@@ -44,27 +44,27 @@ class Session:
         self._written = False
         self._chosen = chosen
         self._robots = robots
-        self._descriptor = source if isinstance(source, int) else opened(source)
-        self._window = Window(self._descriptor)
-        self._following = Following(self._window, self._age_s)
-        self._insight: Insight | None = None
+        self._descriptor = source if isinstance(source, int) else open_to_read(source)
+        self._file = GrowingFile(self._descriptor)
+        self._live_trace = LiveTrace(self._file, self._age_s)
+        self._robot_states: RobotStates | None = None
         self._details = Cache(_KEPT_BYTES)
-        self._feed: Feed | None = None
-        self._stage: Stage | None = None
-        self._staged_with = (-1, False, 0)
+        self._page_data: PageData | None = None
+        self._scene: TraceScene | None = None
+        self._scene_made_with = (-1, False, 0)
 
     @property
     def begun(self) -> bool:
         """Whether there is something to be shown."""
-        return self._following.presentable
+        return self._live_trace.presentable
 
     def advance(self) -> bool:
         """Read on a bit; False when there was nothing. Raises `JournalError`, `TraceTooLargeError`, `OSError`."""
-        return self._following.advance() or self._replaced()
+        return self._live_trace.advance() or self._replaced()
 
     def begin(self) -> None:
         """Read until the header is known, if it is there. Raises as `advance` does."""
-        while self._following.trace is None and self._following.advance():
+        while self._live_trace.trace is None and self._live_trace.advance():
             pass
 
     def _replaced(self) -> bool:
@@ -74,14 +74,14 @@ class Session:
         try:
             if os.path.samestat(self._path.stat(), os.fstat(self._descriptor)):
                 return False
-            descriptor = opened(self._path)
-            window = Window(descriptor)
+            descriptor = open_to_read(self._path)
+            file = GrowingFile(descriptor)
         except OSError:  # it has been taken away: what was read is still there
             return False
-        self._insight = None
+        self._robot_states = None
         os.close(self._descriptor)
-        self._descriptor, self._window = descriptor, window
-        self._following.restart(window)
+        self._descriptor, self._file = descriptor, file
+        self._live_trace.restart(file)
         return True
 
     def close(self) -> None:
@@ -94,8 +94,8 @@ class Session:
 
     def stop(self) -> None:
         """Whatever takes long is to end soon."""
-        if self._insight:
-            self._insight.stopped = True
+        if self._robot_states:
+            self._robot_states.stopped = True
 
     def _age_s(self) -> float:
         """Since when nobody has written to the file; 0 where somebody is known to."""
@@ -103,18 +103,18 @@ class Session:
             return math.inf
         return 0.0 if self._live else time.time() - os.fstat(self._descriptor).st_mtime
 
-    # The feed
+    # The page's data
 
     @property
-    def _answers(self) -> Feed:
+    def _answers(self) -> PageData:
         trace = self._trace
-        if self._feed is None or self._feed.trace is not trace:
-            self._feed = Feed(trace, live=self._live, chosen=self._chosen)
-        return self._feed
+        if self._page_data is None or self._page_data.trace is not trace:
+            self._page_data = PageData(trace, live=self._live, chosen=self._chosen)
+        return self._page_data
 
     @property
     def _trace(self) -> Trace:
-        trace = self._following.trace
+        trace = self._live_trace.trace
         if trace is None:
             raise NotBegunError("the journal has not begun")
         return trace
@@ -124,8 +124,8 @@ class Session:
         return self._answers.about()
 
     def news(self) -> dict[str, Any]:
-        """How far it is: the feed's news, and how much of the file has been read, 0 to 1."""
-        return {**self._answers.news(), "loaded": round(self._following.loaded, 3)}
+        """How far it is: the page's news, and how much of the file has been read, 0 to 1."""
+        return {**self._answers.news(), "loaded": round(self._live_trace.loaded, 3)}
 
     def rows(self, what: str, first: int, end: int) -> bytes:
         """Messages (`columns`), `steps` or `decisions`. Raises `BadRequestError`."""
@@ -157,10 +157,10 @@ class Session:
 
     def states(self, robot: str, chunk: int) -> bytes:
         """What a robot knew after its steps of a chunk; JSON. Takes its time. Raises `BadRequestError`."""
-        from robochoc.sniffer.insight import Insight  # noqa: PLC0415 - the page comes first
+        from robochoc.sniffer.robot_states import RobotStates  # noqa: PLC0415 - the page comes first
 
-        self._insight = self._insight or Insight()
-        return self._insight.chunk(self._window, robot, chunk, final=self._following.settled)
+        self._robot_states = self._robot_states or RobotStates()
+        return self._robot_states.chunk(self._file, robot, chunk, final=self._live_trace.settled)
 
     # The scene
 
@@ -169,28 +169,28 @@ class Session:
 
         `null`: there is nothing to see, nor will there be.
         """
-        from robochoc.sniffer.moves import Stage, robots_given  # noqa: PLC0415 - as above
+        from robochoc.sniffer.scene import TraceScene, robots_given  # noqa: PLC0415 - as above
 
         trace = self._trace
         files = trace.runs[-1].files if trace.runs else {}
-        staged_with = (trace.generation, trace.over, len(files))
-        if self._stage is None or (staged_with != self._staged_with and not first) or not self._stage:
-            self._stage = Stage(trace, {**robots_given(trace), **self._robots})
-            self._staged_with = staged_with
-        nothing = not self._stage and trace.over
-        return msgspec.json.encode(None if nothing else self._stage.answer(first))
+        made_with = (trace.generation, trace.over, len(files))
+        if self._scene is None or (made_with != self._scene_made_with and not first) or not self._scene:
+            self._scene = TraceScene(trace, {**robots_given(trace), **self._robots})
+            self._scene_made_with = made_with
+        nothing = not self._scene and trace.over
+        return msgspec.json.encode(None if nothing else self._scene.answer(first))
 
     # The file
 
     @property
     def size(self) -> int:
         """How long the file is by now."""
-        return self._window.size
+        return self._file.size
 
     @property
     def file_name(self) -> str:
         """What a copy of it may be called."""
-        trace = self._following.trace
+        trace = self._live_trace.trace
         name = self._path.name if self._path else f"{trace.header.team if trace else 'run'}.journal"
         return "".join(sign if sign.isascii() and (sign.isalnum() or sign in "._-") else "_" for sign in name)[:100]
 

@@ -33,8 +33,8 @@ from robochoc.journal.journal import Header, Journal
 from robochoc.model.outcome import Outcome
 from robochoc.sniffer.columns import NOT_YET, floats, longs, shorts
 from robochoc.sniffer.contents import Contents
-from robochoc.sniffer.open_step import Channel, OpenStep
-from robochoc.sniffer.rows import Messages, Note, Run, Steps, note_of
+from robochoc.sniffer.pending_steps import PendingChannel, PendingStep
+from robochoc.sniffer.trace_tables import Messages, Note, RunRecord, Steps, note_of
 
 MOST_NAMES = 0xFFFF
 """Robots, types of messages, or runs: they are numbered by two bytes."""
@@ -58,7 +58,7 @@ class Trace:
         self.generation = generation
         self.robots: list[str] = []
         self.kinds: list[str] = []
-        self.runs: list[Run] = []
+        self.runs: list[RunRecord] = []
         self.messages = Messages(
             floats(), floats(), longs(), longs(), shorts(), shorts(), shorts(), shorts(), longs(), longs()
         )
@@ -155,9 +155,9 @@ class Trace:
     # Runs
 
     def _begin(self) -> None:
-        self._channels: dict[tuple[str, str], Channel] = {}
-        self._open: dict[str, OpenStep] = {}
-        self._waiting: dict[str, deque[OpenStep]] = {}
+        self._channels: dict[tuple[str, str], PendingChannel] = {}
+        self._open: dict[str, PendingStep] = {}
+        self._waiting: dict[str, deque[PendingStep]] = {}
         self._checks: dict[str, int] = {}
         self._said: dict[str, int] = {}
 
@@ -174,7 +174,7 @@ class Trace:
         if len(self.runs) == MOST_NAMES:
             raise TraceTooLargeError(f"the journal has more than {MOST_NAMES} runs")
         self.runs.append(
-            Run(
+            RunRecord(
                 number=len(self.runs),
                 protocol=began.protocol,
                 epoch=None if began.epoch is UNSET else began.epoch,
@@ -196,21 +196,21 @@ class Trace:
 
     # Steps
 
-    def _open_step(self, robot: str, event: Sent | Received | Decided | Heard | Concluded) -> OpenStep:
+    def _open_step(self, robot: str, event: Sent | Received | Decided | Heard | Concluded) -> PendingStep:
         step = self._open.get(robot)
         if step is None:
             if not self.runs:
                 self._new_run(Began(t=event.t, protocol=self.header.protocol))
-            step = self._open[robot] = OpenStep()
+            step = self._open[robot] = PendingStep()
         step.t = event.t
         if isinstance(event, Sent | Received | Decided):
             step.clock = event.clock
         return step
 
-    def _channel(self, sender: str, receiver: str) -> Channel:
+    def _channel(self, sender: str, receiver: str) -> PendingChannel:
         channel = self._channels.get((sender, receiver))
         if channel is None:
-            channel = self._channels[sender, receiver] = Channel()
+            channel = self._channels[sender, receiver] = PendingChannel()
         return channel
 
     def _add_rare(self, event: AnyEvent) -> None:
@@ -240,12 +240,12 @@ class Trace:
         if step is None:
             if not self.runs:
                 self._new_run(Began(t=event.t, protocol=self.header.protocol))
-            step = OpenStep()
+            step = PendingStep()
         step.t, step.clock, step.checks = event.t, event.clock, event.checks
         self._checks[robot] = event.checks
         self._ready(robot, step)
 
-    def _ready(self, robot: str, step: OpenStep) -> None:
+    def _ready(self, robot: str, step: PendingStep) -> None:
         """The step has ended: write it down, or let it wait for its turn, or for what it took in."""
         self._open.pop(robot, None)
         queue = self._waiting.get(robot)
@@ -271,13 +271,13 @@ class Trace:
             if queue is not None and not queue:
                 del self._waiting[robot]
 
-    def _give_up(self, step: OpenStep) -> None:
+    def _give_up(self, step: PendingStep) -> None:
         """What `step` still waits for counts as unseen."""
         while not step.taken_in():
             step.received.popleft().owed += 1
             self.unseen += 1
 
-    def _write(self, robot: str, step: OpenStep) -> None:
+    def _write(self, robot: str, step: PendingStep) -> None:
         """The step becomes a row, and so does each of its messages."""
         steps, number = self.steps, len(self.steps.t)
         run = len(self.runs) - 1

@@ -25,25 +25,32 @@ from typing import Self
 
 import msgspec
 
-from robochoc.solver.ace_words import (
+from robochoc.solver.ace_messages import (
     BEST,
     LENGTH,
-    Broken,
+    EncodedTable,
     Export,
     Exported,
     FromSolver,
     Solved,
+    SolverFailed,
     Strategy,
-    TableForm,
     Task,
     ToSolver,
     codes_of,
 )
 from robochoc.solver.encoding import Codes, Network
-from robochoc.solver.enumeration import STEPS_BEFORE_ACE, STEPS_EACH, Budget, OutOfStepsError, cheapest, enumerated
+from robochoc.solver.enumeration import (
+    STEPS_BEFORE_ACE,
+    STEPS_EACH,
+    Budget,
+    OutOfStepsError,
+    enumerate_solutions,
+    minimum_solution,
+)
 from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
-from robochoc.solver.propagation import propagated
-from robochoc.solver.question import Answer, Means, Question
+from robochoc.solver.propagation import propagate
+from robochoc.solver.query import Query, SolvedBy, SolverAnswer
 
 CHUNK = 1 << 20
 LAST_WORDS_S = 1.0
@@ -62,13 +69,13 @@ class AceProcess:
         self._java = java
         self._always = always
         self._steps_left = STEPS_BEFORE_ACE
-        self._enumerated: Answer | None = None
+        self._enumerated: SolverAnswer | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._folder: Path | None = None
         self._socket: socket.socket | None = None
         self._lifeline = -1
         self._buffer = bytearray()
-        self._question: Question | None = None
+        self._question: Query | None = None
         self._tasks = 0
         self._searching = False
         self._decoder = msgspec.msgpack.Decoder(FromSolver)
@@ -105,7 +112,7 @@ class AceProcess:
         count_only: bool = False,
         strategy: Strategy = "default",
         deadline: float | None = None,
-    ) -> Answer:
+    ) -> SolverAnswer:
         """All solutions of `network`, up to `limit`; by `deadline` on the monotonic clock.
 
         Raises `SolverMissingError`, `SolverLostError`, `SolverTimeoutError`; after the last two the process is gone,
@@ -130,7 +137,7 @@ class AceProcess:
         or the network was enumerated here.
         """
         limit = 1 if costs else limit
-        self._question = question = Question.of(propagated(network), limit, count_only=count_only, costs=costs)
+        self._question = question = Query.of(propagate(network), limit, count_only=count_only, costs=costs)
         self._enumerated = None if question.trivial or self._always else self._small(question)
         if question.trivial or self._enumerated:
             return False
@@ -140,7 +147,7 @@ class AceProcess:
         self._ask(msgspec.structs.replace(task, costs=list(question.costs)))
         return True
 
-    def answer(self, deadline: float | None = None) -> Answer:
+    def answer(self, deadline: float | None = None) -> SolverAnswer:
         """The answer to the task in hand. Raises as `solve` does.
 
         An answer is complete, or has as many solutions as were asked for: a search that broke off proves nothing.
@@ -149,7 +156,7 @@ class AceProcess:
         if question is None:
             raise ValueError("the solver has no task")
         if question.trivial:
-            return question.answered(1, complete=True, solutions=[()], means=Means.PROPAGATION)
+            return question.answered(1, complete=True, solutions=[()], means=SolvedBy.PROPAGATION)
         if self._enumerated:
             return self._enumerated
         word = self._hear(deadline)
@@ -160,7 +167,7 @@ class AceProcess:
         numbers = array("i")
         numbers.frombytes(word.solutions)
         rows = sorted(question.rows(numbers))  # whoever has found them, solutions are in the same order
-        return question.answered(word.found, complete=word.complete, solutions=rows, means=Means.ACE)
+        return question.answered(word.found, complete=word.complete, solutions=rows, means=SolvedBy.ACE)
 
     def give_up(self) -> SolverTimeoutError:
         """End the process: there is no time left for the task in hand. What it has found so far goes with it."""
@@ -173,7 +180,7 @@ class AceProcess:
             return SolverTimeoutError()
         width = len(question.asked.domains)
         rows = question.rows(codes_of(said, width)[-width:])
-        best = question.answered(1, complete=False, solutions=rows, means=Means.ACE)
+        best = question.answered(1, complete=False, solutions=rows, means=SolvedBy.ACE)
         return SolverTimeoutError(best.solutions[0])
 
     def export(self, network: Network, names: Sequence[str], costs: Codes = ()) -> bytes:
@@ -207,7 +214,7 @@ class AceProcess:
         self._tasks = 0
         self._searching = False
 
-    def _small(self, question: Question) -> Answer | None:
+    def _small(self, question: Query) -> SolverAnswer | None:
         """The answer by enumeration; None when it takes too many steps.
 
         What it takes is at most what it takes to ask ACE, where that runs, and to start it, where it does not.
@@ -215,17 +222,17 @@ class AceProcess:
         budget = Budget(STEPS_EACH + (self._steps_left if self._socket is None else 0))
         try:
             if question.costs:
-                best = cheapest(question.asked, budget, question.costs)
+                best = minimum_solution(question.asked, budget, question.costs)
                 found, complete, solutions = int(best is not None), True, [best] if best else []
             else:
-                found, complete, solutions = enumerated(
+                found, complete, solutions = enumerate_solutions(
                     question.asked, budget, limit=question.limit, count_only=question.count_only
                 )
         except OutOfStepsError:
             return None
         finally:
             self._steps_left -= max(0, budget.used - STEPS_EACH)
-        return question.answered(found, complete=complete, solutions=solutions, means=Means.ENUMERATION)
+        return question.answered(found, complete=complete, solutions=solutions, means=SolvedBy.ENUMERATION)
 
     # The process
 
@@ -291,7 +298,7 @@ class AceProcess:
 
     def _checked(self, word: FromSolver) -> FromSolver:
         self._searching = False
-        if isinstance(word, Broken):
+        if isinstance(word, SolverFailed):
             self.close()
             if word.java_missing:
                 raise SolverMissingError(
@@ -318,7 +325,9 @@ class AceProcess:
 
 def _task(network: Network, limit: int | None, *, count_only: bool, strategy: Strategy) -> Task:
     rows: dict[tuple[Codes, ...], int] = {}
-    forms = [TableForm(table.scope, table.allowed, rows.setdefault(table.rows, len(rows))) for table in network.tables]
+    forms = [
+        EncodedTable(table.scope, table.allowed, rows.setdefault(table.rows, len(rows))) for table in network.tables
+    ]
     return Task(
         domains=[list(domain) for domain in network.domains],
         tables=forms,

@@ -27,16 +27,16 @@ from typing import Any
 
 import msgspec
 
-from robochoc.solver.ace_words import (
+from robochoc.solver.ace_messages import (
     BEST,
     LENGTH,
-    Broken,
+    EncodedTable,
     Export,
     Exported,
     FromSolver,
     Solved,
+    SolverFailed,
     Strategy,
-    TableForm,
     Task,
     ToSolver,
     codes_of,
@@ -83,13 +83,13 @@ def main() -> None:
     try:
         answer = _Ace(folder).answer if warm else _Models().answer
     except _NoJavaError as missing:
-        link.say(Broken(str(missing), java_missing=True))
+        link.say(SolverFailed(str(missing), java_missing=True))
         return
     while (task := link.hear()) is not None:
         try:
             link.say(answer(task))
         except Exception as error:  # noqa: BLE001 - whatever it was, Java's included, the parent has to know
-            link.say(Broken(f"{type(error).__name__}: {error}"))
+            link.say(SolverFailed(f"{type(error).__name__}: {error}"))
     # The parent has gone, which the thread sees too; but a thread ends with the program, half done or not.
     shutil.rmtree(folder, ignore_errors=True)
 
@@ -144,7 +144,7 @@ class _Ace:
         self._system = self._java.JClass("java.lang.System")
         self._heads: dict[tuple[str, ...], tuple[Any, int]] = {}
         # Something small loads the classes that every task needs, while the parent still prepares the first.
-        self.solve(Task([[0, 1], [0, 1]], [TableForm((0, 1), False, 0)], [[[0, 0]]], [], None, False, "static"))
+        self.solve(Task([[0, 1], [0, 1]], [EncodedTable((0, 1), False, 0)], [[[0, 0]]], [], None, False, "static"))
 
     def answer(self, task: ToSolver) -> FromSolver:
         """Do what the parent asks for."""
@@ -275,7 +275,7 @@ class _Models:
             etree.SubElement(total, "list").text = " ".join(names[place] for place in task.costs)
         return bytes(etree.tostring(root, pretty_print=True))
 
-    def _rows(self, task: Task, table: TableForm) -> list[Any]:
+    def _rows(self, task: Task, table: EncodedTable) -> list[Any]:
         rows = task.rows[table.rows]
         return [row[0] for row in rows] if len(table.scope) == 1 else [tuple(row) for row in rows]
 

@@ -1,6 +1,6 @@
-"""A robot's part of the team's problem: its own file, and what all robots know of each other.
+"""The problem that one agent is given: its robot's file, and what all robots know of each other.
 
-This is all that reaches a robot, be it an object in the simulator or a process of its own.
+An agent gets nothing else, neither in the simulator nor in a process of its own.
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-from robochoc.model.problem import Domain, Model, Robot, Team
-from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, as_compiled
+from robochoc.model.problem import ConstraintModel, Domain, Robot, Team
+from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, ensure_compiled
 from robochoc.solver.domain import CompiledDomain
-from robochoc.solver.explanation import Known, held
+from robochoc.solver.explanation import KeyedConstraint, held_above
 
 Interfaces = Mapping[str, tuple[str, ...]]
 """The variables that each robot shows to its neighbours, by the robot's name."""
@@ -22,40 +22,47 @@ Links = Mapping[str, tuple[str, ...]]
 
 
 class RunParameters(NamedTuple):
-    """What all robots of a run are told beside the problem.
+    """The parameters of a run, the same for all robots.
 
-    `seed` is what their chance is drawn from, `settings` are the protocol's, as they were given. `aside` is what it
-    costs that a robot of weight 1 steps aside (None: nobody may); then its constraints, its private ones too, fall
-    away.
+    Attributes:
+        seed: Robots draw their random numbers from it.
+        settings: The protocol's settings, as the user wrote them.
+        withdrawal_cost: The cost of withdrawing a robot of weight 1. The constraints of a withdrawn robot, its private
+            ones too, no longer apply. None: robots must not withdraw.
     """
 
     seed: int = 0
     settings: Mapping[str, str] = MappingProxyType({})
-    aside: float | None = None
+    withdrawal_cost: float | None = None
 
 
-NO_BRIEF = RunParameters()
+DEFAULT_PARAMETERS = RunParameters()
 
 
 class AgentProblem(NamedTuple):
-    """What one robot knows when the search begins.
+    """The problem that one agent is given: all that its robot knows when the search begins.
 
-    `own` is the robot itself with its compiled domain. `order`, `interfaces` and the declared `domains` of interface
-    variables are common knowledge. `copies` are the totally known constraints over its
-    variables that lower robots hold, for protocols in which all robots of a scope have to know them. `links` is
-    for protocols that work on a pseudo-tree. `secretive` are the parents that hold parts of partially known
-    constraints towards this robot: that there is such a constraint both sides know, the parts they do not.
-    `brief` is what all robots are told; whoever may step aside does so at the `brief.aside` times its weight.
+    Attributes:
+        own: The robot itself, with its compiled domain.
+        order: The names of all robots in priority order, the highest first.
+        interfaces: The interface variables of all robots.
+        copies: The totally known constraints on its variables that lower robots hold. For protocols in which all
+            robots of a scope know a constraint.
+        domains: The declared domains of all interface variables.
+        links: The parents of each robot. For protocols that work on a pseudo-tree.
+        pkc_holders: The parents that hold a part of a partially known constraint with this robot. Both sides know
+            that there is such a constraint. Neither knows the other's part.
+        parameters: The parameters of the run.
     """
 
     own: CompiledRobot
     order: Sequence[str]
     interfaces: Interfaces
-    copies: tuple[Known, ...] = ()
+    copies: tuple[KeyedConstraint, ...] = ()
     domains: Mapping[str, Domain] = MappingProxyType({})
     links: Links | None = None
-    secretive: tuple[str, ...] = ()
-    brief: RunParameters = NO_BRIEF
+    pkc_holders: tuple[str, ...] = ()
+    parameters: RunParameters = DEFAULT_PARAMETERS
 
     @property
     def robot(self) -> Robot:
@@ -69,30 +76,40 @@ class AgentProblem(NamedTuple):
 
 
 def agent_problems(
-    team: Team | CompiledTeam, brief: RunParameters = NO_BRIEF, *, shared_scopes: bool = False, tree: bool = False
+    team: Team | CompiledTeam,
+    parameters: RunParameters = DEFAULT_PARAMETERS,
+    *,
+    shared_scopes: bool = False,
+    tree: bool = False,
 ) -> dict[str, AgentProblem]:
-    """Return the part of each robot of `team` that is compiled, in priority order.
+    """Return what each agent of `team` is given, by the robot's name, in priority order.
 
-    `shared_scopes`: every robot of a constraint's scope knows it. `tree`: all know who is whose parent.
+    Args:
+        team: The team. Only robots that are compiled get a problem.
+        parameters: The parameters of the run.
+        shared_scopes: Whether every robot of a constraint's scope knows the constraint.
+        tree: Whether all robots know the parents of each robot.
     """
-    compiled = as_compiled(team)
+    compiled = ensure_compiled(team)
     team = compiled.team
     shown = {robot.name: robot.interface for robot in team.robots}
     known = {name: team.variables[name].domain for names in shown.values() for name in names}
     links = {robot.name: tuple(parent.name for parent in robot.parents) for robot in team.robots} if tree else None
-    copies: dict[str, list[Known]] = {robot.name: [] for robot in team.robots}
+    copies: dict[str, list[KeyedConstraint]] = {robot.name: [] for robot in team.robots}
     if shared_scopes:
         for robot in team.robots:
-            for one in held(robot):
+            for one in held_above(robot):
                 for owner in {team.owner[name] for name in one.constraint.variables} - {robot.name}:
-                    if one.constraint.model is not Model.PKC:
+                    if one.constraint.model is not ConstraintModel.PKC:
                         copies[owner].append(one)
-    secretive: dict[str, list[str]] = {robot.name: [] for robot in team.robots}
+    pkc_holders: dict[str, list[str]] = {robot.name: [] for robot in team.robots}
     for robot in team.robots:
         for child in robot.children:
             if child.constraints:
-                secretive[child.name].append(robot.name)
+                pkc_holders[child.name].append(robot.name)
     return {
-        name: AgentProblem(own, team.order, shown, tuple(copies[name]), known, links, tuple(secretive[name]), brief)
+        name: AgentProblem(
+            own, team.order, shown, tuple(copies[name]), known, links, tuple(pkc_holders[name]), parameters
+        )
         for name, own in compiled.robots.items()
     }

@@ -21,7 +21,7 @@ from robochoc.system.files import write_atomically
 
 FORMAT = 1
 """Counts up when what is stored, or how networks are encoded, changes."""
-LARGEST_BYTES = 64 << 20
+MAX_BYTES = 64 << 20
 SUFFIX = ".solutions"
 _DIGEST_BYTES = 32
 
@@ -71,7 +71,7 @@ class SolutionCache:
         """Remember all solutions of `network`, unless they are too many, or the folder cannot be written."""
         key, width = self.key(network), len(network.domains)
         codes = array("i", (code for solution in solutions for code in solution)).tobytes()
-        if len(codes) > LARGEST_BYTES:
+        if len(codes) > MAX_BYTES:
             return
         body = msgspec.msgpack.encode(_Entry(key, width, len(solutions), codes))
         with suppress(OSError):

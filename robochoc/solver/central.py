@@ -15,33 +15,33 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Kind, Team
+from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.ace_words import Strategy
+from robochoc.solver.ace_messages import Strategy
 from robochoc.solver.cache import SolutionCache
-from robochoc.solver.cliques import strengthened
+from robochoc.solver.cliques import with_cliques
 from robochoc.solver.encoding import Codes, Component, Network, components
 from robochoc.solver.failures import SolverTimeoutError
-from robochoc.solver.question import Answer, Means
-from robochoc.solver.symmetry import broken, orbits, symmetries
-from robochoc.solver.weighted import Priced, charged_anyway, priced, with_robots_aside
+from robochoc.solver.query import SolvedBy, SolverAnswer
+from robochoc.solver.symmetry import break_symmetries, orbits, symmetries
+from robochoc.solver.weighted import WeightedComponent, components_with_withdrawal, constant_costs, weighted_components
 
-LONGEST_TABLE = 20_000
+MAX_CLIQUE_ROWS = 20_000
 """A clique with more solutions than this stays an allDifferent."""
 TABLE_PATIENCE_S = 20.0
 """So long, all in all, may it take to make tables of cliques."""
-MOST_ORBITS = 20_000
+MAX_ORBITS = 20_000
 """So many solutions up to symmetry are looked at one by one to be counted; of more only the number is asked."""
 MANY_ROWS = 100_000
 """For a team whose tables have so many rows ACE is started at once, while the first task is still made ready."""
 HEDGE_S = 5.0
 """After so long without an answer the other strategy is tried beside."""
 _TICK_S = 0.2
-NOTHING = Answer(0, complete=True, solutions=())
+NO_SOLUTIONS = SolverAnswer(0, complete=True, solutions=())
 
 
 @dataclass(frozen=True)
-class Judgement:
+class CentralAnswer:
     """What the judge has found. `count` is None unless it was asked for.
 
     Where something is minimised: `cost` is what the assignment comes to, and nothing comes to less than `bound`.
@@ -90,7 +90,7 @@ class CentralSolver:
         self._progress = progress
         self._tables: dict[Network, tuple[Codes, ...] | None] = {}
 
-    def judge(self, team: Team, *, count: bool = False, aside: int | None = None) -> Judgement:
+    def judge(self, team: Team, *, count: bool = False, aside: int | None = None) -> CentralAnswer:
         """The verdict on `team`, with a solution (of a DisWCSP: the cheapest) or (`count`) the number of all.
 
         With `aside`, robots may step aside, one of weight 1 at this price, and costs and prices are minimised; those
@@ -98,9 +98,9 @@ class CentralSolver:
         `SolverMissingError`, `SolverLostError`, `UnsupportedError`.
         """
         if aside is not None:
-            return self._minimum(team, with_robots_aside(team, aside))
-        if team.kind is Kind.DISWCSP and not count:
-            return self._minimum(team, priced(team.variables.values(), list(team.constraints())))
+            return self._minimum(team, components_with_withdrawal(team, aside))
+        if team.kind is ProblemKind.DISWCSP and not count:
+            return self._minimum(team, weighted_components(team.variables.values(), list(team.constraints())))
         with ExitStack() as processes:
             ace = self._solver or processes.enter_context(AceProcess(always=self._always_ace))
             spare = processes.enter_context(AceProcess(always=True))
@@ -113,20 +113,20 @@ class CentralSolver:
                 try:
                     found.append(self._solve(part, ace, spare, count=count))
                 except SolverTimeoutError:
-                    return Judgement(Verdict.UNKNOWN)
+                    return CentralAnswer(Verdict.UNKNOWN)
                 if not found[-1].found:
-                    return Judgement(Verdict.NO_SOLUTION, count=0 if count else None)
+                    return CentralAnswer(Verdict.NO_SOLUTION, count=0 if count else None)
         if count:
-            return Judgement(Verdict.SOLUTION, count=math.prod(answer.found for answer in found))
+            return CentralAnswer(Verdict.SOLUTION, count=math.prod(answer.found for answer in found))
         assignment: dict[str, int] = {}
         for part, answer in zip(parts, found, strict=True):
             assignment.update(zip(part.names, part.decoded(answer.solutions[0]), strict=True))
-        return Judgement(Verdict.SOLUTION, {name: assignment[name] for name in team.variables})
+        return CentralAnswer(Verdict.SOLUTION, {name: assignment[name] for name in team.variables})
 
-    def _minimum(self, team: Team, parts: list[Priced]) -> Judgement:
+    def _minimum(self, team: Team, parts: list[WeightedComponent]) -> CentralAnswer:
         """The cheapest solution of all `parts`, which do not depend on each other."""
         parts.sort(key=lambda part: math.prod(len(domain) for domain in part.network.domains))
-        cost = bound = charged_anyway(team)
+        cost = bound = constant_costs(team)
         assignment: dict[str, int] | None = {}
         proven = True
         with ExitStack() as processes:
@@ -134,7 +134,7 @@ class CentralSolver:
             for part in parts:
                 codes, optimal = self._cheapest(part, ace)
                 if codes is None and optimal:
-                    return Judgement(Verdict.NO_SOLUTION)
+                    return CentralAnswer(Verdict.NO_SOLUTION)
                 proven = proven and optimal
                 bound += part.cost(codes) if codes is not None and optimal else part.base
                 if codes is None or assignment is None:
@@ -143,11 +143,11 @@ class CentralSolver:
                 cost += part.cost(codes)
                 assignment.update(part.decoded(codes))
         if assignment is None:
-            return Judgement(Verdict.UNKNOWN, bound=bound)
+            return CentralAnswer(Verdict.UNKNOWN, bound=bound)
         assignment = {name: assignment[name] for name in team.variables if name in assignment}
-        return Judgement(Verdict.OPTIMAL if proven else Verdict.UNKNOWN, assignment, cost=cost, bound=bound)
+        return CentralAnswer(Verdict.OPTIMAL if proven else Verdict.UNKNOWN, assignment, cost=cost, bound=bound)
 
-    def _cheapest(self, part: Priced, ace: AceProcess) -> tuple[Codes | None, bool]:
+    def _cheapest(self, part: WeightedComponent, ace: AceProcess) -> tuple[Codes | None, bool]:
         """A solution, and whether none is cheaper; without one, whether there is none."""
         network = part.network
         if network.impossible:
@@ -177,28 +177,28 @@ class CentralSolver:
     def _time_is_over(self) -> bool:
         return self._deadline is not None and time.monotonic() >= self._deadline
 
-    def _solve(self, part: Component, ace: AceProcess, spare: AceProcess, *, count: bool) -> Answer:
+    def _solve(self, part: Component, ace: AceProcess, spare: AceProcess, *, count: bool) -> SolverAnswer:
         """The number of solutions of one component, or its first one."""
         network = part.network
         if network.impossible:
-            return NOTHING
+            return NO_SOLUTIONS
         if not network.tables:
             (domain,) = network.domains
-            return Answer(len(domain), complete=True, solutions=((domain[0],),))
+            return SolverAnswer(len(domain), complete=True, solutions=((domain[0],),))
         group = symmetries(part)
         if group:
-            smaller = broken(network, group)
+            smaller = break_symmetries(network, group)
             if not count:
                 return self._search(smaller, ace, spare, _Wanted(limit=1, in_order=True))
-            first = self._search(smaller, ace, spare, _Wanted(limit=MOST_ORBITS, in_order=True))
+            first = self._search(smaller, ace, spare, _Wanted(limit=MAX_ORBITS, in_order=True))
             if first.complete:
-                return Answer(len(orbits(first.solutions, group, network)), complete=True, solutions=())
+                return SolverAnswer(len(orbits(first.solutions, group, network)), complete=True, solutions=())
         wanted = _Wanted(count_only=True, in_order=True) if count else _Wanted(limit=1)
         return self._search(network, ace, spare, wanted)
 
-    def _search(self, network: Network, ace: AceProcess, spare: AceProcess, wanted: _Wanted) -> Answer:
-        strong = strengthened(network, lambda clique: self._table(ace, clique))
-        return NOTHING if strong.impossible else self._race(strong, ace, spare, wanted)
+    def _search(self, network: Network, ace: AceProcess, spare: AceProcess, wanted: _Wanted) -> SolverAnswer:
+        strong = with_cliques(network, lambda clique: self._table(ace, clique))
+        return NO_SOLUTIONS if strong.impossible else self._race(strong, ace, spare, wanted)
 
     def _table(self, ace: AceProcess, clique: Network) -> tuple[Codes, ...] | None:
         """All solutions of a clique; None when there are too many, or it takes too long."""
@@ -209,22 +209,22 @@ class CentralSolver:
     def _known_or_solved(self, ace: AceProcess, clique: Network) -> tuple[Codes, ...] | None:
         known = self._cache.get(clique) if self._cache else None
         if known is not None:
-            return known if len(known) <= LONGEST_TABLE else None
+            return known if len(known) <= MAX_CLIQUE_ROWS else None
         patience = time.monotonic() + TABLE_PATIENCE_S
         deadline = patience if self._deadline is None else min(patience, self._deadline)
         try:
-            answer = ace.solve(clique, limit=LONGEST_TABLE + 1, strategy="static", deadline=deadline)
+            answer = ace.solve(clique, limit=MAX_CLIQUE_ROWS + 1, strategy="static", deadline=deadline)
         except SolverTimeoutError:
             if self._deadline is not None and deadline == self._deadline:
                 raise
             return None
-        if not answer.complete or answer.found > LONGEST_TABLE:
+        if not answer.complete or answer.found > MAX_CLIQUE_ROWS:
             return None
-        if self._cache and answer.means is Means.ACE:
+        if self._cache and answer.means is SolvedBy.ACE:
             self._cache.put(clique, answer.solutions)
         return answer.solutions
 
-    def _race(self, network: Network, first: AceProcess, second: AceProcess, wanted: _Wanted) -> Answer:
+    def _race(self, network: Network, first: AceProcess, second: AceProcess, wanted: _Wanted) -> SolverAnswer:
         """The answer of whichever of two strategies is ready first; the second begins when the first takes long."""
         usual, other = wanted.strategies
         if not first.begin(network, limit=wanted.limit, count_only=wanted.count_only, strategy=usual):

@@ -64,7 +64,7 @@ def cliques(pairs: Iterable[Codes]) -> list[Codes]:
     return found
 
 
-def strengthened(network: Network, solutions: Callable[[Network], tuple[Codes, ...] | None]) -> Network:
+def with_cliques(network: Network, solutions: Callable[[Network], tuple[Codes, ...] | None]) -> Network:
     """`network` with allDifferent on cliques of `ne`, and with tables for the cliques that owe each other more.
 
     Tables are for cliques that need every value there is: there they pay, as almost nothing is left to choose.

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Self
 
 from robochoc.model.problem import Robot
 from robochoc.solver.cache import SolutionCache
-from robochoc.solver.domain import MOST_SOLUTIONS, CompiledDomain, TooManySolutionsError, compiled_domain
+from robochoc.solver.domain import MAX_SOLUTIONS, CompiledDomain, TooManySolutionsError, compile_domain
 from robochoc.solver.encoding import Codes, Network, UnsupportedError
 from robochoc.solver.failures import SolverLostError, SolverTimeoutError
 
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess
-    from robochoc.solver.question import Answer
+    from robochoc.solver.query import SolverAnswer
 
 PATIENCE_S = 60.0
 """How long the compilation of one robot may take, unless more is asked for."""
@@ -30,12 +30,12 @@ class Limits:
     With `always_ace`, ACE solves small local problems too.
     """
 
-    solutions: int = MOST_SOLUTIONS
+    solutions: int = MAX_SOLUTIONS
     time_s: float = PATIENCE_S
     always_ace: bool = False
 
 
-class Source(StrEnum):
+class CompiledFrom(StrEnum):
     """Where a robot's local solutions come from; of several, the one that cost most."""
 
     DIRECT = "direct"
@@ -71,7 +71,7 @@ class Compilation:
 
     robot: str
     domain: CompiledDomain
-    source: Source
+    source: CompiledFrom
     seconds: float
 
 
@@ -114,7 +114,7 @@ class Compiler:
         over.
         """
         began = time.monotonic()
-        sources = [Source.DIRECT]
+        sources = [CompiledFrom.DIRECT]
 
         def solve(network: Network) -> Sequence[Codes]:
             solutions, source = self._solutions(robot.name, network, began + self._limits.time_s)
@@ -122,31 +122,31 @@ class Compiler:
             return solutions
 
         try:
-            domain = compiled_domain(robot, solve, self._limits.solutions)
+            domain = compile_domain(robot, solve, self._limits.solutions)
         except UnsupportedError as refusal:
             raise UnsupportedError(f"{robot.name}: {refusal}") from refusal
-        costliest = max(sources, key=list(Source).index)
+        costliest = max(sources, key=list(CompiledFrom).index)
         return Compilation(robot.name, domain, costliest, time.monotonic() - began)
 
-    def _solutions(self, robot: str, network: Network, limit: float) -> tuple[tuple[Codes, ...], Source]:
+    def _solutions(self, robot: str, network: Network, limit: float) -> tuple[tuple[Codes, ...], CompiledFrom]:
         if network in self._too_slow:
             raise CompileTimeoutError(robot, self._limits.time_s)
         known = self._known.get(network)
-        source = Source.EQUAL
+        source = CompiledFrom.EQUAL
         if known is None and self._cache is not None:
             known = self._cache.get(network)
-            source = Source.CACHE
+            source = CompiledFrom.CACHE
         if known is None:
             answer = self._solved(robot, network, limit)
             known, source = answer.solutions, _source(answer)
-            if self._cache is not None and answer.complete and source is Source.ACE:
+            if self._cache is not None and answer.complete and source is CompiledFrom.ACE:
                 self._cache.put(network, known)
         self._known[network] = known
         if len(known) > self._limits.solutions:
             raise TooManySolutionsError(robot, self._limits.solutions)
         return known, source
 
-    def _solved(self, robot: str, network: Network, limit: float) -> Answer:
+    def _solved(self, robot: str, network: Network, limit: float) -> SolverAnswer:
         deadline = limit if self._deadline is None else min(limit, self._deadline)
         try:
             return self._solver().solve(network, limit=self._limits.solutions + 1, strategy="static", deadline=deadline)
@@ -169,9 +169,13 @@ class Compiler:
         return self._own
 
 
-def _source(answer: Answer) -> Source:
+def _source(answer: SolverAnswer) -> CompiledFrom:
     """Return what the solver's `answer` comes from."""
-    from robochoc.solver.question import Means  # noqa: PLC0415 - start-up: most robots need no solver
+    from robochoc.solver.query import SolvedBy  # noqa: PLC0415 - start-up: most robots need no solver
 
-    sources = {Means.PROPAGATION: Source.DIRECT, Means.ENUMERATION: Source.ENUMERATED, Means.ACE: Source.ACE}
+    sources = {
+        SolvedBy.PROPAGATION: CompiledFrom.DIRECT,
+        SolvedBy.ENUMERATION: CompiledFrom.ENUMERATED,
+        SolvedBy.ACE: CompiledFrom.ACE,
+    }
     return sources[answer.means]

@@ -2,7 +2,7 @@
 
 Paper, Section 4.1: every robot is one variable to a protocol. Its values are the robot's local solutions, seen from
 the interface variables that neighbours know (`solver/domain.py`); the constraints it checks are those shared with
-its parents (`solver/shared.py`), and its parts of those that are partially known (PKC), towards its children too.
+its parents (`solver/shared_constraint.py`), and its parts of partially known ones (PKC), also with its children.
 
 Constraint checks are counted here, and only here: one check is one evaluation of one shared constraint for one
 value of the own domain (Meisels, Kaplansky, Razgon and Zivan 2002). Private constraints are settled once, when
@@ -18,24 +18,24 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, Model
+from robochoc.model.problem import INFINITE, ConstraintModel
 from robochoc.solver.agent_problem import AgentProblem
-from robochoc.solver.explanation import Known, held, held_below
+from robochoc.solver.explanation import KeyedConstraint, held_above, held_below
 from robochoc.solver.filters import Filters
-from robochoc.solver.shared import Conflict, Others, OwnValues, SharedConstraint, in_order_of_lowest
+from robochoc.solver.shared_constraint import Conflict, OtherValues, OwnValues, SharedConstraint, sorted_by_lowest_agent
 
 if TYPE_CHECKING:
     from robochoc.solver.conflict_table import ConflictTable
     from robochoc.solver.cost_table import CostTable
 
-Burden = tuple[int, float]
+LexicographicCost = tuple[int, float]
 """How many constraints a value breaks, and what all others charge for it. Pairs compare as tuples do: a broken
 constraint weighs more than any cost, and differences are never `inf - inf`."""
 
-LARGE = 64
+MIN_TABLE_VALUES = 64
 """From so many values on, conflicts are looked up for all of them at once, in numpy."""
 
-WIDE = 65_536
+MAX_BOUNDED_ROWS = 65_536
 """A constraint with more combinations of values than this is not searched for the least that it charges."""
 
 
@@ -44,7 +44,7 @@ class LocalProblem:
 
     `values[i]` is the i-th value as neighbours see it; `solution(i)` are the own variables' values behind it.
     `parents` and `children` are the links that the files name, `neighbours` are they and all others in a constraint
-    that this robot knows; each in priority order. `partners` are the parents with whom a partially known constraint
+    that this robot knows; each in priority order. `pkc_parents` are the parents with whom a partially known constraint
     is shared: they have to hear of the own value too. `checks` counts constraint checks so far.
 
     `charges[i]` is what the i-th value costs before anybody else has said a word: what its private constraints
@@ -61,31 +61,31 @@ class LocalProblem:
         self._domain = part.domain
         self.values: tuple[Value, ...] = self._domain.values
         self.charges: tuple[float, ...] = self._domain.costs
-        if part.brief.aside is not None:
+        if part.parameters.withdrawal_cost is not None:
             self.values = (*self.values, (None,) * len(robot.interface))
-            self.charges = (*self.charges, part.brief.aside * robot.weight)
+            self.charges = (*self.charges, part.parameters.withdrawal_cost * robot.weight)
         self.checks = 0
         own = OwnValues(robot.interface, self.values)
         owners = {name: agent for agent, names in part.interfaces.items() for name in names if agent != self.agent}
 
-        def ready(known: Known) -> SharedConstraint:
+        def ready(known: KeyedConstraint) -> SharedConstraint:
             constraint = SharedConstraint(known.key, known.constraint, owners, rank, part.interfaces)
             constraint.compile(own)
             return constraint
 
-        above = [(known.constraint.model, ready(known)) for known in held(robot)]
+        above = [(known.constraint.model, ready(known)) for known in held_above(robot)]
         copies = [ready(known) for known in part.copies]
         shared = [*(constraint for _, constraint in above), *copies]
-        self._constraints = in_order_of_lowest(shared, rank)
+        self._constraints = sorted_by_lowest_agent(shared, rank)
         self._rank = rank
         self._depths = [rank[constraint.agents[-1]] if constraint.agents else -1 for constraint in self._constraints]
         met = {agent for constraint in shared for agent in constraint.agents}
         self.neighbours = tuple(sorted({*self.parents, *self.children, *met}, key=rank.__getitem__))
-        self._table: ConflictTable | None = self._looked_up() if len(self.values) >= LARGE else None
+        self._table: ConflictTable | None = self._looked_up() if len(self.values) >= MIN_TABLE_VALUES else None
         self._below = _by_robot(ready(known) for _, known in held_below(robot))
-        parts_above = [constraint for model, constraint in above if model is Model.PKC]
-        secretive = {*part.secretive, *_by_robot(parts_above)}
-        self.partners = tuple(parent for parent in self.parents if parent in secretive)
+        parts_above = [constraint for model, constraint in above if model is ConstraintModel.PKC]
+        secretive = {*part.pkc_holders, *_by_robot(parts_above)}
+        self.pkc_parents = tuple(parent for parent in self.parents if parent in secretive)
         below = itertools.chain.from_iterable(self._below.values())
         self._filtering = _by_robot([*copies, *below, *parts_above])
         self._part = part
@@ -105,7 +105,7 @@ class LocalProblem:
         broken = self._broken(index, view, since)
         return None if broken is None else broken[0].conflict(broken[1])
 
-    def explained(self, index: int, view: Mapping[str, Value], since: int = -1) -> tuple[Conflict, str] | None:
+    def conflict_with_key(self, index: int, view: Mapping[str, Value], since: int = -1) -> tuple[Conflict, str] | None:
         """Like `conflict`, with the key of the constraint that is broken."""
         broken = self._broken(index, view, since)
         return None if broken is None else (broken[0].conflict(broken[1]), broken[0].key)
@@ -115,13 +115,13 @@ class LocalProblem:
         known = self._known(view)
         return [(c.conflict(others), c.key) for c, others in known if not c.mask(others) >> index & 1]
 
-    def refuses(self, index: int, child: str, value: Value) -> Conflict | None:
+    def part_conflict(self, index: int, child: str, value: Value) -> Conflict | None:
         """What cannot both be, by the own parts towards `child`: of `values[index]` and `value`, what the part sees.
 
         None: the parts allow the pair. The pair is named like a conflict, but with this robot's own value in it.
         """
         for constraint in self._below.get(child, ()):
-            others = constraint.others({child: value})
+            others = constraint.other_values({child: value})
             if others is None:
                 continue
             self.checks += 1
@@ -141,30 +141,30 @@ class LocalProblem:
         return allowed
 
     @property
-    def places(self) -> Sequence[int]:
+    def filter_places(self) -> Sequence[int]:
         """For each own value its place in filters. Raises `UnsupportedError` when there are too many for a filter."""
         return self._filters.places
 
-    def violated(self, index: int, view: Mapping[str, Value]) -> int:
+    def violation_count(self, index: int, view: Mapping[str, Value]) -> int:
         """How many constraints `values[index]` breaks, of those whose other variables are all known in `view`."""
         return sum(not constraint.mask(others) >> index & 1 for constraint, others in self._known(view))
 
     def cost(self, index: int, view: Mapping[str, Value]) -> float:
         """What `values[index]` costs in `view`: its charge, and all constraints whose other variables are known."""
-        return sum([c.prices(others)[index] for c, others in self._known(view)], self.charges[index])
+        return sum([c.costs(others)[index] for c, others in self._known(view)], self.charges[index])
 
     def costs(self, view: Mapping[str, Value]) -> list[float]:
         """Like `cost`, of every own value: as many checks for each constraint as there are values."""
-        known = [constraint.prices(others) for constraint, others in self._known(view, len(self.values))]
+        known = [constraint.costs(others) for constraint, others in self._known(view, len(self.values))]
         return [sum(prices) for prices in zip(self.charges, *known, strict=True)]
 
-    def burdens(self, view: Mapping[str, Value]) -> list[Burden]:
+    def lexicographic_costs(self, view: Mapping[str, Value]) -> list[LexicographicCost]:
         """Like `costs`, for those who compare costs of assignments that break something."""
         costs = self.costs(view)
         if INFINITE not in costs:
             return [(0, cost) for cost in costs]
-        known = [constraint.prices(others) for constraint, others in self._known(view, 0)]
-        return [_burden(prices) for prices in zip(self.charges, *known, strict=True)]
+        known = [constraint.costs(others) for constraint, others in self._known(view, 0)]
+        return [_lexicographic_cost(prices) for prices in zip(self.charges, *known, strict=True)]
 
     def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], float]]:
         """Of each constraint whose other robots are all among `robots`: who these are, and the most that it charges.
@@ -172,7 +172,7 @@ class LocalProblem:
         That is, short of being broken, and whatever values there are: nothing is checked. See `tables`.
         """
         known = {*robots}
-        return [(c.agents, c.dearest) for c in self._constraints if known.issuperset(c.agents)]
+        return [(c.agents, c.max_cost) for c in self._constraints if known.issuperset(c.agents)]
 
     def added(self, robot: str, view: Mapping[str, Value]) -> list[float] | None:
         """What each own value pays once `robot` is known too, the lowest in `view`; None: no constraint waits for it.
@@ -185,20 +185,26 @@ class LocalProblem:
         waiting = self._constraints[places]
         if not waiting:
             return None
-        known = [(constraint, others) for constraint in waiting if (others := constraint.others(view)) is not None]
+        known = [
+            (constraint, others) for constraint in waiting if (others := constraint.other_values(view)) is not None
+        ]
         self.checks += len(known) * len(self.values)
-        return _summed(len(self.values), [constraint.prices(others) for constraint, others in known])
+        return _summed(len(self.values), [constraint.costs(others) for constraint, others in known])
 
-    def least(self, robots: Container[str]) -> list[float]:
+    def lower_bounds(self, robots: Container[str]) -> list[float]:
         """For each own value, what constraints whose other robots are all among `robots` charge at the very least.
 
         These may take any values that their files declare. Nothing is charged for sure where robots may step aside,
-        and nothing is said of a constraint with more than `WIDE` combinations of values.
+        and nothing is said of a constraint with more than `MAX_BOUNDED_ROWS` combinations of values.
         """
         least: list[list[float]] = []
         for constraint in self._constraints:
-            if self._part.brief.aside is None and constraint.agents and all(a in robots for a in constraint.agents):
-                checks, charged = constraint.least(self._part.domains, WIDE)
+            if (
+                self._part.parameters.withdrawal_cost is None
+                and constraint.agents
+                and all(a in robots for a in constraint.agents)
+            ):
+                checks, charged = constraint.lower_bounds(self._part.domains, MAX_BOUNDED_ROWS)
                 self.checks += checks
                 least.append(charged)
         return _summed(len(self.values), least)
@@ -223,7 +229,7 @@ class LocalProblem:
                 found.append(table)
         return found
 
-    def alike(self, value: Value) -> Sequence[int]:
+    def interchangeable(self, value: Value) -> Sequence[int]:
         """The places of all own values that agree with `value` wherever that is not None.
 
         They are interchangeable to whoever looks at nothing else: neighbourhood partial interchangeability
@@ -233,13 +239,13 @@ class LocalProblem:
         wanted = [(place, part) for place, part in enumerate(value) if part is not None]
         return [index for index, own in enumerate(self.values) if all(own[place] == part for place, part in wanted)]
 
-    def _known(self, view: Mapping[str, Value], values: int = 1) -> list[tuple[SharedConstraint, Others]]:
+    def _known(self, view: Mapping[str, Value], values: int = 1) -> list[tuple[SharedConstraint, OtherValues]]:
         """The constraints whose other variables are all known, and what they see: for so many own `values`."""
-        known = [(c, others) for c in self._constraints if (others := c.others(view)) is not None]
+        known = [(c, others) for c in self._constraints if (others := c.other_values(view)) is not None]
         self.checks += len(known) * values
         return known
 
-    def _broken(self, index: int, view: Mapping[str, Value], since: int) -> tuple[SharedConstraint, Others] | None:
+    def _broken(self, index: int, view: Mapping[str, Value], since: int) -> tuple[SharedConstraint, OtherValues] | None:
         """The first constraint that `values[index]` breaks, and what it sees in `view`."""
         if self._table is not None:
             checks, broken = self._table.look(index, view, bisect_left(self._depths, since))
@@ -247,7 +253,7 @@ class LocalProblem:
             return broken
         for place in range(bisect_left(self._depths, since), len(self._constraints)):
             constraint = self._constraints[place]
-            others = constraint.others(view)
+            others = constraint.other_values(view)
             if others is None:
                 continue
             self.checks += 1
@@ -270,7 +276,7 @@ def _summed(size: int, rows: Sequence[Sequence[float]]) -> list[float]:
     return [sum(prices) for prices in zip(*rows, strict=True)] if rows else [0] * size
 
 
-def _burden(prices: Sequence[float]) -> Burden:
+def _lexicographic_cost(prices: Sequence[float]) -> LexicographicCost:
     """What `prices` come to."""
     return prices.count(INFINITE), sum([price for price in prices if price < INFINITE])
 

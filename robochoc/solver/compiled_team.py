@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from robochoc.model.problem import Robot, Team
-from robochoc.solver.domain import CompiledDomain, compiled_domain
+from robochoc.solver.domain import CompiledDomain, compile_domain
 
 CompileRobot = Callable[[Robot], CompiledDomain]
-"""Computes a robot's compiled domain. `compiled_domain` does so without a solver, `solver/compile.py` with one."""
+"""Computes a robot's compiled domain. `compile_domain` does so without a solver, `solver/compile.py` with one."""
 
 
 @dataclass(frozen=True, init=False)
@@ -25,12 +25,12 @@ class CompiledRobot:
     robot: Robot
     domain: CompiledDomain
 
-    def __init__(self, robot: Robot, compile_robot: CompileRobot = compiled_domain) -> None:
+    def __init__(self, robot: Robot, compile_robot: CompileRobot = compile_domain) -> None:
         """Compile `robot`. Raises what `compile_robot` raises."""
         object.__setattr__(self, "robot", robot)
         object.__setattr__(self, "domain", compile_robot(robot))
 
-    def relinked(self, robot: Robot, compile_robot: CompileRobot = compiled_domain) -> CompiledRobot:
+    def relinked(self, robot: Robot, compile_robot: CompileRobot = compile_domain) -> CompiledRobot:
         """Return `robot`, which is this one with other links. It is compiled anew only if its values are others."""
         same = _decisive(robot) == _decisive(self.robot)
         return CompiledRobot(robot, (lambda _: self.domain) if same else compile_robot)
@@ -47,7 +47,7 @@ class CompiledTeam:
     robots: Mapping[str, CompiledRobot]
 
     def __init__(
-        self, team: Team, compile_robot: CompileRobot = compiled_domain, only: Collection[str] | None = None
+        self, team: Team, compile_robot: CompileRobot = compile_domain, only: Collection[str] | None = None
     ) -> None:
         """Compile the robots of `team`, or `only` those of these names. Raises what `compile_robot` raises."""
         named = [robot for robot in team.robots if only is None or robot.name in only]
@@ -60,8 +60,8 @@ class CompiledTeam:
         return self.robots[name].domain
 
 
-def as_compiled(team: Team | CompiledTeam) -> CompiledTeam:
-    """Return `team`, compiled without a solver if it is not compiled yet. Raises as `compiled_domain` does."""
+def ensure_compiled(team: Team | CompiledTeam) -> CompiledTeam:
+    """Return `team`, compiled without a solver if it is not compiled yet. Raises as `compile_domain` does."""
     return team if isinstance(team, CompiledTeam) else CompiledTeam(team)
 
 

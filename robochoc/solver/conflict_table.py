@@ -16,19 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.model.message import Value
-from robochoc.solver.shared import Others, SharedConstraint
+from robochoc.solver.shared_constraint import OtherValues, SharedConstraint
 
 REMEMBERED = 512
 """Values of a neighbour, for each group of constraints, whose conflicts are kept."""
 
-_Seen = tuple[Others | None, ...]
+_Seen = tuple[OtherValues | None, ...]
 
 
 class _Broken(NamedTuple):
     """For each own value the first constraint of a group that it breaks (their number, if none)."""
 
     first: NDArray[np.int32]
-    constraints: list[tuple[SharedConstraint, Others]]
+    constraints: list[tuple[SharedConstraint, OtherValues]]
 
 
 class _Look(NamedTuple):
@@ -36,7 +36,7 @@ class _Look(NamedTuple):
 
     checks: list[int]
     broken: list[int]
-    constraints: list[tuple[SharedConstraint, Others]]
+    constraints: list[tuple[SharedConstraint, OtherValues]]
 
 
 class ConflictTable:
@@ -52,7 +52,7 @@ class ConflictTable:
 
     def look(
         self, index: int, view: Mapping[str, Value], first: int = 0
-    ) -> tuple[int, tuple[SharedConstraint, Others] | None]:
+    ) -> tuple[int, tuple[SharedConstraint, OtherValues] | None]:
         """How many constraints are checked for the value at `index`, and which one it breaks in `view`, if any.
 
         Constraints before the one numbered `first`, which begins a group, are left out.
@@ -67,7 +67,7 @@ class ConflictTable:
     def _look(self, view: Mapping[str, Value], begin: int) -> _Look:
         checks = np.zeros(self._size, np.int32)
         broken = np.full(self._size, -1, np.int32)
-        constraints: list[tuple[SharedConstraint, Others]] = []
+        constraints: list[tuple[SharedConstraint, OtherValues]] = []
         for group in self._groups[begin:]:
             first, known = group.broken(view)
             open_still = broken < 0
@@ -84,12 +84,12 @@ class _Group:
     def __init__(self, constraints: Sequence[SharedConstraint]) -> None:
         self._constraints = constraints
         self._codes = [np.array(constraint.codes, np.int32) for constraint in constraints]
-        self._masks: list[dict[Others, NDArray[np.bool_]]] = [{} for _ in constraints]
+        self._masks: list[dict[OtherValues, NDArray[np.bool_]]] = [{} for _ in constraints]
         self._kept: OrderedDict[_Seen, _Broken] = OrderedDict()
 
     def broken(self, view: Mapping[str, Value]) -> _Broken:
         """The first constraint that each own value breaks, among those that `view` knows enough for."""
-        seen = tuple([constraint.others(view) for constraint in self._constraints])
+        seen = tuple([constraint.other_values(view) for constraint in self._constraints])
         kept = self._kept.get(seen)
         if kept is None:
             kept = self._kept[seen] = self._broken(seen)
@@ -104,7 +104,7 @@ class _Group:
             first[~self._mask(place, others)] = number
         return _Broken(first, [(self._constraints[place], others) for place, others in known])
 
-    def _mask(self, place: int, others: Others) -> NDArray[np.bool_]:
+    def _mask(self, place: int, others: OtherValues) -> NDArray[np.bool_]:
         mask = self._masks[place].get(others)
         if mask is None:
             holds = np.array(self._constraints[place].holds(others), np.bool_)

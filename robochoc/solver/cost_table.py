@@ -1,7 +1,7 @@
 """What a constraint charges for every combination of values, as an array: for protocols that compute with tables.
 
 Costs are floats, as a broken hard constraint costs `inf`; integers up to 2^53 are exact in them (`exact.py`). A table
-has at most as many entries as a constraint may have tuples of values to be tried on (`MOST_TUPLES`).
+has at most as many entries as a constraint may have tuples of values to be tried on (`MAX_TUPLES`).
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.model.message import Value
-from robochoc.solver.encoding import MOST_TUPLES, UnsupportedError
-from robochoc.solver.shared import Others, SharedConstraint
+from robochoc.solver.encoding import MAX_TUPLES, UnsupportedError
+from robochoc.solver.shared_constraint import OtherValues, SharedConstraint
 
 Array = NDArray[np.float64]
 
@@ -41,17 +41,17 @@ def cost_table(
     """
     columns = [domains[agent] for agent in constraint.agents]
     entries = math.prod(map(len, columns)) * size
-    if entries > MOST_TUPLES:
+    if entries > MAX_TUPLES:
         raise UnsupportedError(
-            f"the table of constraint {constraint.key} has {entries:,} entries, more than {MOST_TUPLES:,}; split the"
+            f"the table of constraint {constraint.key} has {entries:,} entries, more than {MAX_TUPLES:,}; split the"
             " constraint, or choose a protocol that computes without tables"
         )
     charges = np.zeros([*map(len, columns), size], np.float64)
-    seen: set[Others] = set()
+    seen: set[OtherValues] = set()
     for place in itertools.product(*(range(len(column)) for column in columns)):
         chosen = (column[index] for column, index in zip(columns, place, strict=True))
-        others = constraint.others(dict(zip(constraint.agents, chosen, strict=True)))
+        others = constraint.other_values(dict(zip(constraint.agents, chosen, strict=True)))
         if others is not None:
             seen.add(others)
-            charges[place] = constraint.prices(others)
+            charges[place] = constraint.costs(others)
     return len(seen) * size, CostTable(constraint.key, constraint.agents, charges)

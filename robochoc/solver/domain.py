@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 from robochoc.model.message import Value
 from robochoc.model.problem import Constraint, Robot
-from robochoc.solver.encoding import Codes, Component, Network, UnsupportedError, components, is_soft, price_on
+from robochoc.solver.encoding import Codes, Component, Network, UnsupportedError, components, cost_function, is_soft
 
-MOST_SOLUTIONS = 100_000
+MAX_SOLUTIONS = 100_000
 """How many local solutions a robot may have, unless more are asked for."""
 
 SolveNetwork = Callable[[Network], Iterable[Sequence[int]]]
@@ -76,7 +76,7 @@ class _Group:
         self.cost, self.solution = min((self.cost, self.solution), (cost, solution))
 
 
-def compiled_domain(robot: Robot, solve: SolveNetwork | None = None, limit: int = MOST_SOLUTIONS) -> CompiledDomain:
+def compile_domain(robot: Robot, solve: SolveNetwork | None = None, limit: int = MAX_SOLUTIONS) -> CompiledDomain:
     """The compiled domain of `robot`, values in the order of its variables and their values.
 
     `solve` is asked for the solutions of what private constraints connect; a robot without such needs none. Raises
@@ -119,7 +119,7 @@ def _grouped(
 ) -> list[_Group]:
     """Solutions of one part that agree on its variables in `seen`, joined."""
     shown = [place for place, name in enumerate(part.names) if name in seen]
-    prices = [price_on(constraint, part.names) for constraint in soft]
+    prices = [cost_function(constraint, part.names) for constraint in soft]
     groups: dict[Codes, _Group] = {}
     for codes in solutions:
         solution = part.decoded(codes)

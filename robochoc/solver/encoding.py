@@ -13,13 +13,13 @@ import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from robochoc.model.expression import UndefinedValueError, compiled
+from robochoc.model.expression import UndefinedValueError, compile_expression
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Variable
 
-MOST_TUPLES = 4_000_000
+MAX_TUPLES = 4_000_000
 """How many tuples of values a constraint may have to be tried on."""
 
-LONGEST_ALLOWED = 100_000
+MAX_ALLOWED_ROWS = 100_000
 """A constraint on so many combinations of values is a table of allowed tuples, however few it forbids."""
 
 Codes = tuple[int, ...]
@@ -99,18 +99,18 @@ def components(
     return [_component(names, domains, held[names[0]]) for names in groups]
 
 
-def holds_on(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
+def allows_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
     """`constraint` as a test of the values of the variables `names`; what is soft is allowed."""
     definition = constraint.definition
     if not isinstance(definition, Predicate):
-        price = price_on(constraint, names)
+        price = cost_function(constraint, names)
         return lambda values: price(values) < INFINITE
     if constraint.cost < INFINITE:
         return lambda values: True  # noqa: ARG005 - a soft predicate forbids nothing
     return _truth_on(constraint, definition, names)
 
 
-def price_on(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], float]:
+def cost_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], float]:
     """What values of the variables `names` pay at `constraint`: 0 where it holds, `INFINITE` where it is hard."""
     definition = constraint.definition
     if isinstance(definition, Predicate):
@@ -140,7 +140,7 @@ def is_soft(constraint: Constraint) -> bool:
 def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
     """Whether the predicate of `constraint` is true of values of `names`; where it is undefined, it is not."""
     arguments = _arguments(constraint, names)
-    body = compiled(predicate.body, predicate.parameters)
+    body = compile_expression(predicate.body, predicate.parameters)
 
     def holds(values: Sequence[int]) -> bool:
         try:
@@ -164,7 +164,7 @@ def _forbids_something(constraint: Constraint) -> bool:
 
 def _fold(constraint: Constraint, domains: dict[str, list[int]]) -> None:
     """Take from a domain what a unary constraint forbids; a false one on constants only leaves no domain a value."""
-    test = holds_on(constraint, constraint.variables)
+    test = allows_function(constraint, constraint.variables)
     if constraint.variables:
         (name,) = constraint.variables
         domains[name] = [value for value in domains[name] if test((value,))]
@@ -250,23 +250,23 @@ def _rows(constraint: Constraint, domains: Mapping[str, list[int]]) -> _Rows | N
     scope = constraint.variables
     size = math.prod(len(domains[name]) for name in scope)
     definition = constraint.definition
-    if size > MOST_TUPLES and isinstance(definition, Relation) and definition.semantics is not Semantics.SOFT:
+    if size > MAX_TUPLES and isinstance(definition, Relation) and definition.semantics is not Semantics.SOFT:
         listed = tuple(set(_listed(constraint, definition, domains)))
         allows = definition.semantics is Semantics.SUPPORTS
         return _Rows(scope, allows, listed) if allows or listed else None
-    if size > MOST_TUPLES:
+    if size > MAX_TUPLES:
         raise UnsupportedError(
-            f"constraint {constraint.name} has {size:,} combinations of values to try, more than {MOST_TUPLES:,};"
+            f"constraint {constraint.name} has {size:,} combinations of values to try, more than {MAX_TUPLES:,};"
             " state it as a relation, or split it"
         )
-    test = holds_on(constraint, scope)
+    test = allows_function(constraint, scope)
     sorted_out: tuple[list[tuple[int, ...]], list[tuple[int, ...]]] = ([], [])
     for row in itertools.product(*(domains[name] for name in scope)):
         sorted_out[test(row)].append(row)
     forbidden, allowed = sorted_out
     if not forbidden:
         return None
-    if size > LONGEST_ALLOWED and len(forbidden) < len(allowed):
+    if size > MAX_ALLOWED_ROWS and len(forbidden) < len(allowed):
         return _Rows(scope, allowed=False, rows=tuple(forbidden))
     return _Rows(scope, allowed=True, rows=tuple(allowed))
 

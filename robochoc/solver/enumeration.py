@@ -47,7 +47,7 @@ class Budget:
             raise OutOfStepsError
 
 
-class Found(NamedTuple):
+class Enumeration(NamedTuple):
     """How many solutions there are, whether there are no others, and (unless only counted) which, in order."""
 
     number: int
@@ -55,7 +55,7 @@ class Found(NamedTuple):
     solutions: list[Codes]
 
 
-def enumerated(network: Network, budget: Budget, *, limit: int | None, count_only: bool) -> Found:
+def enumerate_solutions(network: Network, budget: Budget, *, limit: int | None, count_only: bool) -> Enumeration:
     """Return the solutions of `network`, up to `limit`, in lexicographic order.
 
     `network` is propagated. Raises `OutOfStepsError` when the budget does not suffice.
@@ -69,13 +69,13 @@ def enumerated(network: Network, budget: Budget, *, limit: int | None, count_onl
         if not count_only:
             solutions += several
         if limit is not None and count > limit:
-            return Found(limit, complete=False, solutions=sorted(solutions)[:limit])
+            return Enumeration(limit, complete=False, solutions=sorted(solutions)[:limit])
         if count == limit and limit == 1:  # whoever asks for one does not ask whether it is alone
-            return Found(1, complete=False, solutions=solutions)
-    return Found(count, complete=True, solutions=sorted(solutions))
+            return Enumeration(1, complete=False, solutions=solutions)
+    return Enumeration(count, complete=True, solutions=sorted(solutions))
 
 
-def cheapest(network: Network, budget: Budget, costs: Codes) -> Codes | None:
+def minimum_solution(network: Network, budget: Budget, costs: Codes) -> Codes | None:
     """Return a solution of `network` in which the codes at the places `costs` sum up to the least, if there is one.
 
     `network` is propagated. Raises `OutOfStepsError` when the budget does not suffice.

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from robochoc.model.problem import Constraint, Robot, Team
 
 
-class Known(NamedTuple):
+class KeyedConstraint(NamedTuple):
     """A shared constraint and its key."""
 
     key: str
@@ -29,21 +29,21 @@ class Invalidated(NamedTuple):
     agents: frozenset[str]
 
 
-def held(robot: Robot) -> Iterator[Known]:
+def held_above(robot: Robot) -> Iterator[KeyedConstraint]:
     """The constraints that `robot` holds towards its parents.
 
     Constraints of one name with one parent share a key: a scenario that removes one of them removes all.
     """
     for parent in robot.parents:
         for constraint in parent.constraints:
-            yield Known(f"{robot.name}<{parent.name}:{constraint.name}", constraint)
+            yield KeyedConstraint(f"{robot.name}<{parent.name}:{constraint.name}", constraint)
 
 
-def held_below(robot: Robot) -> Iterator[tuple[str, Known]]:
+def held_below(robot: Robot) -> Iterator[tuple[str, KeyedConstraint]]:
     """The parts of partially known constraints that `robot` holds towards its children, each with the child's name."""
     for child in robot.children:
         for constraint in child.constraints:
-            yield child.name, Known(f"{robot.name}>{child.name}:{constraint.name}", constraint)
+            yield child.name, KeyedConstraint(f"{robot.name}>{child.name}:{constraint.name}", constraint)
 
 
 def domain_key(agent: str) -> str:
@@ -66,8 +66,8 @@ def invalidated_by(old: Team, new: Team) -> Invalidated:
     return Invalidated(frozenset(keys), frozenset(agents))
 
 
-def _all_held(robot: Robot) -> list[Known]:
-    return [*held(robot), *(part for _, part in held_below(robot))]
+def _all_held(robot: Robot) -> list[KeyedConstraint]:
+    return [*held_above(robot), *(part for _, part in held_below(robot))]
 
 
 def _has_grown(old: Robot, new: Robot) -> bool:

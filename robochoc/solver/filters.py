@@ -13,9 +13,9 @@ from collections.abc import Mapping, Sequence
 from robochoc.model.message import Value
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.shared import SharedConstraint
+from robochoc.solver.shared_constraint import SharedConstraint
 
-LARGEST = 65_536
+MAX_FILTER_BITS = 65_536
 """Bits in a filter: combinations of a robot's interface values, as its domains are declared."""
 
 
@@ -34,10 +34,10 @@ class Filters:
         self._made: dict[tuple[int, str], tuple[int, bytes]] = {}
         columns = self._columns(part.robot.name)
         size = math.prod(len(column) for column in columns)
-        if size > LARGEST:
+        if size > MAX_FILTER_BITS:
             raise UnsupportedError(
                 f"{part.robot.name} shows its neighbours {size:,} combinations of values, and a filter has a bit for"
-                f" each, {LARGEST:,} at most; make its domains smaller, or take another protocol"
+                f" each, {MAX_FILTER_BITS:,} at most; make its domains smaller, or take another protocol"
             )
         ranks: list[dict[int | None, int]] = [{value: rank for rank, value in enumerate(column)} for column in columns]
         self.places = [_place(value, ranks) for value in values]

@@ -13,17 +13,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from robochoc.solver.encoding import LONGEST_ALLOWED, Codes, Network, Table
+from robochoc.solver.encoding import MAX_ALLOWED_ROWS, Codes, Network, Table
 
 LARGEST_PERMUTATION = 5
 """So many variables that share out as many values are a table (120 rows); ACE does so up to 4."""
 
 
-def propagated(network: Network) -> Network:
+def propagate(network: Network) -> Network:
     """`network` with the same variables and the same solutions, arc consistent; impossible, if that shows it.
 
     Every domain has at least two values wherever a table or a `different` looks at it, and of forbidden tuples there
-    are tables only where those allowed would be more than `LONGEST_ALLOWED`.
+    are tables only where those allowed would be more than `MAX_ALLOWED_ROWS`.
     """
     filtered = _Filter(network)
     if not filtered.run():
@@ -38,7 +38,7 @@ def propagated(network: Network) -> Network:
     result = Network(domains, (*tables, *spelt_out), kept)
     # A table that was made of something else may have more to say.
     forbidding = sum(not table.allowed for table in filtered.tables)
-    return propagated(result) if spelt_out or forbidding > sum(not table.allowed for table in tables) else result
+    return propagate(result) if spelt_out or forbidding > sum(not table.allowed for table in tables) else result
 
 
 class _Filter:
@@ -125,7 +125,7 @@ def _spelt_out(scope: Codes, domains: Sequence[Codes]) -> Table:
 
 def _allowing(table: Table, domains: Sequence[Codes]) -> Table:
     """`table` by its allowed tuples, unless they are too many."""
-    if table.allowed or math.prod(len(domains[place]) for place in table.scope) > LONGEST_ALLOWED:
+    if table.allowed or math.prod(len(domains[place]) for place in table.scope) > MAX_ALLOWED_ROWS:
         return table
     forbidden = set(table.rows)
     rows = itertools.product(*(domains[place] for place in table.scope))

@@ -54,7 +54,7 @@ def symmetries(part: Component) -> tuple[Symmetry, ...]:
     return tuple(sorted(group - {identity}))
 
 
-def broken(network: Network, group: Sequence[Symmetry]) -> Network:
+def break_symmetries(network: Network, group: Sequence[Symmetry]) -> Network:
     """`network` without most of those solutions that are not the first of their orbit.
 
     x is the first if x <= g(x) for every g. Of that the first place where g may change something is demanded: all

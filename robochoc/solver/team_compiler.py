@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from robochoc.model.problem import Robot, Team
 from robochoc.solver.cache import SolutionCache
-from robochoc.solver.compile import Compiler, Limits, Source
+from robochoc.solver.compile import CompiledFrom, Compiler, Limits
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.failures import SolverTimeoutError
@@ -66,7 +66,7 @@ class TeamCompiler:
                 compilation = compiler.compile(robot)
             except SolverTimeoutError:
                 raise OutOfTimeError(f"the time (--timeout) was over while {robot.name} was compiled") from None
-            solved = solved or compilation.source is not Source.DIRECT
+            solved = solved or compilation.source is not CompiledFrom.DIRECT
             if not (compilation.domain.values or every):
                 raise NoLocalSolutionError(robot.name)
             return compilation.domain

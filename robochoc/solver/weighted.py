@@ -13,20 +13,29 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from robochoc.model.problem import INFINITE, Constraint, Team, Variable
-from robochoc.solver.encoding import Codes, Component, Network, Table, UnsupportedError, components, is_soft, price_on
-from robochoc.solver.propagation import propagated
+from robochoc.solver.encoding import (
+    Codes,
+    Component,
+    Network,
+    Table,
+    UnsupportedError,
+    components,
+    cost_function,
+    is_soft,
+)
+from robochoc.solver.propagation import propagate
 
-MOST_PRICED = 1_000_000
+MAX_COST_ROWS = 1_000_000
 """How many combinations of values may have a price each."""
-HIGHEST = 2**30
+MAX_TOTAL_COST = 2**30
 """So much may all charges come to, at worst, in units of their greatest common divisor: ACE's codes are small."""
 
-Prices = dict[Codes, float]
+CostRows = dict[Codes, float]
 """What combinations of codes are charged; those that are not there are forbidden."""
 
 
 @dataclass(frozen=True)
-class Priced:
+class WeightedComponent:
     """The variables of `part`, which come first in `network`, and what they are charged.
 
     That is `base`, and `unit` times the sum of the codes at the places `costs`.
@@ -49,7 +58,7 @@ class Priced:
         return {name: values[code] for name, code in own if code < len(values)}
 
 
-def priced(variables: Iterable[Variable], constraints: Sequence[Constraint]) -> list[Priced]:
+def weighted_components(variables: Iterable[Variable], constraints: Sequence[Constraint]) -> list[WeightedComponent]:
     """The problem of `variables` and `constraints`, split into what does not depend on each other.
 
     What constraints on constants charge is left out. Raises `UnsupportedError` when a constraint has too many tuples,
@@ -64,20 +73,20 @@ def priced(variables: Iterable[Variable], constraints: Sequence[Constraint]) -> 
     return [_priced(part, of[part.names[0]]) for part in parts]
 
 
-def charged_anyway(team: Team) -> int:
+def constant_costs(team: Team) -> int:
     """What soft constraints on constants only charge."""
-    fixed = (price_on(constraint, ())(()) for constraint in team.constraints() if not constraint.variables)
+    fixed = (cost_function(constraint, ())(()) for constraint in team.constraints() if not constraint.variables)
     return int(sum(price for price in fixed if price < INFINITE))
 
 
-def _priced(part: Component, soft: Iterable[Constraint]) -> Priced:
-    network = propagated(part.network)
+def _priced(part: Component, soft: Iterable[Constraint]) -> WeightedComponent:
+    network = propagate(part.network)
     if network.impossible:
-        return Priced(part, network, (), 0, 1)
-    return with_charges(part, network, charges_on(part, network, soft))
+        return WeightedComponent(part, network, (), 0, 1)
+    return with_cost_variables(part, network, costs_by_scope(part, network, soft))
 
 
-def charges_on(part: Component, network: Network, soft: Iterable[Constraint]) -> dict[Codes, Prices]:
+def costs_by_scope(part: Component, network: Network, soft: Iterable[Constraint]) -> dict[Codes, CostRows]:
     """What `soft` constraints on variables of `part` charge, by scope, for the codes that `network` leaves."""
     together = _by_scope(part, soft)
     _join_unary(together)
@@ -92,7 +101,7 @@ def _by_scope(part: Component, soft: Iterable[Constraint]) -> dict[Codes, list[C
     return together
 
 
-def with_charges(part: Component, network: Network, charges: Mapping[Codes, Prices]) -> Priced:
+def with_cost_variables(part: Component, network: Network, charges: Mapping[Codes, CostRows]) -> WeightedComponent:
     """`network`, which is that of `part`, with a variable for every scope that is charged.
 
     Combinations of codes that a scope has no price for are forbidden. Raises `UnsupportedError` when they are too high.
@@ -101,7 +110,7 @@ def with_charges(part: Component, network: Network, charges: Mapping[Codes, Pric
     above = {scope: {row: int(price) - least[scope] for row, price in charges[scope].items()} for scope in charges}
     unit = math.gcd(*(price for prices in above.values() for price in prices.values())) or 1
     worst = sum(max(prices.values(), default=0) for prices in above.values()) // unit
-    if worst > HIGHEST:
+    if worst > MAX_TOTAL_COST:
         raise UnsupportedError(
             f"costs add up to {worst * unit:,} at worst, which is more than the central judge can minimise; costs that"
             " stand for 'never' are better written as infinity"
@@ -113,10 +122,10 @@ def with_charges(part: Component, network: Network, charges: Mapping[Codes, Pric
             costs.append(len(domains))
             tables.append(Table((*scope, len(domains)), allowed=True, rows=rows))
             domains.append(tuple(sorted({row[-1] for row in rows})))
-    return Priced(part, Network(tuple(domains), tuple(tables)), tuple(costs), sum(least.values()), unit)
+    return WeightedComponent(part, Network(tuple(domains), tuple(tables)), tuple(costs), sum(least.values()), unit)
 
 
-def with_robots_aside(team: Team, aside: int) -> list[Priced]:
+def components_with_withdrawal(team: Team, aside: int) -> list[WeightedComponent]:
     """The problem of `team`, where a robot of weight 1 may step aside for the price `aside`, with all its constraints.
 
     Its variables then have a code that stands for no value.
@@ -144,7 +153,7 @@ def with_robots_aside(team: Team, aside: int) -> list[Priced]:
             network = replace(network, tables=(*network.tables, *_all_or_none(network, first, others, absent)))
             prices = charges.setdefault((first,), {(code,): 0 for code in network.domains[first]})
             prices[absent,] += robot.weight * aside
-        found.append(with_charges(part, network, charges))
+        found.append(with_cost_variables(part, network, charges))
     return found
 
 
@@ -155,7 +164,7 @@ def _unless_absent(table: Table, domains: Sequence[Codes], absent: int) -> Table
     return replace(table, rows=(*table.rows, *_absences([domains[place] for place in table.scope], absent)))
 
 
-def _free_if_absent(prices: Prices, scope: Codes, network: Network, absent: int) -> Prices:
+def _free_if_absent(prices: CostRows, scope: Codes, network: Network, absent: int) -> CostRows:
     domains = [network.domains[place][:-1] for place in scope]
     return {**prices, **dict.fromkeys(_absences(domains, absent), 0)}
 
@@ -181,16 +190,16 @@ def _join_unary(together: dict[Codes, list[Constraint]]) -> None:
         together[wider[scope[0]]] += together.pop(scope)
 
 
-def _prices(part: Component, network: Network, scope: Codes, charging: Iterable[Constraint]) -> Prices:
+def _prices(part: Component, network: Network, scope: Codes, charging: Iterable[Constraint]) -> CostRows:
     """What constraints on variables at places of `scope` charge for each combination of their codes."""
     size = math.prod(len(network.domains[place]) for place in scope)
-    if size > MOST_PRICED:
+    if size > MAX_COST_ROWS:
         names = ", ".join(constraint.name for constraint in charging)
         raise UnsupportedError(
-            f"constraint {names} has a price for {size:,} combinations of values, more than {MOST_PRICED:,} that the"
+            f"constraint {names} has a price for {size:,} combinations of values, more than {MAX_COST_ROWS:,} that the"
             " central judge can list; split it"
         )
-    prices = [price_on(constraint, [part.names[place] for place in scope]) for constraint in charging]
+    prices = [cost_function(constraint, [part.names[place] for place in scope]) for constraint in charging]
     found = {}
     for codes in itertools.product(*(network.domains[place] for place in scope)):
         values = part.decoded(codes)

@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Sequence
 from robochoc.model.expression import UndefinedValueError, evaluate
 from robochoc.model.problem import INFINITE, Assignment, Constraint, Relation, Robot, Semantics, Team, Variable
 
-PLACES = 20_000
+MAX_TRIES = 20_000
 """Values to be tried for the variables of a robot that stepped aside."""
 
 
@@ -19,7 +19,7 @@ class RefutedError(Exception):
     """What a protocol claims is refuted by the checker, or by a second opinion: a fault of the protocol, or ours."""
 
 
-def objections(team: Team, assignment: Assignment, withdrawn: Collection[str] = ()) -> Iterator[str]:
+def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = ()) -> Iterator[str]:
     """Why `assignment` is no answer for the robots of `team` that have not withdrawn; nothing when it is one.
 
     Every variable of a flying robot has a value of its domain and every constraint among flying robots holds.
@@ -32,33 +32,36 @@ def objections(team: Team, assignment: Assignment, withdrawn: Collection[str] = 
             yield f"{name} = {assignment[name]} is not in its domain"
     yield from (f"{name} is no variable of a robot that flies" for name in assignment if name not in flying)
     for constraint in team.constraints():
-        if all(name in assignment for name in constraint.variables) and price(constraint, assignment) == INFINITE:
+        if (
+            all(name in assignment for name in constraint.variables)
+            and constraint_cost(constraint, assignment) == INFINITE
+        ):
             values = ", ".join(f"{name} = {assignment[name]}" for name in constraint.variables)
             yield f"constraint {constraint.name} is broken by {values}"
 
 
-def cost(team: Team, assignment: Assignment) -> float:
+def assignment_cost(team: Team, assignment: Assignment) -> float:
     """What `assignment` pays in all, over the constraints whose variables it covers."""
     met = (c for c in team.constraints() if all(name in assignment for name in c.variables))
-    return sum(price(constraint, assignment) for constraint in met)
+    return sum(constraint_cost(constraint, assignment) for constraint in met)
 
 
-def could_join(team: Team, assignment: Assignment, withdrawn: Collection[str]) -> Iterator[str]:
+def needlessly_withdrawn(team: Team, assignment: Assignment, withdrawn: Collection[str]) -> Iterator[str]:
     """Robots that stepped aside although they had a place beside those that fly.
 
-    A robot of many variables is given `PLACES` tries; who has found no place by then is believed.
+    A robot of many variables is given `MAX_TRIES` tries; who has found no place by then is believed.
     """
     constraints = list(team.constraints())
     for name in withdrawn:
         names = [variable.name for variable in team[name].variables]
         own = [c for c in constraints if {*assignment, *names}.issuperset(c.variables) and set(names) & {*c.variables}]
-        if _has_a_place(team[name].variables, assignment, own, [PLACES]):
+        if _has_a_place(team[name].variables, assignment, own, [MAX_TRIES]):
             yield name
 
 
 def has_local_solution(robot: Robot) -> bool | None:
-    """Whether the private constraints leave `robot` a solution, by trying; None when `PLACES` tries were too few."""
-    tries = [PLACES]
+    """Whether the private constraints leave `robot` a solution, by trying; None when `MAX_TRIES` tries were too few."""
+    tries = [MAX_TRIES]
     if _has_a_place(robot.variables, {}, robot.private, tries):
         return True
     return False if tries[0] else None
@@ -77,12 +80,14 @@ def _has_a_place(
         tries[0] -= 1
         place = {**assignment, first.name: value}
         met = (c for c in own if first.name in c.variables and all(name in place for name in c.variables))
-        if all(price(constraint, place) < INFINITE for constraint in met) and _has_a_place(rest, place, own, tries):
+        if all(constraint_cost(constraint, place) < INFINITE for constraint in met) and _has_a_place(
+            rest, place, own, tries
+        ):
             return True
     return False
 
 
-def price(constraint: Constraint, assignment: Assignment) -> float:
+def constraint_cost(constraint: Constraint, assignment: Assignment) -> float:
     """What `assignment` pays at `constraint`: 0 where it holds, `INFINITE` where it is broken and hard."""
     values = tuple(assignment[term] if isinstance(term, str) else term for term in constraint.parameters)
     definition = constraint.definition

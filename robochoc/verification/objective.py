@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, Team
-from robochoc.solver.encoding import max_cost, price_on
+from robochoc.solver.encoding import cost_function, max_cost
 
 
 class Objective:
@@ -20,7 +20,7 @@ class Objective:
     def __init__(self, team: Team, aside: float | None = None) -> None:
         self._weights = {robot.name: robot.weight for robot in team.robots}
         self._aside = aside
-        self._constraints = [(c.variables, price_on(c, c.variables)) for c in team.constraints()]
+        self._constraints = [(c.variables, cost_function(c, c.variables)) for c in team.constraints()]
         self._paid: list[float] = [0] * len(self._constraints)
         self._on: dict[str, list[int]] = {name: [] for name in team.variables}
         self.interfaces = {robot.name: robot.interface for robot in team.robots}

@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from robochoc.journal.journal import lines_of
-from robochoc.sniffer.packed import packed_feed
+from robochoc.sniffer.embedded import embedded_answers
 from robochoc.sniffer.page import page as page_of
 from robochoc.sniffer.session import Session
 from tests.support.sniffer_pages import (
@@ -117,7 +117,7 @@ def test_names_of_strangers_are_text(browser: Any, tmp_path: Path) -> None:  # n
 
 def test_an_export_needs_no_server(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401
     file = tmp_path / "run.html"
-    file.write_bytes(page_of("embedded", packed_feed(FEED, JOURNAL), title="A run"))
+    file.write_bytes(page_of("embedded", embedded_answers(FEED, JOURNAL), title="A run"))
     with shown(browser, file.as_uri()) as page:
         choose(page, 100)
         text_is(page, "#message blockquote", FEED.detail(100)["words"])

@@ -16,7 +16,7 @@ from click import Context
 from robochoc.cli.group import COMMANDS, cli
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.problem import Constraint, Model, Relation, Robot, Semantics
+from robochoc.model.problem import Constraint, ConstraintModel, Relation, Robot, Semantics
 from tests.support.broken import CASES
 from tests.support.broken_case import Broken
 from tests.support.problems import team_of
@@ -246,7 +246,7 @@ def test_one_file_cannot_hold_several_teams(tmp_path: Path) -> None:
 
 def test_what_this_version_cannot_solve_is_said_in_one_sentence(tmp_path: Path) -> None:
     differ = Relation("R", 2, Semantics.CONFLICTS, ((1, 1),))
-    part = Constraint("C", differ, ("A", "B"), ("A", "B"), model=Model.PKC)
+    part = Constraint("C", differ, ("A", "B"), ("A", "B"), model=ConstraintModel.PKC)
     write_team(team_of({"A": (1, 2), "B": (1, 2)}, [part]), tmp_path / "private")
     done = robochoc("solve", tmp_path / "private", "--withdraw")
     assert done.returncode == 2

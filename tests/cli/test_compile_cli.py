@@ -14,7 +14,7 @@ from lxml import etree
 
 from robochoc.formats import PREDEFINED, read_team, write_team
 from robochoc.model.problem import Constraint
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 from tests.support.complex_problems import complex_team
 from tests.support.program import ROOT, robochoc
 
@@ -238,7 +238,7 @@ def test_the_central_judge_places_everybody() -> None:
     assert (answer["verdict"], answer["verified"]) == ("solution", True)
     team = read_team(QUEENS)
     assert answer["assignment"].keys() == set(team.variables)
-    assert not list(objections(team, answer["assignment"]))
+    assert not list(violations(team, answer["assignment"]))
 
 
 def test_the_central_judge_counts() -> None:
@@ -255,7 +255,7 @@ def test_rows_have_the_solutions_that_cells_have(rows: Path) -> None:
     assert answered("solve", "--protocol", "central", "--count", rows)["count"] == 56
     answer = answered("solve", rows)
     assert (answer["verdict"], answer["verified"]) == ("solution", True)
-    assert not list(objections(read_team(QUEENS), answer["assignment"]))
+    assert not list(violations(read_team(QUEENS), answer["assignment"]))
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from robochoc.cli.group import cli
 from robochoc.formats import write_team
 from robochoc.formats.result import result_json
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from tests.support.program import ROOT, on_a_terminal, robochoc
 
 HANGAR = ROOT / "docs" / "examples" / "hangar"
@@ -40,7 +40,7 @@ def flown(*words: object) -> dict[str, Any]:
     return told
 
 
-def saved(folder: Path, values: dict[str, int], *, epochs: tuple[Epoch, ...] = (), name: str = "two") -> Path:
+def saved(folder: Path, values: dict[str, int], *, epochs: tuple[EpochOutcome, ...] = (), name: str = "two") -> Path:
     verdict = Verdict.SOLUTION if values else Verdict.NO_SOLUTION
     outcome = Outcome(name, "abt", "simulator", 0, verdict, values, epochs=epochs)
     path = folder / "result.json"
@@ -192,7 +192,10 @@ def test_epochs_that_the_situation_opened_and_a_recording_that_takes_the_same_dr
 
 
 def test_a_team_without_a_solution_stays_on_the_ground(tmp_path: Path) -> None:
-    nowhere = (Epoch(Verdict.SOLUTION, ("A",), assignment={"V1.1": 1}), Epoch(Verdict.NO_SOLUTION, ("A",)))
+    nowhere = (
+        EpochOutcome(Verdict.SOLUTION, ("A",), assignment={"V1.1": 1}),
+        EpochOutcome(Verdict.NO_SOLUTION, ("A",)),
+    )
     told = flown(saved(tmp_path, {}, epochs=nowhere))
     assert [leg["verdict"] for leg in told["legs"]] == ["solution", "no-solution"]
     result = ran("fly", saved(tmp_path, {}))

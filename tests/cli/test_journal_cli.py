@@ -22,7 +22,7 @@ from robochoc.journal.journal import Header, Journal, Recorder, read_journal
 from robochoc.sniffer.acl import parse
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.export import MOST_ARROWS, drawable, mermaid
-from robochoc.sniffer.feed import Feed
+from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.patterns import matching, patterns_in
 from robochoc.sniffer.trace import Trace
 from tests.support.recorded_journals import recorded
@@ -83,7 +83,7 @@ def test_show_tells_of_an_end_that_is_missing_and_keeps_names_on_their_lines(tmp
 
 
 def test_a_table_comes_back_as_the_trace(file: Path) -> None:
-    trace, feed = trace_of(file), Feed(trace_of(file))
+    trace, feed = trace_of(file), PageData(trace_of(file))
     of, steps = trace.messages, trace.steps
     rows = list(csv.DictReader(io.StringIO(exported(file, "csv"), newline="")))
     assert len(rows) == len(of.t)
@@ -197,7 +197,7 @@ def test_names_mean_nothing_to_mermaid() -> None:
         Settled(t=0, robot=NAME, clock=0, checks=0),
     ]
     journal = Journal(Header(team="", protocol="abt", runtime="", seed=0), tuple(events), None)
-    diagram = mermaid(Feed(Trace.of(journal)), [0]).decode()
+    diagram = mermaid(PageData(Trace.of(journal)), [0]).decode()
     assert diagram.splitlines() == [
         "sequenceDiagram",
         "    participant R0 as R#59;#35;1#65533;end",
@@ -231,7 +231,7 @@ def test_with_the_refusal_comes_a_command_that_works(chosen: tuple[str, ...], tm
 
 
 def test_a_diagram_of_long_names_is_cut_until_it_can_be_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    feed = Feed(Trace.of(recorded("mgm")))
+    feed = PageData(Trace.of(recorded("mgm")))
     monkeypatch.setattr("robochoc.sniffer.export.MOST_CHARACTERS", 3_000)
     part = drawable(feed, range(len(feed.trace.messages.t)))
     assert 20 < len(part) <= MOST_ARROWS / 4

@@ -9,7 +9,7 @@ import pytest
 
 from robochoc.cli.options.order import NAMES
 from robochoc.formats import InvalidInputError, read_team, write_team
-from robochoc.formats.order import read_order
+from robochoc.formats.order_file import read_order
 from robochoc.journal.journal import read_journal
 from robochoc.model.orders import Order
 from tests.support.journal_entries import entries_of

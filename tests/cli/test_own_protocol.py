@@ -168,9 +168,9 @@ FEED = """
 import json, sys
 from pathlib import Path
 from robochoc.journal.journal import read_journal
-from robochoc.sniffer.feed import Feed
+from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.trace import Trace
-feed = Feed(Trace.of(read_journal(Path(sys.argv[1]).read_bytes())))
+feed = PageData(Trace.of(read_journal(Path(sys.argv[1]).read_bytes())))
 about, details = json.loads(feed.about()), json.loads(feed.details(0))
 (improve,) = [kind for kind in about["kinds"] if kind["name"] == "Improve"]
 print(improve["name"], improve["performative"] + ",", improve["why"])

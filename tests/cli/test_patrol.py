@@ -6,8 +6,8 @@ import pytest
 
 from robochoc.formats import read_team
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Kind
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.model.problem import ProblemKind
+from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.cost_problems import least_cost
 from tests.support.program import ROOT
@@ -19,7 +19,7 @@ BEST = {"lead": 3, "north": 2, "south": 1, "west": 2}
 
 def test_the_example_has_soft_and_hard_constraints() -> None:
     team = read_team(PATROL)
-    assert team.kind is Kind.DISWCSP
+    assert team.kind is ProblemKind.DISWCSP
     assert least_cost(team) == 6
 
 

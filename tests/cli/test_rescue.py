@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.formats import read_robot, read_team
-from robochoc.model.change import changed_by
+from robochoc.model.change import team_after_events
 from robochoc.model.problem import AddAgent, AddConstraint, RemoveAgent, RemoveConstraint, RemoveValue
 from tests.support.journal_entries import entries_of
 from tests.support.program import ROOT, robochoc
@@ -37,7 +37,7 @@ def test_the_story() -> None:
     assert kinds == [[RemoveAgent], [AddAgent], [RemoveValue, RemoveValue], [RemoveConstraint, AddConstraint]]
     assert "East" in team
     assert "Spare" not in team
-    last = changed_by(team, len(team.scenario))
+    last = team_after_events(team, len(team.scenario))
     assert last.order == ("Lead", "North", "South", "West", "Medic", "Relay", "Spare")
     assert last["Spare"] == read_robot(RESCUE / "late" / "Spare.xml")
 

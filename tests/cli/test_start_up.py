@@ -13,7 +13,7 @@ from tests.support.program import ROOT
 
 HEAVY = {
     "numpy", "meshcat", "tornado", "zenoh", "cryptography", "pycsp3", "jpype", "importlib.metadata", "tomllib",
-    "robochoc.solver.ace", "robochoc.solver.central", "robochoc.run.second_opinion",
+    "robochoc.solver.ace", "robochoc.solver.central", "robochoc.verification.second_opinion",
     "robochoc.communication.simulator.channel", "robochoc.sniffer", "robochoc.flight",
     "robochoc.communication.network", "robochoc.view", "robochoc.ros", "robochoc.replay",
 }  # fmt: skip

@@ -12,17 +12,17 @@ import pytest
 
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.orders import in_order
+from robochoc.model.orders import with_order
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Robot, Team
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver import compiled
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import CentralSolver
 from robochoc.solver.compile import Compiler
-from robochoc.solver.domain import CompiledDomain, compiled_domain
-from robochoc.verification.checker import objections
+from robochoc.solver.domain import CompiledDomain, compile_domain
+from robochoc.verification.checker import violations
 from tests.support.complex_problems import random_complex_team
 from tests.support.loose_problems import any_order, loosened
 from tests.support.problems import solutions
@@ -58,7 +58,7 @@ def solved_by_brute_force(team: Team, chance: Random) -> Verdict:
     result = Simulation(compiled_by_brute_force(team), protocol_named("abt"), schedule).run(60)
     if result.verdict is Verdict.SOLUTION:
         assignment = {name: value for own in result.assignments.values() for name, value in own.items()}
-        assert not list(objections(team, assignment))
+        assert not list(violations(team, assignment))
     return result.verdict
 
 
@@ -70,9 +70,9 @@ def test_domains_and_abt_agree_with_brute_force(batch: int) -> None:
     for _ in range(150):
         team = random_complex_team(chance)
         for robot in team.robots:
-            check_domain(robot, compiled_domain(robot, brute_force))
+            check_domain(robot, compile_domain(robot, brute_force))
         team = loosened(team, chance)
-        verdict = solved_by_brute_force(in_order(team, any_order(team, chance)), chance)
+        verdict = solved_by_brute_force(with_order(team, any_order(team, chance)), chance)
         assert verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION), team
         seen[verdict] += 1
     assert min(seen[Verdict.SOLUTION], seen[Verdict.NO_SOLUTION]) > 20, seen

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from robochoc.communication.run_result import RunResult
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE, Team
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 from tests.support.loose_problems import any_order, loosened, minimum_cost
 from tests.support.problems import ON_ONE_MACHINE, random_team, solutions
 from tests.support.random_options import MAX_MESSAGES, random_options
@@ -123,7 +123,7 @@ def test_withdrawing_is_not_asked_of_a_team_that_has_a_solution() -> None:
         pass
     outcome = solve(team, Options(runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL))
     assert outcome.withdrawn == ()
-    assert not list(objections(team, outcome.assignment))
+    assert not list(violations(team, outcome.assignment))
 
 
 def test_a_result_joins_clocks_by_the_largest() -> None:

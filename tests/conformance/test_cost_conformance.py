@@ -10,7 +10,7 @@ import pytest
 
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import UnsupportedError

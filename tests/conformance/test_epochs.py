@@ -15,16 +15,16 @@ from robochoc.model.problem import (
     AddConstraint,
     AddValue,
     Domain,
-    Event,
     Parent,
     RemoveAgent,
     RemoveConstraint,
     RemoveValue,
     Robot,
+    ScenarioEvent,
     Team,
     Variable,
 )
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.loose_problems import loosened
 from tests.support.problems import ON_ONE_MACHINE, random_team, solutions, team_of
@@ -92,13 +92,13 @@ def test_epochs_follow_an_order_that_is_asked_for() -> None:
 
 
 def test_the_judge_goes_through_the_same_epochs() -> None:
-    team = pair(Event((AddValue("B", 2),)), Event((RemoveValue("B", 2),)))
+    team = pair(ScenarioEvent((AddValue("B", 2),)), ScenarioEvent((RemoveValue("B", 2),)))
     outcome = solve(team, Options(protocol="central", cache=False))
     assert [epoch.verdict for epoch in outcome.epochs] == ["no-solution", "solution", "no-solution"]
 
 
 def test_second_opinions_are_asked_for_in_each_epoch() -> None:
-    team = pair(Event((AddValue("B", 2),)), Event((RemoveValue("B", 2),)))
+    team = pair(ScenarioEvent((AddValue("B", 2),)), ScenarioEvent((RemoveValue("B", 2),)))
     outcome = solve(team, replace(SIMULATED, verify=True, cache=False))
     assert [epoch.verified for epoch in outcome.epochs] == [True, True, True]
 
@@ -112,8 +112,8 @@ def verdicts(outcome: Outcome) -> list[str]:
 
 def test_a_constraint_goes_and_another_comes() -> None:
     team = pair(
-        Event((RemoveConstraint("RB", "RA", "C"),)),
-        Event((AddConstraint("RB", "RA", differ("A", "B", "again")),)),
+        ScenarioEvent((RemoveConstraint("RB", "RA", "C"),)),
+        ScenarioEvent((AddConstraint("RB", "RA", differ("A", "B", "again")),)),
     )
     assert verdicts(solve(team, SIMULATED)) == ["no-solution", "solution", "no-solution"]
 
@@ -124,14 +124,14 @@ def test_a_robot_leaves_and_another_joins() -> None:
         (Variable("C", Domain("D", (range(1, 2),))),),
         parents=(Parent("RB", (differ("B", "C"),)),),
     )
-    team = pair(Event((RemoveAgent("RA"),)), Event((AddAgent(newcomer),)))
+    team = pair(ScenarioEvent((RemoveAgent("RA"),)), ScenarioEvent((AddAgent(newcomer),)))
     outcome = solve(team, SIMULATED)
     assert verdicts(outcome) == ["no-solution", "solution", "no-solution"]
     assert [epoch.robots for epoch in outcome.epochs] == [("RA", "RB"), ("RB",), ("RB", "RC")]
 
 
 def test_a_verdict_that_still_stands_costs_nothing() -> None:
-    team = pair(Event((AddConstraint("RB", "RA", differ("A", "B", "more")),)))
+    team = pair(ScenarioEvent((AddConstraint("RB", "RA", differ("A", "B", "more")),)))
     first, second = solve(team, SIMULATED).epochs
     assert first.verdict is second.verdict is Verdict.NO_SOLUTION
     assert second.metrics.messages == {}
@@ -141,7 +141,7 @@ def test_a_verdict_that_still_stands_costs_nothing() -> None:
 
 
 def test_a_change_that_hurts_nobody_costs_nothing() -> None:
-    team = pair(Event((AddValue("A", 3),)), values=2)
+    team = pair(ScenarioEvent((AddValue("A", 3),)), values=2)
     second = solve(team, SIMULATED).epochs[1]
     assert second.verdict is Verdict.SOLUTION
     assert second.metrics.messages == {}
@@ -150,7 +150,7 @@ def test_a_change_that_hurts_nobody_costs_nothing() -> None:
 def test_an_event_in_mid_run_ends_the_epoch_without_a_verdict() -> None:
     domains = dict.fromkeys("ABCDE", range(1, 4))
     constraints = [differ(left, right) for left in "ABCDE" for right in "ABCDE" if left < right]
-    team = replace(team_of(domains, constraints), scenario=(Event((RemoveAgent("RE"),), after=8),))
+    team = replace(team_of(domains, constraints), scenario=(ScenarioEvent((RemoveAgent("RE"),), after=8),))
     for runtime in ON_ONE_MACHINE:
         first, second = solve(team, replace(SIMULATED, runtime=runtime, timeout=60)).epochs
         assert first.verdict is Verdict.UNKNOWN
@@ -159,7 +159,7 @@ def test_an_event_in_mid_run_ends_the_epoch_without_a_verdict() -> None:
 
 
 def test_an_event_in_mid_run_comes_at_the_end_if_there_are_not_so_many_messages() -> None:
-    team = pair(Event((RemoveAgent("RA"),), after=1000), values=2)
+    team = pair(ScenarioEvent((RemoveAgent("RA"),), after=1000), values=2)
     assert verdicts(solve(team, SIMULATED)) == ["solution", "solution"]
 
 

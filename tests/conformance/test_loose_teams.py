@@ -10,7 +10,7 @@ import pytest
 
 from robochoc.model.orders import Order
 from robochoc.model.outcome import Verdict
-from robochoc.run.orchestrator import Options, Runtime
+from robochoc.run import Options, Runtime
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.loose_problems import check_against_brute_force, every_order, loose_team, turned_interface
 from tests.support.random_options import random_schedule

@@ -16,7 +16,7 @@ from robochoc.model.problem import Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.registry import protocol_named, protocol_names
-from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.verification.objective import withdrawal_cost
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
@@ -36,7 +36,9 @@ def name_of(protocol: type[Protocol]) -> str:
     return protocol.__name__
 
 
-def strangers(team: Team, protocol: type[Protocol], seed: int, brief: RunParameters = NO_BRIEF) -> set[tuple[str, str]]:
+def strangers(
+    team: Team, protocol: type[Protocol], seed: int, brief: RunParameters = DEFAULT_PARAMETERS
+) -> set[tuple[str, str]]:
     """Who has written to whom without sharing a constraint."""
     known = acquaintances(profiles_of(team))
     found = set()
@@ -72,7 +74,9 @@ def test_who_stays_within_never_writes_to_a_stranger(protocol: type[Protocol]) -
         for team in random_teams(seed, costs=protocol.traits.costs):
             assert strangers(team, protocol, seed) == set()
             if protocol.traits.costs:  # the last value is to step aside
-                assert strangers(team, protocol, seed, RunParameters(seed, aside=withdrawal_cost(team))) == set()
+                assert (
+                    strangers(team, protocol, seed, RunParameters(seed, withdrawal_cost=withdrawal_cost(team))) == set()
+                )
 
 
 @pytest.mark.parametrize("protocol", BEYOND, ids=name_of)

@@ -20,7 +20,7 @@ from robochoc.formats import InvalidInputError, read_team, write_team
 from robochoc.formats.result import ResultError, read_result, result_json
 from robochoc.journal.blocks import BEGINNING, PREAMBLE, JournalDamagedError, Unframer, framed
 from robochoc.journal.journal import Header, JournalError, Recorder, lines_of, read_journal
-from robochoc.model.outcome import Epoch, Metrics, Outcome, PseudoTreeNode, Verdict
+from robochoc.model.outcome import EpochOutcome, Metrics, Outcome, PseudoTreeNode, Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.dpop import DPOP
@@ -164,7 +164,7 @@ def spoilt_scenario(chance: Random, content: bytes) -> bytes:
 def results() -> Sequence[bytes]:
     """Results with and without all that can be in one."""
     counts = Metrics({"Ok": 3, "Nogood": 1}, 90, 7, 20, 0.5, 0.25, 4096, 1.5)
-    epoch = Epoch(Verdict.SOLUTION, ("A", "B"), assignment={"V": 1}, cost=2, metrics=counts, lost=("B",))
+    epoch = EpochOutcome(Verdict.SOLUTION, ("A", "B"), assignment={"V": 1}, cost=2, metrics=counts, lost=("B",))
     whole = Outcome(
         *("four", "abt", "simulator", 7, Verdict.OPTIMAL, {"V1.1": 1, "V1.2": -3}, 12.0, ("Robot3",)),
         metrics=counts,

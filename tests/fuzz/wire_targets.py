@@ -61,7 +61,7 @@ from robochoc.services.facilitator import handle, subscribe
 from robochoc.services.identifier import AgentIdentifier, identifier_on
 from robochoc.services.sl import Function, df_on, request
 from robochoc.sniffer.acl import ACLError, ACLMessage, parse, text
-from robochoc.solver.explanation import Known
+from robochoc.solver.explanation import KeyedConstraint
 from tests.fuzz.harness import Target, assert_said
 from tests.fuzz.mutations import one_of, spoilt_bytes, spoilt_msgpack, spoilt_text
 from tests.support.complex_problems import random_complex_team
@@ -226,7 +226,7 @@ def _introduce(profile: Profile) -> bool:
 def records() -> Sequence[bytes]:
     """Constraints as they travel."""
     found = [
-        record_of(Known(f"{robot.name}<{one.name}", one))
+        record_of(KeyedConstraint(f"{robot.name}<{one.name}", one))
         for robot in _robots()
         for one in (*robot.private, *robot.shared)
     ]

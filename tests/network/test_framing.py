@@ -46,10 +46,10 @@ from robochoc.communication.network.framing import (
 from robochoc.communication.network.profile import Profile
 from robochoc.journal.events import Received
 from robochoc.model.outcome import Metrics, PseudoTreeNode
-from robochoc.model.problem import Kind
+from robochoc.model.problem import ProblemKind
 from robochoc.protocols.findings import Best, Findings, Trail
 
-PROFILE = Profile("R1", Kind.DISCSP, ("R0",), (), {"X": ((1, 3), (5, 5))}, {}, 1, 0, ("/R1/goal",))
+PROFILE = Profile("R1", ProblemKind.DISCSP, ("R0",), (), {"X": ((1, 3), (5, 5))}, {}, 1, 0, ("/R1/goal",))
 OUTSIDE = (Register, Welcome, Denied, Joined, Ask, Told, Sniff, Sniffable)
 WORDS = get_args(ToMaster), get_args(ToRobot), get_args(ToPeer)
 

@@ -11,8 +11,8 @@ import pytest
 
 from robochoc.formats import read_team
 from robochoc.model.outcome import Verdict
-from robochoc.run.orchestrator import Options, Runtime, solve
-from robochoc.verification.checker import objections
+from robochoc.run import Options, Runtime, solve
+from robochoc.verification.checker import violations
 from tests.support.deployments import PAIR, TRIANGLE, Deployment, Program, ended, one_line, written
 from tests.support.journal_entries import entries_of
 from tests.support.program import ROOT
@@ -146,7 +146,7 @@ def test_whom_the_directory_knows_while_the_master_waits(site: Deployment) -> No
     assert words.output.startswith("((result")
     assert f"RA@{site.place}/robochoc" in words.output
     table = asked("--search", "topic=/nowhere")
-    assert (table.status(), table.output) == (0, "nobody that matches\n")
+    assert (table.status(), table.output) == (0, "no agent matches\n")
 
     watcher = asked("--watch", "--patience", 1)
     watcher.wait_to_print("RB@")
@@ -167,7 +167,7 @@ def test_what_a_parent_leaves_out_its_childs_constraints_say(site: Deployment) -
     master = site.master("--team", files, "--json")
     robots = site.robots(files, tokens)
     assert master.status() == 0, master.errors
-    assert not list(objections(read_team(files), master.object["assignment"]))
+    assert not list(violations(read_team(files), master.object["assignment"]))
     ended(robots)
 
 

@@ -11,9 +11,9 @@ import pytest
 from robochoc.communication.network.members import Members, RegistrationRefusedError
 from robochoc.communication.network.profile import Profile, Ranges
 from robochoc.formats import PREDEFINED
-from robochoc.model.problem import Constraint, Kind, Predicate
+from robochoc.model.problem import Constraint, Predicate, ProblemKind
 from robochoc.protocols.traits import Traits
-from robochoc.solver.agent_problem import NO_BRIEF
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import random_team, team_of
 from tests.support.sparse_teams import profiles_of
@@ -102,7 +102,7 @@ def test_who_comes_again_is_not_held_against_its_former_life() -> None:
     members = Members()
     join(members, RA)
     members.robots[RA].gone = 1.0
-    other = msgspec.structs.replace(PROFILES[RA], children=(), variables={}, kind=Kind.DISWCSP)
+    other = msgspec.structs.replace(PROFILES[RA], children=(), variables={}, kind=ProblemKind.DISWCSP)
     assert members.register(RA, other, "second").profile is other
 
 
@@ -129,7 +129,7 @@ def test_complete_when_all_neighbours_are_there() -> None:
 
 
 def test_complete_when_so_many_are_there_and_all_their_neighbours() -> None:
-    lonely = Profile("RZ", Kind.DISCSP, (), (), {}, {}, 1, 0, ())
+    lonely = Profile("RZ", ProblemKind.DISCSP, (), (), {}, {}, 1, 0, ())
     members = Members(number=2)
     members.register("RZ", lonely, "first").joined = True
     assert not members.awaited
@@ -159,8 +159,8 @@ def test_an_open_team_misses_who_is_given_up() -> None:
 
 
 def looked_at() -> dict[str, Profile]:
-    upper = Profile("A", Kind.DISCSP, (), ("B",), {"X": ((1, 2),)}, {"B": ("Y", "Z")}, 1, 0, ())
-    lower = Profile("B", Kind.DISCSP, ("A",), (), {"Y": ((1, 2),)}, {}, 1, 0, ())
+    upper = Profile("A", ProblemKind.DISCSP, (), ("B",), {"X": ((1, 2),)}, {"B": ("Y", "Z")}, 1, 0, ())
+    lower = Profile("B", ProblemKind.DISCSP, ("A",), (), {"Y": ((1, 2),)}, {}, 1, 0, ())
     return {"A": upper, "B": lower}
 
 
@@ -172,7 +172,7 @@ def test_variables_that_a_parent_looks_at_are_shown() -> None:
     assert members.unseen() == {"B": ("Z",)}
     members.robots["B"].also["Z"] = ((3, 4),)
     assert members.unseen() == {}
-    task = members.tasks(1, "abt", Traits(), NO_BRIEF)["A"]
+    task = members.tasks(1, "abt", Traits(), DEFAULT_PARAMETERS)["A"]
     assert task.interfaces == {"A": ("X",), "B": ("Y", "Z")}
     assert task.domains["Z"] == ((3, 4),)
 
@@ -180,7 +180,7 @@ def test_variables_that_a_parent_looks_at_are_shown() -> None:
 def test_who_is_no_child_is_not_asked_to_show_anything() -> None:
     members = Members()
     members.register("B", looked_at()["B"], "first")
-    spy = Profile("S", Kind.DISCSP, (), (), {}, {"B": ("Secret",)}, 1, 0, ())
+    spy = Profile("S", ProblemKind.DISCSP, (), (), {}, {"B": ("Secret",)}, 1, 0, ())
     assert "looks at variables of B, which is no child" in refused(members, "S", spy)
     assert members.unseen() == {}
 
@@ -193,7 +193,7 @@ def robot(
     wants: tuple[str, ...] = (),
 ) -> Profile:
     variables: dict[str, Ranges] = {shown: ((1, 2),)} if shown else {}
-    return Profile(name, Kind.DISCSP, parents, children, variables, {}, 1, 0, (), wants)
+    return Profile(name, ProblemKind.DISCSP, parents, children, variables, {}, 1, 0, (), wants)
 
 
 def test_what_a_childs_constraints_look_at_is_asked_for_whether_its_parent_says_so_or_not() -> None:
@@ -207,7 +207,7 @@ def test_what_a_childs_constraints_look_at_is_asked_for_whether_its_parent_says_
     assert members.show("A", {"X": ((1, 3),)}) == ""
     assert not members.unseen()
     assert not list(members.strangers())
-    assert members.tasks(1, "abt", Traits(), NO_BRIEF)["B"].interfaces == {"A": ("X",), "B": ("Y",)}
+    assert members.tasks(1, "abt", Traits(), DEFAULT_PARAMETERS)["B"].interfaces == {"A": ("X",), "B": ("Y",)}
 
 
 def test_two_that_show_one_variable_are_both_named() -> None:

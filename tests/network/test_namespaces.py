@@ -12,7 +12,7 @@ import pytest
 
 from robochoc.formats import write_team
 from robochoc.model.problem import Constraint
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from tests.support.deployments import Deployment, Program, ended
 from tests.support.journal_entries import entries_of
 from tests.support.namespaces import DELAY_S, TUN, Link, bad_line, inside, namespaces, route, veth, why_not

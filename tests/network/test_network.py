@@ -19,7 +19,7 @@ from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooLargeError
-from robochoc.verification.checker import cost, objections
+from robochoc.verification.checker import assignment_cost, violations
 from tests.support.clocks import once
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import least_cost, random_cost_team
@@ -58,7 +58,7 @@ def agrees(
     assert result.verdict is (Verdict.NO_SOLUTION if truth is None else Verdict.SOLUTION), (team, protocol)
     assert not result.lost
     if truth is not None:
-        assert not list(objections(team, assignment_of(result)))
+        assert not list(violations(team, assignment_of(result)))
         assert checked == (True, 0.0)
     return result.verdict
 
@@ -109,7 +109,7 @@ def test_costs(protocol: str, seed: int) -> None:
         assert result.verdict is Verdict.NO_SOLUTION
         return
     assert result.verdict is Verdict.SOLUTION, "whether that is optimal is for who asked to say"
-    assert cost(team, assignment_of(result)) == least
+    assert assignment_cost(team, assignment_of(result)) == least
     assert checked == (True, least)
 
 
@@ -120,9 +120,9 @@ def test_local_search_ends_by_itself() -> None:
         result = network.search(TIMEOUT_S)
         held, told = network.master.checked(result.assignments)
     assert set(result.assignments) == set(team.order)
-    assert (cost(team, assignment_of(result)) < INFINITE) is held
+    assert (assignment_cost(team, assignment_of(result)) < INFINITE) is held
     if held:
-        assert cost(team, assignment_of(result)) == told
+        assert assignment_cost(team, assignment_of(result)) == told
 
 
 @pytest.mark.parametrize("filters", [("signed", "sealed"), pytest.param((), marks=pytest.mark.slow)])
@@ -159,7 +159,7 @@ def test_what_the_robots_check_is_what_the_checker_checks() -> None:
     with LocalNetwork(CHAIN, protocol_named("abt")) as network:
         result = network.search(TIMEOUT_S)
         wrong = {**result.assignments, "RX0": {"X0": result.assignments["RX1"]["X1"]}}
-        assert list(objections(CHAIN, {name: v for values in wrong.values() for name, v in values.items()}))
+        assert list(violations(CHAIN, {name: v for values in wrong.values() for name, v in values.items()}))
         assert network.master.checked(wrong) == (False, 0.0)
 
 

@@ -15,10 +15,10 @@ from robochoc.journal.events import AnyEvent, Lost, Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint
 from robochoc.run.registry import protocol_named
-from robochoc.run.scenario import Played, ScenarioRun
+from robochoc.run.scenario import FinishedEpoch, ScenarioRun
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 from tests.support.complex_problems import complex_team
 from tests.support.loose_problems import untold_interface
 from tests.support.paused_abt import PausedABT
@@ -46,18 +46,18 @@ def test_those_who_are_left_go_on_with_the_values_that_they_had(tmp_path: Path) 
         events.append(event)
 
     brief = RunParameters(settings={"file": str(go)})
-    journey = ScenarioRun(TEAM, None, CompiledTeam, lambda: None, brief=brief)
-    played: list[Played] = []
+    journey = ScenarioRun(TEAM, None, CompiledTeam, lambda: None, parameters=brief)
+    played: list[FinishedEpoch] = []
     with LocalNetwork(
         journey.compiled(), PausedABT, observer=observe, conditions=NetworkSettings(survive=True), brief=brief
     ) as network:
-        for one in journey.go(network, lambda _: None):
+        for one in journey.epochs(network, lambda _: None):
             played.append(one)
             shown = {name: member.robot.interface for name, member in network.master.members.robots.items()}
-            assert shown == {robot.name: robot.interface for robot in one.compiled.team.robots}
+            assert shown == {robot.name: robot.interface for robot in one.epoch.team.robots}
     first, second = played
     assert list(first.result.lost) == ["B"]
-    assert second.compiled.team["V"].interface == ("v", "w")
+    assert second.epoch.team["V"].interface == ("v", "w")
     assert second.result.verdict is Verdict.SOLUTION
     assert second.result.assignments["V"]["v"] != second.result.assignments["A"]["a"]
 
@@ -69,4 +69,4 @@ def test_who_is_asked_to_show_more_is_not_misread() -> None:
     with LocalNetwork(team, protocol_named("abt")) as network:
         result = network.search(60)
     assert result.verdict is Verdict.SOLUTION
-    assert not list(objections(team, {**result.assignments["A"], **result.assignments["B"]}))
+    assert not list(violations(team, {**result.assignments["A"], **result.assignments["B"]}))

@@ -32,7 +32,7 @@ from robochoc.communication.network.quotas import Kept, Share
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.shared import PredicateRecord, SharedRecord
 from robochoc.communication.network.transport import Transport
-from robochoc.model.problem import INFINITE, Model
+from robochoc.model.problem import INFINITE, ConstraintModel
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.awc import AWC
 from robochoc.protocols.protocol import Protocol
@@ -103,7 +103,9 @@ def test_a_gap_is_told_once_a_search_of_each() -> None:
 
 
 def copy(scope: tuple[str, ...] = ("B", "C"), body: str = "ne(X, Y)") -> SharedRecord:
-    return SharedRecord("RC<RB:C", "C", PredicateRecord("p", ("X", "Y"), body), scope, scope, Model.TKC, INFINITE)
+    return SharedRecord(
+        "RC<RB:C", "C", PredicateRecord("p", ("X", "Y"), body), scope, scope, ConstraintModel.TKC, INFINITE
+    )
 
 
 def copies(sender: str, *records: SharedRecord, number: int = 1) -> Arrived:

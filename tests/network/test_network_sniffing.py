@@ -39,11 +39,11 @@ import json, os, signal, sys, time
 import zenoh
 from robochoc.authority.identity import Identity, IdentityTexts
 from robochoc.communication.network.access import journal_key
-from robochoc.communication.network.transport import Post
+from robochoc.communication.network.transport import Transport
 from robochoc.communication.network.journal_server import question
 
 texts, endpoint, run = json.loads(sys.stdin.readline())
-post = Post(endpoint, Identity.of(IdentityTexts(*map(str.encode, texts))), watch=())
+post = Transport(endpoint, Identity.of(IdentityTexts(*map(str.encode, texts))), watch=())
 while not post.ask(journal_key("Eye"), question(run, 0), 1):
     time.sleep(0.1)
 waited_for = {"congestion_control": zenoh.CongestionControl.BLOCK, "priority": zenoh.Priority.REAL_TIME}

@@ -18,7 +18,7 @@ from robochoc.communication.network.transport import Transport
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Kind
+from robochoc.model.problem import ProblemKind
 from robochoc.protocols.abt import Ok
 from tests.support.network_runs import NetworkRun, letter
 from tests.support.paused_abt import CHAIN, TRIANGLE, PausedABT
@@ -64,7 +64,7 @@ LIES: dict[str, Callable[[Profile], Profile]] = {
     "is no name": lambda p: changed(p, variables={"../x": ((0, 1),)}),
     "it names itself": lambda p: changed(p, children=("RX3",)),
     "too many neighbours": lambda p: changed(p, children=tuple(f"N{i}" for i in range(20_000))),
-    "a team is one or the other": lambda p: changed(p, kind=Kind.DISWCSP),
+    "a team is one or the other": lambda p: changed(p, kind=ProblemKind.DISWCSP),
 }
 
 

@@ -17,7 +17,7 @@ from robochoc.communication.network.search_state import SearchState
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.formats.result import read_result, result_json
-from robochoc.model.outcome import ALL_ROBOTS, Metrics, Outcome, PseudoTreeNode, Thoroughness, Verdict
+from robochoc.model.outcome import ALL_ROBOTS, CheckCounts, Metrics, Outcome, PseudoTreeNode, Verdict
 from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.afc import AFC
@@ -27,7 +27,7 @@ from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.sfb import SFB
 from robochoc.protocols.traits import Traits
-from robochoc.run.networked.lead import claimed
+from robochoc.run.networked.machines import claimed
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support import traitors
 from tests.support.in_memory_network import InMemoryNetwork
@@ -167,7 +167,7 @@ SAID = Outcome("t", "abt", "network", 0, Verdict.NO_SOLUTION, witness="RB")
             "t: solution for all 3 robots, checked against every constraint",
         ),
         (
-            {"verdict": Verdict.SOLUTION, "verified": True, "assignment": VALUES, "checked": Thoroughness(1, 1)},
+            {"verdict": Verdict.SOLUTION, "verified": True, "assignment": VALUES, "checked": CheckCounts(1, 1)},
             None,
             "t: solution for all 3 robots, checked; by their owner alone: 1 of 2 constraints",
         ),

@@ -32,10 +32,10 @@ from robochoc.communication.network.profile import (
 )
 from robochoc.formats import read_team
 from robochoc.formats.extension import MAX_VALUES
-from robochoc.model.change import without
-from robochoc.model.problem import Domain, Kind, Robot, Team
+from robochoc.model.change import without_robots
+from robochoc.model.problem import Domain, ProblemKind, Robot, Team
 from robochoc.protocols.traits import Traits
-from robochoc.solver.agent_problem import NO_BRIEF, AgentProblem, RunParameters, agent_problems
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters, agent_problems
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
 from robochoc.solver.domain import CompiledDomain
 from tests.support.complex_problems import random_complex_team
@@ -93,7 +93,7 @@ def comparable(part: AgentProblem) -> AgentProblem:
     return part._replace(
         own=part.own.relinked(replace(part.robot, shown=())),
         domains=domains,
-        secretive=tuple(sorted(part.secretive)),
+        pkc_holders=tuple(sorted(part.pkc_holders)),
         interfaces=dict(part.interfaces),
         order=tuple(part.order),
     )
@@ -120,7 +120,7 @@ def test_robots_of_files_know_what_the_whole_team_would_tell_them(folder: Path) 
 @given(team=random_teams)
 @settings(max_examples=120, deadline=None)
 def test_robots_know_what_the_whole_team_would_tell_them(team: Team) -> None:
-    assert_same(team, registered(team), team.robots, NO_BRIEF)
+    assert_same(team, registered(team), team.robots, DEFAULT_PARAMETERS)
 
 
 @given(team=random_teams, data=st.data())
@@ -129,14 +129,14 @@ def test_robots_left_behind_know_what_a_smaller_team_would_tell_them(team: Team,
     gone = data.draw(st.sets(st.sampled_from(team.order), max_size=len(team.order) - 1))
     members = registered(team)
     members.remove(gone)
-    left = without(team, gone)
+    left = without_robots(team, gone)
     assert members.order == left.order
     expected = agent_problems(CompiledTeam(left, nothing_of), tree=True)
-    for name, task in members.tasks(2, "abt", TREE, NO_BRIEF).items():
+    for name, task in members.tasks(2, "abt", TREE, DEFAULT_PARAMETERS).items():
         known = part_of(team[name], task)
         assert replace(known.robot, shown=()) == replace(left[name], shown=())
         assert known.links == expected[name].links
-        assert sorted(known.secretive) == sorted(expected[name].secretive)
+        assert sorted(known.pkc_holders) == sorted(expected[name].pkc_holders)
         assert set(known.interfaces) == set(expected[name].interfaces)
         for other, shown in expected[name].interfaces.items():  # what others have shown once they go on showing
             assert set(shown) <= set(known.interfaces[other]) <= {v.name for v in team[other].variables}
@@ -182,7 +182,7 @@ def test_a_profile_tells_nothing_of_what_nobody_sees() -> None:
 
 # What cannot be
 
-GOOD = Profile("R1", Kind.DISCSP, ("R0",), ("R2",), {"X": ((1, 3), (5, 5))}, {"R2": ("Z",)}, 1, 4, ("/goal",))
+GOOD = Profile("R1", ProblemKind.DISCSP, ("R0",), ("R2",), {"X": ((1, 3), (5, 5))}, {"R2": ("Z",)}, 1, 4, ("/goal",))
 
 
 def changed(**news: object) -> Profile:
@@ -258,8 +258,8 @@ def test_any_ranges_are_a_domain_or_refused(ranges: tuple[tuple[int, int], ...])
 
 
 def two(**news: object) -> dict[str, Profile]:
-    upper = Profile("A", Kind.DISCSP, (), ("B",), {"X": ((1, 2),)}, {}, 1, 0, ())
-    lower = Profile("B", Kind.DISCSP, ("A",), (), {"Y": ((1, 2),)}, {}, 1, 0, ())
+    upper = Profile("A", ProblemKind.DISCSP, (), ("B",), {"X": ((1, 2),)}, {}, 1, 0, ())
+    lower = Profile("B", ProblemKind.DISCSP, ("A",), (), {"Y": ((1, 2),)}, {}, 1, 0, ())
     return {"A": upper, "B": msgspec.structs.replace(lower, **news)}
 
 
@@ -274,7 +274,7 @@ def test_profiles_that_agree_do_not_contradict() -> None:
         (two(variables={"X": ((1, 1),)}), "the variable X is A's, and B's too"),
         (two(parents=()), "A calls B its child, which does not list it as a parent"),
         (two(parents=(), children=("A",)), "B calls A its child, which does not list it as a parent"),
-        (two(kind=Kind.DISWCSP), "A is a DisCSP and B is a DisWCSP: a team is one or the other"),
+        (two(kind=ProblemKind.DISWCSP), "A is a DisCSP and B is a DisWCSP: a team is one or the other"),
     ],
     ids=["variable", "no parent", "both above", "kinds"],
 )
@@ -290,7 +290,7 @@ def test_a_parent_that_knows_no_child_contradicts() -> None:
 
 def test_parents_in_a_circle_contradict() -> None:
     around = {
-        name: Profile(name, Kind.DISCSP, (above,), (below,), {}, {}, 1, 0, ())
+        name: Profile(name, ProblemKind.DISCSP, (above,), (below,), {}, {}, 1, 0, ())
         for above, name, below in (("C", "A", "B"), ("A", "B", "C"), ("B", "C", "A"))
     }
     (why,) = contradictions(around)

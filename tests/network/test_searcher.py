@@ -33,9 +33,9 @@ from robochoc.protocols.awc import AWC
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.syncbb import BestPath, Path, SyncBB
-from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
-from robochoc.solver.explanation import held
+from robochoc.solver.explanation import held_above
 from tests.support.problems import team_of
 from tests.support.sparse_teams import profiles_of
 
@@ -68,7 +68,7 @@ def chain(cost: float = INFINITE) -> Team:
     return team_of(dict.fromkeys("ABC", (1, 2)), [*constraints, Constraint("P", PREDEFINED["lt"], ("B", 9), ("B", 9))])
 
 
-def tasks(team: Team, protocol: type[Protocol], brief: RunParameters = NO_BRIEF) -> dict[str, Task]:
+def tasks(team: Team, protocol: type[Protocol], brief: RunParameters = DEFAULT_PARAMETERS) -> dict[str, Task]:
     members = Members()
     for name, profile in profiles_of(team).items():
         members.register(name, profile, "visit")
@@ -76,7 +76,10 @@ def tasks(team: Team, protocol: type[Protocol], brief: RunParameters = NO_BRIEF)
 
 
 def searcher(
-    around: Surroundings, protocol: type[Protocol] = ABT, brief: RunParameters = NO_BRIEF, team: Team | None = None
+    around: Surroundings,
+    protocol: type[Protocol] = ABT,
+    brief: RunParameters = DEFAULT_PARAMETERS,
+    team: Team | None = None,
 ) -> Searcher:
     """RB's."""
     team = team or chain()
@@ -114,7 +117,7 @@ def test_where_all_know_a_constraint_its_holder_tells_and_waits_to_be_told() -> 
     assert [record.scope for record in msgspec.msgpack.decode(word.content, type=list[SharedRecord])] == [("A", "B")]
     one.search()
     assert len(around.sent) == 1  # not ready: there is nothing to begin
-    one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held(chain()["RC"])))))
+    one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held_above(chain()["RC"])))))
     one.learn("RC", b"\x90")
     assert around.said == [Ready(1)]
 
@@ -268,7 +271,7 @@ def test_checking_adds_up_what_its_constraints_charge() -> None:
 
 def test_who_steps_aside_answers_for_nothing() -> None:
     around = Around()
-    one = searcher(around.surroundings(), brief=RunParameters(aside=1))
+    one = searcher(around.surroundings(), brief=RunParameters(withdrawal_cost=1))
     one.prepare()
     assert one.judged({"A": 1, "C": 1}) == Checked(1, allowed=True, cost=0)
 
@@ -313,7 +316,7 @@ def test_of_copies_it_checks_no_more_than_can_be_told(monkeypatch: pytest.Monkey
     around = Around()
     one = searcher(around.surroundings(), AWC)
     one.prepare()
-    one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held(chain()["RC"])))))
+    one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held_above(chain()["RC"])))))
     one.search()
     copy = Judged("RC", ("B", "C"), 1, 0)
     assert one.judged({"A": 2, "C": 2}).copies == (copy,)

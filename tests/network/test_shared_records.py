@@ -23,8 +23,8 @@ from robochoc.communication.network.shared import (
 )
 from robochoc.formats import PREDEFINED
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.problem import INFINITE, Constraint, Model, Semantics, Team
-from robochoc.solver.explanation import Known, held, held_below
+from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Semantics, Team
+from robochoc.solver.explanation import KeyedConstraint, held_above, held_below
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.pkc_problems import random_pkc_team
@@ -42,11 +42,11 @@ TABLE = RelationRecord("t", 2, Semantics.SOFT, ((1, 2), (2, 1)), (3, INFINITE), 
 
 
 def shared(definition: PredicateRecord | RelationRecord = NE, **news: object) -> SharedRecord:
-    record = SharedRecord("R2<R1:C", "C", definition, ("A", "B"), ("A", "B"), Model.TKC, INFINITE)
+    record = SharedRecord("R2<R1:C", "C", definition, ("A", "B"), ("A", "B"), ConstraintModel.TKC, INFINITE)
     return msgspec.structs.replace(record, **news)
 
 
-def sent(known: Known) -> Known:
+def sent(known: KeyedConstraint) -> KeyedConstraint:
     return known_of(msgspec.msgpack.decode(msgspec.msgpack.encode(record_of(known)), type=SharedRecord))
 
 
@@ -54,14 +54,14 @@ def sent(known: Known) -> Known:
 @settings(max_examples=80, deadline=None)
 def test_constraints_come_as_they_were_sent(make: Callable[[Random], Team], seed: int) -> None:
     for robot in make(Random(seed)).robots:
-        for known in chain(held(robot), (part for _, part in held_below(robot))):
+        for known in chain(held_above(robot), (part for _, part in held_below(robot))):
             assert sent(known) == known
 
 
 @pytest.mark.parametrize("model", ["planar", "full"])
 def test_queens_come_as_they_were_sent(model: str) -> None:
     for robot in queens3d(3, model).robots:
-        for known in held(robot):
+        for known in held_above(robot):
             assert sent(known) == known
 
 
@@ -69,7 +69,7 @@ def test_queens_come_as_they_were_sent(model: str) -> None:
 def test_what_is_built_in_comes_as_it_was_sent(name: str) -> None:
     definition = PREDEFINED[name]
     scope = tuple(f"V{place}" for place in range(len(definition.parameters)))
-    known = Known("R2<R1:C", Constraint("C", definition, scope, scope))
+    known = KeyedConstraint("R2<R1:C", Constraint("C", definition, scope, scope))
     assert sent(known) == known
 
 

@@ -15,7 +15,7 @@ from robochoc.protocols.afb_bounds import Cost
 from robochoc.protocols.afb_messages import CPA, FBCPA, FBEstimate, NewSolution, Terminate
 from robochoc.protocols.findings import Best, Findings
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import NO_BRIEF, RunParameters, agent_problems
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies, value
 from tests.support.problems import team_of
@@ -38,9 +38,11 @@ def chain() -> Team:
     return team_of(dict.fromkeys("ABCD", (1, 2)), constraints)
 
 
-def agent(team: Team, name: str, brief: RunParameters = NO_BRIEF) -> AFB:
+def agent(team: Team, name: str, brief: RunParameters = DEFAULT_PARAMETERS) -> AFB:
     """The protocol object of one robot, started, with nothing left to say."""
-    robot = AFB(LocalProblem(agent_problems(team, brief=brief, shared_scopes=True)[name]), PriorityOrder(team.order))
+    robot = AFB(
+        LocalProblem(agent_problems(team, parameters=brief, shared_scopes=True)[name]), PriorityOrder(team.order)
+    )
     robot.start()
     robot.outbox.clear()
     return robot
@@ -153,7 +155,7 @@ def test_an_n_ary_constraint_is_in_one_estimate_only() -> None:
 
 def test_of_a_robot_that_may_step_aside_nothing_is_expected() -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [priced("AB", {}, 5)])
-    assert agent(team, "RA", RunParameters(aside=9)).prices.estimates == [0]
+    assert agent(team, "RA", RunParameters(withdrawal_cost=9)).prices.estimates == [0]
 
 
 def test_what_a_cpa_has_in_common_with_the_last_one_is_not_priced_again() -> None:

@@ -18,7 +18,7 @@ from robochoc.protocols.afc_tree import Accept, AFCTree
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 from tests.support.agents import replies, value
 from tests.support.problems import random_team
 from tests.support.small_teams import different
@@ -187,7 +187,7 @@ def test_the_values_form_a_solution_when_nobody_speaks_even_without_accepts() ->
         result = Simulation(team, Undetected, RandomChannels(seed)).run(60)
         if result.verdict is Verdict.SOLUTION:
             solved += 1
-            assert not list(objections(team, {n: v for own in result.assignments.values() for n, v in own.items()}))
+            assert not list(violations(team, {n: v for own in result.assignments.values() for n, v in own.items()}))
     assert solved > 50
 
 

@@ -18,12 +18,12 @@ from robochoc.protocols.findings import Trail
 from robochoc.protocols.maxsum import MaxSum
 from robochoc.protocols.mgm import MGM
 from robochoc.protocols.mgm2 import MGM2
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.incumbent import best_of
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 from robochoc.verification.objective import withdrawal_cost
 from tests.support.agents import replies
 from tests.support.cost_problems import random_cost_team, random_hard_team
@@ -146,12 +146,12 @@ def test_who_may_step_aside_does_so_rather_than_break_anything(protocol: type[Cy
     for seed in range(40):
         team = random_hard_team(chance)
         price = withdrawal_cost(team)
-        brief = RunParameters(seed, {"cycles": "25"}, aside=price)
+        brief = RunParameters(seed, {"cycles": "25"}, withdrawal_cost=price)
         result = Simulation(team, protocol, any_schedule(chance), brief=brief).search()
         assert result.verdict is Verdict.SOLUTION
         found = best_of(CompiledTeam(team), result, price)
         assert found
-        assert not list(objections(team, found.assignment, _absent(team, found.assignment)))
+        assert not list(violations(team, found.assignment, _absent(team, found.assignment)))
         aside += len(_absent(team, found.assignment)) > 0
     assert aside > 10
 

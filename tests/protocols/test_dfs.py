@@ -21,7 +21,7 @@ from robochoc.protocols.dfs import Back, Token, TreeMessage, TreeProtocol, Wave
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import Traits
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies

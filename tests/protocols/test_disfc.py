@@ -18,7 +18,7 @@ from robochoc.formats.team import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Model, Team
+from robochoc.model.problem import Constraint, ConstraintModel, Team
 from robochoc.protocols.disfc import AddLink, DisFC, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver import filters
@@ -44,7 +44,7 @@ EVERYTHING = b"\x07"
 
 
 def tkc(pair: str, *forbidden: tuple[int, int]) -> Constraint:
-    return replace(pkc_part(pair, *forbidden), model=Model.TKC)
+    return replace(pkc_part(pair, *forbidden), model=ConstraintModel.TKC)
 
 
 def differ(pair: str) -> Constraint:
@@ -185,7 +185,10 @@ def test_a_new_assignment_is_held_against_the_filters_from_below() -> None:
 
 def test_filters_are_over_the_declared_domain_of_all_that_the_receiver_shows() -> None:
     domains = dict.fromkeys(("A", "b", "B"), (1, 2))
-    constraints = [replace(pkc_part("Ab", (1, 1)), model=Model.TKC), replace(pkc_part("AB", (1, 2)), model=Model.TKC)]
+    constraints = [
+        replace(pkc_part("Ab", (1, 1)), model=ConstraintModel.TKC),
+        replace(pkc_part("AB", (1, 2)), model=ConstraintModel.TKC),
+    ]
     team = complex_team({"RA": ["A"], "RB": ["b", "B"]}, domains, constraints)
     (_, ok), *_ = [*unsaid(team, "RA")]
     assert isinstance(ok, Ok)

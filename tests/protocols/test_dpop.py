@@ -15,7 +15,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics
 from robochoc.protocols.dpop import DPOP
 from robochoc.protocols.dpop_messages import UTIL, VALUE, Dimensions, Need, Proceed
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from tests.support.agents import replies, value
 from tests.support.cost_problems import with_costs
 from tests.support.dpop_robots import begun, dimensions, domain, leaf, products

@@ -15,10 +15,10 @@ from robochoc.model.message import Message, encode
 from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.protocols.dpop import DPOP
 from robochoc.protocols.dpop_messages import UTIL, VALUE, Dimensions, Need, Proceed
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
-from robochoc.solver.exact import EXACT
+from robochoc.solver.exact_costs import EXACT
 from tests.support.agents import replies
 from tests.support.cost_problems import with_costs
 from tests.support.dpop_robots import PRODUCT, begun, dimensions, domain, leaf, products

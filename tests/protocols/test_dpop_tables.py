@@ -18,7 +18,7 @@ from robochoc.model.problem import Constraint, Predicate, Team
 from robochoc.protocols import dpop_tables
 from robochoc.protocols.dpop_tables import Arriving, Extent, Table, aligned, bytes_of, is_hopeless, packed, project
 from robochoc.protocols.dpop_tables import width_of as width_for
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from tests.support.cost_problems import with_costs
 from tests.support.problems import ON_ONE_MACHINE, team_of
 

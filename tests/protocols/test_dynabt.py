@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from robochoc.formats import PREDEFINED
-from robochoc.model.change import changed
+from robochoc.model.change import apply_changes
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import (
     AddAgent,
@@ -97,7 +97,7 @@ def with_two_nogoods() -> tuple[Team, DynABT]:
 
 def test_remove_constraint_drops_the_nogoods_that_it_explains_and_no_others() -> None:
     team, dynabt = with_two_nogoods()
-    change(dynabt, team, changed(team, [RemoveConstraint("RC", "RA", "C")]))
+    change(dynabt, team, apply_changes(team, [RemoveConstraint("RC", "RA", "C")]))
     assert list(dynabt.store) == [{"RB": (2,)}]
     assert value(dynabt) == (3,)
 
@@ -108,7 +108,7 @@ def test_remove_constraint_drops_what_was_derived_from_it_far_away() -> None:
         dynabt = agent(team, "RA")
         replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
         holder, _, rest = gone.partition("<")
-        change(dynabt, team, changed(team, [RemoveConstraint(holder, rest.removesuffix(":C"), "C")]))
+        change(dynabt, team, apply_changes(team, [RemoveConstraint(holder, rest.removesuffix(":C"), "C")]))
         assert len(list(dynabt.store)) == left
 
 
@@ -133,7 +133,7 @@ def test_two_constraints_of_one_name_go_together() -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [differ("A", "B"), differ("B", "A")])
     dynabt = agent(team, "RB")
     replies(dynabt, ("RA", Ok((1,))))
-    change(dynabt, team, changed(team, [RemoveConstraint("RB", "RA", "C")]))
+    change(dynabt, team, apply_changes(team, [RemoveConstraint("RB", "RA", "C")]))
     assert list(dynabt.store) == []
 
 
@@ -142,7 +142,7 @@ def test_a_constraint_that_comes_in_the_place_of_its_namesake_is_another() -> No
     dynabt = agent(team, "RB")
     replies(dynabt, ("RA", Ok((1,))))
     other = AddConstraint("RB", "RA", Constraint("C", PREDEFINED["le"], ("B", "A"), ("B", "A")))
-    change(dynabt, team, changed(team, [RemoveConstraint("RB", "RA", "C"), other]))
+    change(dynabt, team, apply_changes(team, [RemoveConstraint("RB", "RA", "C"), other]))
     assert list(dynabt.store) == []
 
 
@@ -151,7 +151,7 @@ def test_a_constraint_that_comes_in_the_place_of_its_namesake_is_another() -> No
 
 def test_additions_keep_nogoods_and_a_no_solution() -> None:
     team, dynabt = with_two_nogoods()
-    change(dynabt, team, changed(team, [AddConstraint("RD", "RA", differ("A", "D", "N"))]))
+    change(dynabt, team, apply_changes(team, [AddConstraint("RD", "RA", differ("A", "D", "N"))]))
     assert list(dynabt.store) == [{"RA": (1,)}, {"RB": (2,)}]
     unsolvable = triangle(1)
     top = agent(unsolvable, "RA")
@@ -189,7 +189,7 @@ def test_add_constraint_is_checked_against_what_the_lower_robot_knows() -> None:
 
 def test_values_that_go_take_their_nogoods_along() -> None:
     team, dynabt = with_two_nogoods()
-    change(dynabt, team, changed(team, [RemoveValue("C", 1)]))
+    change(dynabt, team, apply_changes(team, [RemoveValue("C", 1)]))
     assert dynabt.problem.values == ((2,), (3,))
     assert [dynabt.store[index] for index in (0, 1)] == [{"RB": (2,)}, None]
     assert dynabt.store.because(0) == {CBC}
@@ -213,13 +213,13 @@ def test_a_domain_that_grew_voids_the_resolvents_of_its_owner() -> None:
     dynabt = agent(team, "RA")
     replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
     assert value(dynabt) == (2,)
-    change(dynabt, team, changed(team, [AddValue("C", 3)]))
+    change(dynabt, team, apply_changes(team, [AddValue("C", 3)]))
     assert list(dynabt.store) == []
 
 
 def test_a_domain_that_grew_leaves_direct_conflicts() -> None:
     team, dynabt = with_two_nogoods()
-    change(dynabt, team, changed(team, [AddValue("C", 0)]))
+    change(dynabt, team, apply_changes(team, [AddValue("C", 0)]))
     assert dynabt.problem.values == ((0,), (1,), (2,), (3,))
     assert [dynabt.store[index] for index in range(4)] == [None, {"RA": (1,)}, {"RB": (2,)}, None]
     assert value(dynabt) == (3,)
@@ -229,7 +229,7 @@ def test_a_domain_that_shrank_leaves_resolvents() -> None:
     team = triangle(3)
     dynabt = agent(team, "RA")
     replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
-    change(dynabt, team, changed(team, [RemoveValue("C", 3)]))
+    change(dynabt, team, apply_changes(team, [RemoveValue("C", 3)]))
     assert list(dynabt.store) == [{}]
 
 
@@ -238,7 +238,7 @@ def test_a_no_solution_goes_when_a_domain_that_it_rests_on_grows() -> None:
     for variable, stands in (("B", False), ("A", False), ("D", True)):
         dynabt = agent(team, "RA")
         replies(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
-        change(dynabt, team, changed(team, [AddValue(variable, 3)]))
+        change(dynabt, team, apply_changes(team, [AddValue(variable, 3)]))
         assert (dynabt.verdict is Verdict.NO_SOLUTION) is stands
 
 
@@ -247,7 +247,7 @@ def test_a_no_solution_goes_when_a_domain_that_it_rests_on_grows() -> None:
 
 def test_a_robot_that_left_is_forgotten() -> None:
     team, dynabt = with_two_nogoods()
-    change(dynabt, team, changed(team, [RemoveAgent("RA")]))
+    change(dynabt, team, apply_changes(team, [RemoveAgent("RA")]))
     assert (dynabt.view, dynabt.higher, list(dynabt.store)) == ({"RB": (2,)}, {"RB"}, [{"RB": (2,)}])
 
 
@@ -262,7 +262,7 @@ def test_nogoods_that_rest_on_a_robot_that_left_are_void() -> None:
     team = triangle()
     dynabt = agent(team, "RA")
     replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
-    change(dynabt, team, changed(team, [RemoveAgent("RC")]))
+    change(dynabt, team, apply_changes(team, [RemoveAgent("RC")]))
     assert list(dynabt.store) == []
 
 
@@ -280,7 +280,7 @@ def test_a_robot_of_an_old_name_is_a_stranger() -> None:
     dynabt = agent(team, "RA")
     replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
     again = replace(team["RD"], parents=(Parent("RA", (differ("A", "D", "N"),)),))
-    new = changed(team, [RemoveAgent("RD"), AddAgent(again)])
+    new = apply_changes(team, [RemoveAgent("RD"), AddAgent(again)])
     dynabt.change(
         LocalProblem(agent_problems(new)["RA"]), PriorityOrder(new.order), Invalidated(frozenset(), frozenset({"RD"}))
     )
@@ -313,11 +313,11 @@ def test_after_an_epoch_that_was_broken_off_links_are_asked_for_again() -> None:
 def test_who_changes_twice_before_it_goes_on_tells_all_that_is_new() -> None:
     """A robot was lost before all had taken in the change before."""
     team = triangle()
-    first = changed(team, [AddConstraint("RD", "RA", differ("A", "D", "N"))])
+    first = apply_changes(team, [AddConstraint("RD", "RA", differ("A", "D", "N"))])
     dynabt = agent(team, "RA")
     change(dynabt, team, first)
     assert after(dynabt, first, RemoveAgent("RB")) == [("RD", Ok((1,)))]
-    assert after(dynabt, changed(first, [RemoveAgent("RB")]), AddValue("C", 9)) == []
+    assert after(dynabt, apply_changes(first, [RemoveAgent("RB")]), AddValue("C", 9)) == []
 
 
 def test_links_that_were_added_stay() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robochoc.model.change import changed
+from robochoc.model.change import apply_changes
 from robochoc.model.problem import AddAgent, AddConstraint, Child, Domain, Parent, RemoveAgent, Robot, Team, Variable
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.dynabt import Nogood
@@ -37,7 +37,7 @@ def test_the_values_of_one_who_shows_other_variables_mean_nothing_any_more() -> 
     team = pair("A1")
     dynabt = agent(team, "RB")
     replies(dynabt, ("RA", Ok((1,))))
-    assert invalidated_by(team, changed(team, [A2B])).agents == {"RA"}
+    assert invalidated_by(team, apply_changes(team, [A2B])).agents == {"RA"}
     assert after(dynabt, team, A2B) == []
     assert (dynabt.view, list(dynabt.store), value(dynabt)) == ({}, [], (2,))
     said = replies(dynabt, ("RA", Ok((2, 1))))
@@ -51,7 +51,7 @@ def test_a_child_that_shows_other_variables_is_told_the_value_again() -> None:
     above = Robot("RB", (Variable("B", bits),), children=(Child("RC", ("B",)),))
     team = Team("two", (above, child))
     change_ = AddConstraint("RC", "RB", differ("B", "C2", "N"))
-    assert invalidated_by(team, changed(team, [change_])).agents == {"RC"}
+    assert invalidated_by(team, apply_changes(team, [change_])).agents == {"RC"}
     assert after(agent(team, "RB"), team, change_) == [("RC", Ok((1,)))]
 
 

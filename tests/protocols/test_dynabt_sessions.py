@@ -17,7 +17,7 @@ from robochoc.run.registry import protocol_named
 from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import Invalidated, invalidated_by
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 from tests.support.complex_changes import random_complex_changing_team
 from tests.support.problems import solutions
 from tests.support.random_changes import random_changing_team, stages
@@ -34,9 +34,10 @@ def played(team: Team, schedule: Schedule) -> Counter[Verdict]:
     journey = ScenarioRun(team, None, compiled_by_brute_force, lambda: None)
     seen = Counter[Verdict]()
     with Simulation(journey.compiled(), protocol_named("dynabt"), schedule) as session:
-        epochs = list(journey.go(session, lambda _: None))
-    for now, (then, result, *_) in zip(stages(team), epochs, strict=True):
-        assert now.order == then.order
+        epochs = list(journey.epochs(session, lambda _: None))
+    for now, epoch in zip(stages(team), epochs, strict=True):
+        result = epoch.result
+        assert now.order == epoch.team.order
         if result.verdict is not Verdict.UNKNOWN:
             check(now, result)
             seen[result.verdict] += 1
@@ -47,7 +48,7 @@ def check(team: Team, result: RunResult) -> None:
     assert result.verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION)
     if result.verdict is Verdict.SOLUTION:
         assignment = {name: value for own in result.assignments.values() for name, value in own.items()}
-        assert not list(objections(team, assignment))
+        assert not list(violations(team, assignment))
 
 
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 20))])

@@ -14,10 +14,10 @@ from robochoc.formats.folder import write_team
 from robochoc.formats.team import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Model, Team
+from robochoc.model.problem import ConstraintModel, Team
 from robochoc.protocols.abt import ABT, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
@@ -49,7 +49,7 @@ def agent(team: Team, name: str) -> ABT:
 
 
 def test_the_value_goes_up_too_where_a_pkc_is_shared_and_only_there() -> None:
-    constraints = [pkc_part("AC"), replace(pkc_part("BC", name="T"), model=Model.TKC)]
+    constraints = [pkc_part("AC"), replace(pkc_part("BC", name="T"), model=ConstraintModel.TKC)]
     team = team_of(dict.fromkeys("ABC", (1, 2)), constraints)
     abt = ABT(LocalProblem(agent_problems(team)["RC"]), PriorityOrder(team.order))
     abt.start()
@@ -57,9 +57,9 @@ def test_the_value_goes_up_too_where_a_pkc_is_shared_and_only_there() -> None:
 
 
 def test_the_value_goes_up_where_only_the_parent_holds_a_part() -> None:
-    shown = replace(pkc_part("AB", name="T"), model=Model.TKC)
+    shown = replace(pkc_part("AB", name="T"), model=ConstraintModel.TKC)
     team = with_part(team_of(dict.fromkeys("AB", (1, 2)), [shown]), "RA", "RB", pkc_part("AB", (1, 1)))
-    assert LocalProblem(agent_problems(team)["RB"]).partners == ("RA",)
+    assert LocalProblem(agent_problems(team)["RB"]).pkc_parents == ("RA",)
 
 
 def test_a_lower_robot_checks_its_own_part() -> None:
@@ -115,11 +115,11 @@ def test_the_refused_robot_answers_a_nogood_that_rests_on_an_old_value() -> None
 
 def test_a_refusal_names_only_the_variables_that_the_part_looks_at() -> None:
     domains = dict.fromkeys(("a", "A", "b", "B"), (1, 2))
-    shown = [replace(pkc_part(pair, name="T"), model=Model.TKC) for pair in ("ab", "AB")]
+    shown = [replace(pkc_part(pair, name="T"), model=ConstraintModel.TKC) for pair in ("ab", "AB")]
     team = complex_team({"RA": ["a", "A"], "RB": ["b", "B"]}, domains, shown)
     problem = LocalProblem(agent_problems(with_part(team, "RA", "RB", pkc_part("AB", (1, 2))))["RA"])
-    assert problem.refuses(0, "RB", (1, 2)) == {"RA": (None, 1), "RB": (None, 2)}
-    assert problem.refuses(0, "RB", (2, 1)) is None
+    assert problem.part_conflict(0, "RB", (1, 2)) == {"RA": (None, 1), "RB": (None, 2)}
+    assert problem.part_conflict(0, "RB", (2, 1)) is None
 
 
 def test_two_parts_that_leave_nothing_together_have_no_solution() -> None:
@@ -223,7 +223,7 @@ def test_how_the_queens_parts_are_stated_changes_no_byte(private_queens: Team) -
 
 def test_private_queens_have_no_solution(private_queens: Team) -> None:
     shared = [constraint for robot in private_queens.robots for constraint in robot.shared]
-    assert {constraint.model for constraint in shared} == {Model.PKC}
+    assert {constraint.model for constraint in shared} == {ConstraintModel.PKC}
     assert len(pkc_parts(private_queens)) == 2 * len(shared)
     assert run(private_queens, ABT, 0).result.verdict is Verdict.NO_SOLUTION
     assert ProcessesRun(private_queens, ABT).run(60).verdict is Verdict.NO_SOLUTION
@@ -234,7 +234,7 @@ def test_private_queens_have_no_solution(private_queens: Team) -> None:
 
 def test_the_example_is_solved() -> None:
     team = read_team(SECRETS)
-    assert {model.model for model in pkc_parts(team).values()} == {Model.PKC}
+    assert {model.model for model in pkc_parts(team).values()} == {ConstraintModel.PKC}
     for runtime in ON_ONE_MACHINE:
         outcome = solve(team, Options(protocol="abt", runtime=runtime, timeout=60))
         assert (outcome.verdict, outcome.verified) == (Verdict.SOLUTION, True)

@@ -23,7 +23,7 @@ from robochoc.protocols.sfb import LARGEST, SFB, SFBSettings
 from robochoc.protocols.sfb_messages import Above, Below, CPAs, Explored, Solution
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError
-from robochoc.solver.exact import EXACT
+from robochoc.solver.exact_costs import EXACT
 from tests.support.agents import replies, value
 from tests.support.cost_problems import least_cost, random_cost_team
 from tests.support.problems import team_of

@@ -157,7 +157,9 @@ def test_an_n_ary_constraint_is_paid_by_its_lowest_robot() -> None:
 
 def test_who_may_step_aside_does_so_last() -> None:
     team = team_of(dict.fromkeys("AB", (1,)), [priced("AB", {(1, 1): INFINITE})])
-    robot = SyncBB(LocalProblem(agent_problems(team, brief=RunParameters(aside=3))["RB"]), PriorityOrder(team.order))
+    robot = SyncBB(
+        LocalProblem(agent_problems(team, parameters=RunParameters(withdrawal_cost=3))["RB"]), PriorityOrder(team.order)
+    )
     robot.start()
     aside: Value = (None,)
     assert replies(robot, ("RA", path((1, 0)))) == [("RA", Backtrack(BestPath(3, ((1,), aside))))]

@@ -12,13 +12,13 @@ from robochoc.flight.flight import FlightLog
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Mission
 from robochoc.formats import read_team
-from robochoc.model.change import changed_by
+from robochoc.model.change import team_after_events
 from robochoc.model.outcome import Outcome, Verdict
-from robochoc.model.problem import Event, RemoveAgent, RemoveValue
+from robochoc.model.problem import RemoveAgent, RemoveValue, ScenarioEvent
 from robochoc.ros.closed_loop import ClosedLoop, drones_of
 from robochoc.ros.simulated_feedback import CannotFlyError, FlightSettings, SimulatedFeedback, UnknownDroneError
-from robochoc.run.orchestrator import Options, Runtime, solve
-from robochoc.verification.checker import objections
+from robochoc.run import Options, Runtime, solve
+from robochoc.verification.checker import violations
 from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import ROOT
 
@@ -42,7 +42,7 @@ class Looped:
 def looped(surroundings: FlightSettings, options: Options = SIMULATED, *, scale: float | None = None) -> Looped:
     flying = SimulatedFeedback(surroundings)
     loop = ClosedLoop(HANGAR, (), flying, scale=scale)
-    outcome = solve(HANGAR, options, field=loop)
+    outcome = solve(HANGAR, options, environment=loop)
     flown = flying.flown()
     assert flown is not None
     assert loop.mission is not None
@@ -63,11 +63,11 @@ def test_an_obstacle_and_a_drone_that_falls_out(runtime: Runtime, met: Looped) -
     done = met if runtime is Runtime.SIMULATOR else looped(MET, replace(SIMULATED, runtime=runtime))
     outcome, flown = done.outcome, done.flown
     assert openings(outcome) == ["the start", "port without 3", "-Fin"]
-    assert done.loop.events == [Event((RemoveValue("port", 3),)), Event((RemoveAgent("Fin"),))]
+    assert done.loop.events == [ScenarioEvent((RemoveValue("port", 3),)), ScenarioEvent((RemoveAgent("Fin"),))]
     assert (outcome.verdict, outcome.verified, outcome.protocol) == (Verdict.SOLUTION, True, "dynabt")
     assert all(epoch.verified for epoch in outcome.epochs)
-    now = changed_by(done.loop.team, outcome.events)
-    assert list(objections(now, outcome.assignment)) == []
+    now = team_after_events(done.loop.team, outcome.events)
+    assert list(violations(now, outcome.assignment)) == []
     assert "Fin" not in now
     assert outcome.assignment["port"] != PLACE[2]
 

@@ -13,14 +13,14 @@ import pytest
 from robochoc.api import Problem
 from robochoc.communication.processes.robot_link import RobotsLostError
 from robochoc.formats import read_team
-from robochoc.model.outcome import Epoch, Outcome, Verdict
-from robochoc.model.problem import AddAgent, Event, RemoveAgent, RemoveValue, Team
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.problem import AddAgent, RemoveAgent, RemoveValue, ScenarioEvent, Team
 from robochoc.ros.closed_loop import ClosedLoop, drones_of
 from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.source import ReceivedMessage, Source, SourceError
 from robochoc.ros.source_feedback import SourceFeedback
-from robochoc.run.orchestrator import OnLoss, Options, Runtime, Withdrawal, solve
+from robochoc.run import OnLoss, Options, Runtime, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.clocks import waiting
 from tests.support.problems import ON_ONE_MACHINE
@@ -39,11 +39,11 @@ PORTS = {"point": {"x": 3.0, "y": 1.0, "z": 3.0}}
 class Says:
     """A field that says what it was told to say, and keeps what it is told."""
 
-    def __init__(self, *events: Event | None) -> None:
+    def __init__(self, *events: ScenarioEvent | None) -> None:
         self.events = list(events)
-        self.summary: list[tuple[tuple[str, ...], Epoch, float | None]] = []
+        self.summary: list[tuple[tuple[str, ...], EpochOutcome, float | None]] = []
 
-    def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
+    def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
         self.summary.append((team.order, epoch, left_s))
         return self.events.pop(0) if self.events else None
 
@@ -54,8 +54,8 @@ def openings(outcome: Outcome) -> list[str]:
 
 @pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_a_field_is_told_each_epoch_and_says_the_next(runtime: Runtime) -> None:
-    field = Says(Event((RemoveValue("A", 1),)), Event((RemoveAgent("RB"),)))
-    outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=runtime), field=field)
+    field = Says(ScenarioEvent((RemoveValue("A", 1),)), ScenarioEvent((RemoveAgent("RB"),)))
+    outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=runtime), environment=field)
     assert openings(outcome) == ["the start", "A without 1", "-RB"]
     assert [(order, left_s) for order, _, left_s in field.summary] == [(("RA", "RB"), None)] * 2 + [(("RA",), None)]
     assert [epoch for _, epoch, _ in field.summary] == [*outcome.epochs]
@@ -64,29 +64,34 @@ def test_a_field_is_told_each_epoch_and_says_the_next(runtime: Runtime) -> None:
 
 
 def test_what_cannot_be_is_passed_over() -> None:
-    field = Says(Event((RemoveAgent("RX"), RemoveValue("A", 9), RemoveValue("A", 1))), Event((RemoveAgent("RX"),)))
-    outcome = solve(pair(values=3), SIMULATED, field=field)
+    field = Says(
+        ScenarioEvent((RemoveAgent("RX"), RemoveValue("A", 9), RemoveValue("A", 1))),
+        ScenarioEvent((RemoveAgent("RX"),)),
+    )
+    outcome = solve(pair(values=3), SIMULATED, environment=field)
     assert openings(outcome) == ["the start", "A without 1", "nothing"]
     team = pair(values=3)
-    there = Says(Event((AddAgent(team["RB"]),)))
-    assert openings(solve(team, SIMULATED, field=there)) == ["the start", "nothing"]
+    there = Says(ScenarioEvent((AddAgent(team["RB"]),)))
+    assert openings(solve(team, SIMULATED, environment=there)) == ["the start", "nothing"]
 
 
 def test_the_files_own_events_come_first() -> None:
-    team = pair(Event((RemoveValue("A", 1),)), values=3)
-    outcome = solve(team, SIMULATED, field=Says(Event((RemoveValue("A", 2), RemoveValue("A", 1)))))
+    team = pair(ScenarioEvent((RemoveValue("A", 1),)), values=3)
+    outcome = solve(team, SIMULATED, environment=Says(ScenarioEvent((RemoveValue("A", 2), RemoveValue("A", 1)))))
     assert openings(outcome) == ["the start", "A without 1", "A without 2"]
     assert outcome.events == 2
 
 
 def test_without_a_field_a_problem_that_does_not_change_has_no_epochs() -> None:
     assert solve(pair(values=3), SIMULATED).epochs == ()
-    assert len(solve(pair(values=3), SIMULATED, field=Says()).epochs) == 1
+    assert len(solve(pair(values=3), SIMULATED, environment=Says()).epochs) == 1
 
 
 def test_an_epoch_without_a_solution_may_be_followed_by_one_with() -> None:
     values = tuple(RemoveValue("A", value) for value in (1, 2, 3))
-    outcome = solve(pair(values=3), SIMULATED, field=Says(Event(values), Event((RemoveAgent("RA"),))))
+    outcome = solve(
+        pair(values=3), SIMULATED, environment=Says(ScenarioEvent(values), ScenarioEvent((RemoveAgent("RA"),)))
+    )
     assert [epoch.verdict for epoch in outcome.epochs] == ["solution", "no-solution", "solution"]
 
 
@@ -100,18 +105,18 @@ def test_an_epoch_without_a_solution_may_be_followed_by_one_with() -> None:
 )
 def test_what_a_changing_problem_cannot_have_is_refused(options: Options, named: str) -> None:
     with pytest.raises(UnsupportedError, match=f"{named} is for problems that do not change"):
-        solve(pair(values=3), options, field=Says())
+        solve(pair(values=3), options, environment=Says())
 
 
 def test_when_the_time_is_over_nothing_that_comes_is_heeded() -> None:
     class Slow(Says):
-        def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
+        def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
             assert left_s is not None
             time.sleep(left_s)
             return super().__call__(team, epoch, left_s)
 
-    field = Slow(Event((RemoveValue("A", 1),)))
-    outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1), field=field)
+    field = Slow(ScenarioEvent((RemoveValue("A", 1),)))
+    outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1), environment=field)
     assert (outcome.verdict, openings(outcome)) == (Verdict.UNKNOWN, ["the start", "A without 1"])
     assert field.summary[-1][2] == 0
     assert "--timeout" in (outcome.reason or "")
@@ -119,14 +124,14 @@ def test_when_the_time_is_over_nothing_that_comes_is_heeded() -> None:
 
 def test_when_all_messages_are_sent_nothing_that_comes_is_heeded() -> None:
     field = Says()
-    outcome = solve(HANGAR, replace(SIMULATED, messages=3), field=field)
+    outcome = solve(HANGAR, replace(SIMULATED, messages=3), environment=field)
     assert (outcome.verdict, field.summary[-1][2]) == (Verdict.UNKNOWN, 0)
 
 
 class Striking(Says):
     """Kills a robot's process while the team waits."""
 
-    def __call__(self, team: Team, epoch: Epoch, left_s: float | None) -> Event | None:
+    def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
         if not self.summary:
             victim = next(process for process in multiprocessing.active_children() if process.name == "RB")
             victim.kill()
@@ -137,24 +142,24 @@ class Striking(Says):
 @pytest.mark.skipif(sys.platform != "linux", reason="as the runtime's other tests of faults")
 def test_a_robot_that_dies_while_the_team_waits_is_lost() -> None:
     options = Options(protocol="dynabt")
-    event = Event((RemoveValue("A", 1),))
+    event = ScenarioEvent((RemoveValue("A", 1),))
     with pytest.raises(RobotsLostError) as lost:
-        solve(pair(values=3), options, field=Striking(event))
+        solve(pair(values=3), options, environment=Striking(event))
     assert "RB" in lost.value.robots
     surviving = Options(protocol="dynabt", on_loss=OnLoss.WITHDRAW)
-    outcome = solve(pair(values=3), surviving, field=Striking(event))
+    outcome = solve(pair(values=3), surviving, environment=Striking(event))
     assert openings(outcome) == ["the start", "A without 1", "the loss of RB"]
     assert (outcome.lost, outcome.assignment) == (("RB",), {"A": 2})
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, SourceError("the robots cannot be heard any more")])
 def test_no_process_outlives_a_field_that_fails(error: BaseException | type[BaseException]) -> None:
-    def fails(_team: Team, _epoch: Epoch, _left_s: float | None) -> Event | None:
+    def fails(_team: Team, _epoch: EpochOutcome, _left_s: float | None) -> ScenarioEvent | None:
         assert len(multiprocessing.active_children()) == 2
         raise error
 
     with pytest.raises((KeyboardInterrupt, SourceError)):
-        solve(pair(values=3), Options(protocol="dynabt"), field=fails)
+        solve(pair(values=3), Options(protocol="dynabt"), environment=fails)
     assert multiprocessing.active_children() == []
 
 
@@ -211,7 +216,7 @@ def at(seconds: float, topic: str, fields: Mapping[str, object]) -> ReceivedMess
 def listened(*messages: ReceivedMessage, sink: Sink | None = None, team: Team = HANGAR) -> tuple[Outcome, ClosedLoop]:
     feedback = SourceFeedback(Tape(*messages), ReportDecoder(drones_of(team), "map"))
     loop = ClosedLoop(team, [sink] if sink else [], feedback)
-    return solve(team, SIMULATED, field=loop), loop
+    return solve(team, SIMULATED, environment=loop), loop
 
 
 def test_the_first_report_that_changes_the_problem_opens_an_epoch() -> None:
@@ -241,7 +246,7 @@ def test_reports_that_change_nothing_open_no_epoch() -> None:
 
 
 def test_what_is_known_to_come_is_not_asked_for_again() -> None:
-    team = replace(HANGAR, scenario=(Event((RemoveAgent("Fin"),)),))
+    team = replace(HANGAR, scenario=(ScenarioEvent((RemoveAgent("Fin"),)),))
     outcome, _ = listened(at(1, "/fin/out_of_order", {"data": ""}), at(3, "/fin/battery", {"percentage": 0}), team=team)
     assert openings(outcome) == ["the start", "-Fin"]
 
@@ -281,7 +286,7 @@ def live(patience_s: float, *messages: ReceivedMessage) -> tuple[ClosedLoop, Cal
 def test_a_live_source_is_waited_for_and_somebody_told_so() -> None:
     loop, waited = live(0.5, at(time.time(), "/port/blocked", PORTS))
     with waiting(30, at_least_s=0.9):
-        outcome = solve(HANGAR, SIMULATED, field=loop)
+        outcome = solve(HANGAR, SIMULATED, environment=loop)
     assert openings(outcome) == ["the start", "port without 3"]
     assert waited() >= 2
 
@@ -289,7 +294,7 @@ def test_a_live_source_is_waited_for_and_somebody_told_so() -> None:
 def test_waiting_is_bounded_by_the_time_for_all() -> None:
     loop, _ = live(60)
     with waiting(30):
-        outcome = solve(HANGAR, Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1.5), field=loop)
+        outcome = solve(HANGAR, Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1.5), environment=loop)
     assert (outcome.verdict, openings(outcome)) == (Verdict.SOLUTION, ["the start"])
 
 
@@ -302,6 +307,6 @@ def test_the_team_of_a_run_nobody_changed_is_as_its_files_have_it() -> None:
 
 
 def test_a_field_for_whoever_uses_the_library() -> None:
-    field = Says(Event((RemoveValue("port", 3),)))
-    outcome = Problem(HANGAR).solve("dynabt", "simulator", field=field)
+    field = Says(ScenarioEvent((RemoveValue("port", 3),)))
+    outcome = Problem(HANGAR).solve("dynabt", "simulator", environment=field)
     assert openings(outcome) == ["the start", "port without 3"]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from robochoc.flight.point_index import PointIndex
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
-from robochoc.model.change import changed
+from robochoc.model.change import apply_changes
 from robochoc.model.expression import Expression, Type, parse
 from robochoc.model.problem import (
     AddValue,
@@ -58,7 +58,7 @@ def after(team: Team, *reports: Report, scale: float = 1.0) -> tuple[Change, ...
     """What the last of `reports` changes; those before have happened."""
     sees = situation(team, scale)
     for report in reports[:-1]:
-        team = changed(team, sees.changes(team, report))
+        team = apply_changes(team, sees.changes(team, report))
     return sees.changes(team, reports[-1])
 
 
@@ -240,7 +240,7 @@ def test_the_team_can_always_take_it_and_what_is_blocked_is_nobodys(heard: list[
     obstacles: list[tuple[float, float, float]] = []
     for report in heard:
         there = report.drone in team
-        team = changed(team, sees.changes(team, report))  # raises `ChangeError` for what it cannot take
+        team = apply_changes(team, sees.changes(team, report))  # raises `ChangeError` for what it cannot take
         if isinstance(report, Blocked) and there:
             obstacles.append(report.place)
         elif isinstance(report, Cleared) and there:

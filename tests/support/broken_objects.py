@@ -18,16 +18,16 @@ from robochoc.model.problem import (
     Change,
     Child,
     Constraint,
+    ConstraintModel,
     Domain,
-    Event,
-    Kind,
-    Model,
     Parent,
     Predicate,
+    ProblemKind,
     Relation,
     RemoveAgent,
     RemoveValue,
     Robot,
+    ScenarioEvent,
     Semantics,
     Team,
     Term,
@@ -124,7 +124,7 @@ def moved(name: str, holder: str, to: str) -> Breakage:
 
 
 def weighted(then: Breakage) -> Breakage:
-    return lambda team: then(each(lambda one: replace(one, kind=Kind.DISWCSP))(team))
+    return lambda team: then(each(lambda one: replace(one, kind=ProblemKind.DISWCSP))(team))
 
 
 def both(first: Breakage, second: Breakage) -> Breakage:
@@ -207,7 +207,7 @@ AS_IN_FILES: dict[str, Breakage] = {
         "C1", definition=Relation("r1", 2, Semantics.CONFLICTS, ((1, 1),)), parameters=("V1", "V2")
     ),
     "a shared constraint without model": constraint("C4", model=None),
-    "a private constraint with a part": constraint("C0", model=Model.PKC),
+    "a private constraint with a part": constraint("C0", model=ConstraintModel.PKC),
     "another's variable in private": over("C0", "V1", "V2"),
     "own variables only with a parent": over("C4", "V3", 3),
     "others' variables only": over("C4", "V1", "W1"),
@@ -218,13 +218,13 @@ AS_IN_FILES: dict[str, Breakage] = {
     "itself as neighbour": robot("Robot3", children=(Child("Robot3"),)),
     "a neighbour twice": robot("Robot3", children=(Child("Robot1"),)),
     "a cycle of parents": ring,
-    "a DisWCSP among DisCSPs": robot("Robot2", kind=Kind.DISWCSP),
+    "a DisWCSP among DisCSPs": robot("Robot2", kind=ProblemKind.DISWCSP),
     "two owners of one variable": shared_variable,
     "a variable that its owner does not have": over("C4", "V9", "V3"),
     "a constraint under the wrong parent": moved("C4", "Robot3", "Robot2"),
     "n-ary under the higher parent": moved("C5", "Robot3", "Robot1"),
     "n-ary in a higher file": over("C3", "V3", "V2", holder="Robot2"),
-    "a PKC of three robots": constraint("C5", model=Model.PKC),
+    "a PKC of three robots": constraint("C5", model=ConstraintModel.PKC),
     "a part over a third robot": over("C3", "V1", "V3", holder="Robot1"),
     "a part over what its owner shows to nobody": unseen_variable,
     "a child told what is not one's own": child("Robot3", "Robot2", variables=("V1",)),
@@ -250,12 +250,12 @@ VALUES = Domain("D", (range(1, 5),))
 NEWCOMER = Robot("Late", (Variable("VL", VALUES),))
 
 
-def bound(*terms: Term, model: Model = Model.TKC) -> Constraint:
+def bound(*terms: Term, model: ConstraintModel = ConstraintModel.TKC) -> Constraint:
     return Constraint("C", PREDEFINED["ne"], terms, terms, model)
 
 
 def scenario(*changes: Change, after: int | None = None) -> Breakage:
-    return lambda team: replace(team, scenario=(Event(changes, after),))
+    return lambda team: replace(team, scenario=(ScenarioEvent(changes, after),))
 
 
 OF_OBJECTS: dict[str, Wrong] = {
@@ -380,7 +380,7 @@ OF_OBJECTS: dict[str, Wrong] = {
         predicate(Apply("ne", (Name("X"),))), ("robot Robot2, predicate p1", "'ne' takes 2 arguments, not 1")
     ),
     "a totally known constraint twice": wrong(
-        constraint("C3", "Robot1", model=Model.TKC),
+        constraint("C3", "Robot1", model=ConstraintModel.TKC),
         ("robot Robot1, constraint C3 (V1 V2)", "totally known constraint (TKC) with the child 'Robot2'"),
     ),
     "another's variable shown": wrong(robot("Robot2", shown=("V1",)), ("robot Robot2", "is to show 'V1'")),
@@ -410,7 +410,7 @@ OF_OBJECTS: dict[str, Wrong] = {
         ("robot Robot1, constraint C (V1 V3 3)", "ne takes 2 terms"),
     ),
     "a copy of another's part": wrong(
-        child("Robot3", "Robot1", copies=(bound("V1", "V3", model=Model.PKC),)),
+        child("Robot3", "Robot1", copies=(bound("V1", "V3", model=ConstraintModel.PKC),)),
         ("robot Robot1, constraint C (V1 V3)", "a copy of a partially known constraint (PKC)"),
     ),
     "a scenario's unknown robot": wrong(scenario(RemoveAgent("Robot9")), ("event 1", "there is no robot 'Robot9'")),
@@ -425,7 +425,7 @@ OF_OBJECTS: dict[str, Wrong] = {
         scenario(AddAgent(replace(NEWCOMER, variables=()))), ("robot Late", "the robot has no variable")
     ),
     "a scenario's partially known constraint": wrong(
-        scenario(AddConstraint("Robot2", "Robot1", bound("V1", "V2", model=Model.PKC))),
+        scenario(AddConstraint("Robot2", "Robot1", bound("V1", "V2", model=ConstraintModel.PKC))),
         ("event 1", "a partially known constraint (PKC) in a scenario"),
     ),
     "a scenario's robot with a part": wrong(
@@ -433,7 +433,7 @@ OF_OBJECTS: dict[str, Wrong] = {
             AddAgent(
                 replace(
                     NEWCOMER,
-                    parents=(Parent("Robot1", (bound("V1", "VL", model=Model.PKC),)),),
+                    parents=(Parent("Robot1", (bound("V1", "VL", model=ConstraintModel.PKC),)),),
                 )
             )
         ),

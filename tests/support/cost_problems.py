@@ -7,7 +7,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from random import Random
 
-from robochoc.model.problem import INFINITE, Assignment, Constraint, Kind, Predicate, Relation, Robot, Semantics, Team
+from robochoc.model.problem import (
+    INFINITE,
+    Assignment,
+    Constraint,
+    Predicate,
+    ProblemKind,
+    Relation,
+    Robot,
+    Semantics,
+    Team,
+)
 from tests.support.complex_problems import random_complex_team
 from tests.support.problems import PREDICATES, random_team, team_of
 
@@ -45,7 +55,7 @@ def random_hard_team(chance: Random, *, n_ary: bool = True) -> Team:
 
 def with_costs(team: Team) -> Team:
     """`team` as a DisWCSP."""
-    return replace(team, robots=tuple(replace(robot, kind=Kind.DISWCSP) for robot in team.robots))
+    return replace(team, robots=tuple(replace(robot, kind=ProblemKind.DISWCSP) for robot in team.robots))
 
 
 def softened(team: Team, chance: Random) -> Team:

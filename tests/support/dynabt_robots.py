@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robochoc.model.change import changed
+from robochoc.model.change import apply_changes
 from robochoc.model.message import Message
 from robochoc.model.problem import Change, Team
 from robochoc.protocols.dynabt import DynABT
@@ -29,7 +29,7 @@ def change(dynabt: DynABT, old: Team, new: Team) -> None:
 
 def after(dynabt: DynABT, team: Team, *changes: Change, lossless: bool = True) -> list[tuple[str, Message]]:
     """Return what the robot sends when it goes on after `changes`."""
-    change(dynabt, team, changed(team, changes))
+    change(dynabt, team, apply_changes(team, changes))
     dynabt.resume(lossless=lossless)
     said = list(dynabt.outbox)
     dynabt.outbox.clear()

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from robochoc.journal import events
 from robochoc.journal.events import AnyEvent
 from robochoc.journal.journal import Header
-from robochoc.model.outcome import Epoch, Metrics, Outcome, PseudoTreeNode, Verdict
+from robochoc.model.outcome import EpochOutcome, Metrics, Outcome, PseudoTreeNode, Verdict
 
 names = st.sampled_from(["Robot1.1", "Robot1.2", "Robot2.1", "R", "Ω"]) | st.text(max_size=8)
 numbers = st.integers(-(2**62), 2**62)
@@ -81,5 +81,5 @@ outcomes = st.builds(
     cost=st.none() | st.floats(0, 1e9),
     metrics=st.builds(Metrics, messages=assignments, bytes=counts, wall_s=st.floats(0, 1e9)),
     tree=st.dictionaries(names, st.builds(PseudoTreeNode, st.none() | names), max_size=2),
-    epochs=st.lists(st.builds(Epoch, st.sampled_from(Verdict), st.just(("R",))), max_size=2).map(tuple),
+    epochs=st.lists(st.builds(EpochOutcome, st.sampled_from(Verdict), st.just(("R",))), max_size=2).map(tuple),
 )

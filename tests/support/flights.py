@@ -11,7 +11,7 @@ from robochoc.flight.layout import Point
 from robochoc.flight.log import ClosestApproach, FlightEvent, FlightLog, LegTimes
 from robochoc.flight.mission import Mission, mission_of
 from robochoc.flight.preview import preview_of
-from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Team, Variable
 from robochoc.view import scene as scenes
 from robochoc.view.scene import Scene
@@ -95,8 +95,8 @@ def epochs_of_three(team: str = "watch") -> Outcome:
     places = {f"V{place}.1": place for place in range(2, 6)}
     last = {"V1.1": 1, "V2.1": 4, "V3.1": 3, "V4.1": 4}
     epochs = (
-        Epoch(Verdict.SOLUTION, everybody, assignment=places),
-        Epoch(Verdict.NO_SOLUTION, everybody[:4], "-R5.1"),
-        Epoch(Verdict.SOLUTION, everybody[:4], "V2.1 without <2>", last),
+        EpochOutcome(Verdict.SOLUTION, everybody, assignment=places),
+        EpochOutcome(Verdict.NO_SOLUTION, everybody[:4], "-R5.1"),
+        EpochOutcome(Verdict.SOLUTION, everybody[:4], "V2.1 without <2>", last),
     )
     return Outcome(team, "dynabt", "simulator", 0, Verdict.SOLUTION, last, epochs=epochs)

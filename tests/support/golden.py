@@ -8,8 +8,8 @@ from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Given
 from robochoc.journal.journal import Header, Recorder, lines_of, read_journal
-from robochoc.model.problem import Constraint, Kind, Relation, Semantics, Team
-from robochoc.run.orchestrator import Options, Runtime, ScheduleName, Withdrawal, solve
+from robochoc.model.problem import Constraint, ProblemKind, Relation, Semantics, Team
+from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.problems import team_of
 from tests.support.program import ROOT
@@ -50,7 +50,7 @@ def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
 
     The wall-clock time, which is not fixed, is left out, and so are the robots' files, which are no protocol's.
     """
-    withdraw = None if team.dynamic or team.kind is Kind.DISWCSP else Withdrawal.MAXIMAL
+    withdraw = None if team.dynamic or team.kind is ProblemKind.DISWCSP else Withdrawal.MAXIMAL
     settings = {"cycles": "3"} if hasattr(protocol_named(protocol).settings, "cycles") else {}
     options = Options(
         protocol=protocol, runtime=Runtime.SIMULATOR, schedule=schedule, withdraw=withdraw, settings=settings

@@ -31,7 +31,7 @@ from robochoc.communication.run_result import RunResult
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Robot, Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
 
 RUN = "run"
@@ -83,7 +83,7 @@ class InMemoryNetwork:
         protocol: type[Protocol],
         identities: dict[str, Identity] | None = None,
         filters: Sequence[str] = (),
-        brief: RunParameters = NO_BRIEF,
+        brief: RunParameters = DEFAULT_PARAMETERS,
         traitor: str = "",
     ) -> None:
         self.traitor = traitor

@@ -16,7 +16,7 @@ from robochoc.model.problem import INFINITE, Assignment, Team
 from robochoc.protocols.cycles import CycleProtocol
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import RunParameters, agent_problems
-from robochoc.solver.compiled import Burden, LocalProblem
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 P = TypeVar("P", bound=CycleProtocol)
 
@@ -80,7 +80,7 @@ def assignments_by_cycle(team: Team, result: RunResult) -> list[Assignment]:
     return course
 
 
-def cost_of_assignment(team: Team, assignment: Assignment) -> Burden:
+def cost_of_assignment(team: Team, assignment: Assignment) -> LexicographicCost:
     """How many constraints `assignment` breaks, and what the others charge."""
     prices = [constraint.price(assignment) for constraint in team.constraints()]
     return prices.count(INFINITE), sum(price for price in prices if price < INFINITE)
@@ -100,5 +100,5 @@ def _moves(team: Team, assignment: Assignment, together: int) -> Iterator[Assign
                 yield {**assignment, **dict(zip(names, values, strict=True))}
 
 
-def never_rises(burdens: Sequence[Burden]) -> bool:
+def never_rises(burdens: Sequence[LexicographicCost]) -> bool:
     return all(after <= before for before, after in itertools.pairwise(burdens))

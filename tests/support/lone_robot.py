@@ -24,7 +24,7 @@ from robochoc.model.message import encode
 from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.abt import ABT, Ok
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.in_memory_network import RUN, ScriptedTransport
 from tests.support.problems import team_of
@@ -43,7 +43,7 @@ def task(protocol: type[Protocol] = ABT, epoch: int = 1) -> Task:
     members = Members()
     for robot in chain_of_three().robots:
         members.register(robot.name, profile_of(robot), "visit")
-    return members.tasks(epoch, protocol.__name__, protocol.traits, NO_BRIEF)["RB"]
+    return members.tasks(epoch, protocol.__name__, protocol.traits, DEFAULT_PARAMETERS)["RB"]
 
 
 def ok(value: int) -> bytes:

@@ -12,21 +12,21 @@ from dataclasses import replace
 from random import Random
 
 from robochoc.formats import PREDEFINED
-from robochoc.model.orders import Order, OrderError, in_order
+from robochoc.model.orders import Order, OrderError, with_order
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import (
     INFINITE,
     Child,
     Constraint,
     Domain,
-    Kind,
     Parent,
+    ProblemKind,
     Robot,
     Team,
     Variable,
 )
+from robochoc.run import solve
 from robochoc.run.options import Options
-from robochoc.run.orchestrator import solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
 from tests.support.complex_problems import random_complex_team
@@ -64,7 +64,7 @@ def every_order(team: Team, chance: Random) -> list[Order | tuple[str, ...] | No
     orders: list[Order | tuple[str, ...] | None] = [None]
     for order in (*Order, *listed):
         try:
-            in_order(team, order)
+            with_order(team, order)
         except OrderError:
             continue
         orders.append(order)
@@ -105,7 +105,7 @@ def check_against_brute_force(team: Team, options: Options, solver: AceProcess |
         options = replace(options, messages=ENOUGH)
     outcome = solve(team, options, solver=solver)
     truth = minimum_cost(team)
-    found = Verdict.OPTIMAL if team.kind is Kind.DISWCSP else Verdict.SOLUTION
+    found = Verdict.OPTIMAL if team.kind is ProblemKind.DISWCSP else Verdict.SOLUTION
     what = (team, options, outcome.verdict, outcome.cost)
     if outcome.assignment:
         assert outcome.verified, what
@@ -161,7 +161,7 @@ def minimum_cost(team: Team) -> float:
         for robot in team.robots
     )
     smaller = replace(team, robots=tuple(robots))
-    if team.kind is Kind.DISWCSP:
+    if team.kind is ProblemKind.DISWCSP:
         return least_cost(smaller)
     return 0 if any(solutions(smaller)) else INFINITE
 

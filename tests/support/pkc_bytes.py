@@ -16,10 +16,10 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Decided
 from robochoc.model.message import Envelope, encode
-from robochoc.model.problem import Constraint, Domain, Model, Relation, Robot, Semantics, Team
+from robochoc.model.problem import Constraint, ConstraintModel, Domain, Relation, Robot, Semantics, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.shared import Others, SharedConstraint
+from robochoc.solver.shared_constraint import OtherValues, SharedConstraint
 from tests.support.pkc_problems import allowed, as_predicate, as_table, pkc_parts, rows, with_constraints
 
 Asked = Mapping[tuple[str, str], set[frozenset[tuple[str, int]]]]
@@ -87,7 +87,7 @@ def watched(team: Team, monkeypatch: pytest.MonkeyPatch) -> Asked:
         """A mask that notes which of its bits are looked at."""
 
         constraint: SharedConstraint
-        others: Others
+        others: OtherValues
 
         def __rshift__(self, index: int, /) -> int:
             if self.constraint.key in parts:
@@ -98,7 +98,7 @@ def watched(team: Team, monkeypatch: pytest.MonkeyPatch) -> Asked:
                 asked[holder, name].add(frozenset(pair))
             return int(self) >> index
 
-    def mask(constraint: SharedConstraint, others: Others) -> int:
+    def mask(constraint: SharedConstraint, others: OtherValues) -> int:
         found = Mask(plain(constraint, others))
         found.constraint, found.others = constraint, others
         return found
@@ -111,7 +111,7 @@ def changed_elsewhere(team: Team, asked: Asked, chance: Random, *, there: bool =
     """Parts of PKCs say by chance anything about pairs that were not asked about (`there`: about those that were)."""
 
     def change(robot: Robot, constraint: Constraint) -> Constraint:
-        if constraint.model is not Model.PKC:
+        if constraint.model is not ConstraintModel.PKC:
             return constraint
         known = asked.get((robot.name, constraint.name), set())
         return _redrawn(team, constraint, chance, lambda pair: (frozenset(pair.items()) in known) is there)
@@ -125,7 +125,7 @@ def changed_where_nobody_was(team: Team, taken: Mapping[str, set[int]], chance: 
 
     def change(robot: Robot, constraint: Constraint) -> Constraint:
         owners = {team.owner[name] for name in constraint.variables}
-        looks = robot.name if constraint.model is Model.PKC else min(owners, key=rank.__getitem__)
+        looks = robot.name if constraint.model is ConstraintModel.PKC else min(owners, key=rank.__getitem__)
         own = [name for name in constraint.variables if team.owner[name] == looks]
         return _redrawn(
             team, constraint, chance, lambda pair: any(pair[name] not in taken.get(name, set()) for name in own)
@@ -139,7 +139,7 @@ def restated(team: Team, chance: Random) -> Team:
     numbers = itertools.count()
 
     def change(_: Robot, constraint: Constraint) -> Constraint:
-        if constraint.model is not Model.PKC:
+        if constraint.model is not ConstraintModel.PKC:
             return constraint
         every = rows(team, constraint)
         allowing = [row for row in every if allowed(constraint, row)]

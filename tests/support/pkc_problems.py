@@ -11,9 +11,19 @@ from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.expression import Type, parse
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Child, Constraint, Model, Parent, Predicate, Relation, Robot, Semantics, Team
+from robochoc.model.problem import (
+    Child,
+    Constraint,
+    ConstraintModel,
+    Parent,
+    Predicate,
+    Relation,
+    Robot,
+    Semantics,
+    Team,
+)
 from robochoc.protocols.protocol import Protocol
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 from tests.support.problems import PREDICATES, solutions, team_of
 from tests.support.program import ROOT
 from tests.support.solver_networks import compiled_by_brute_force
@@ -41,7 +51,7 @@ def random_pkc_team(chance: Random) -> Team:
             held.append(_random_part(chance, domains, pair, f"C{number}"))
             parts[pair] = _random_part(chance, domains, pair, f"C{number}")
         if kinds != "pkc":
-            held.append(replace(_random_part(chance, domains, pair, f"T{number}"), model=Model.TKC))
+            held.append(replace(_random_part(chance, domains, pair, f"T{number}"), model=ConstraintModel.TKC))
     private = (_table(chance, domains, (name,), 0.3, f"U{name}") for name in domains if chance.random() < 0.1)
     team = team_of(domains, [*held, *(replace(one, model=None) for one in private)], "pkc")
     for (parent, child), part in parts.items():
@@ -86,7 +96,7 @@ def pkc_parts(team: Team) -> dict[Part, Constraint]:
         neighbours: tuple[Parent | Child, ...] = (*robot.parents, *robot.children)
         for neighbour in neighbours:
             for constraint in neighbour.constraints:
-                if constraint.model is Model.PKC:
+                if constraint.model is ConstraintModel.PKC:
                     found[robot.name, neighbour.name, constraint.name] = constraint
     return found
 
@@ -140,7 +150,7 @@ def _random_part(chance: Random, domains: Mapping[str, Sequence[int]], pair: Seq
     chance.shuffle(scope)
     if chance.random() < 0.7:
         return _table(chance, domains, scope, chance.uniform(0, 0.45), name)
-    return Constraint(name, chance.choice(PREDICATES), tuple(scope), tuple(scope), Model.PKC)
+    return Constraint(name, chance.choice(PREDICATES), tuple(scope), tuple(scope), ConstraintModel.PKC)
 
 
 def _table(
@@ -150,7 +160,7 @@ def _table(
     every = itertools.product(*(domains[variable] for variable in scope))
     listed = [row for row in every if (chance.random() < tightness) is (semantics is Semantics.CONFLICTS)]
     relation = Relation(f"r{name}.{chance.getrandbits(40)}", len(scope), semantics, tuple(listed))
-    return Constraint(name, relation, tuple(scope), tuple(scope), Model.PKC)
+    return Constraint(name, relation, tuple(scope), tuple(scope), ConstraintModel.PKC)
 
 
 def _one_sided(team: Team, chance: Random) -> Team:
@@ -187,7 +197,7 @@ def _split(team: Team, constraint: Constraint, chance: Random, name: str) -> tup
         listed = rejected if conflicts else [row for row in every if row not in rejected]
         semantics = Semantics.CONFLICTS if conflicts else Semantics.SUPPORTS
         part = as_table(constraint, listed, semantics, f"{name}.{side}")
-        both.append(replace(part, name=name, model=Model.PKC))
+        both.append(replace(part, name=name, model=ConstraintModel.PKC))
     return both[0], both[1]
 
 
@@ -205,7 +215,7 @@ def pkc_part(pair: str, *forbidden: tuple[int, int], name: str = "C") -> Constra
     """Return one robot's part of a PKC over the variables named by two letters."""
     called = "R" + "_".join(f"{one}.{other}" for one, other in forbidden)
     relation = Relation(called, 2, Semantics.CONFLICTS, forbidden)
-    return Constraint(name, relation, tuple(pair), tuple(pair), Model.PKC)
+    return Constraint(name, relation, tuple(pair), tuple(pair), ConstraintModel.PKC)
 
 
 def pkc_pair(below: Constraint | None, above: Constraint | None, values: int = 2) -> Team:
@@ -229,5 +239,5 @@ def check_against_brute_force(team: Team, protocol: type[Protocol], chance: Rand
     assert result.verdict is (Verdict.SOLUTION if solvable else Verdict.NO_SOLUTION), team
     if solvable:
         flat = {name: value for own in result.assignments.values() for name, value in own.items()}
-        assert not list(objections(team, flat))
+        assert not list(violations(team, flat))
     return result.verdict

@@ -6,19 +6,19 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from random import Random
 
-from robochoc.model.change import changed
+from robochoc.model.change import apply_changes
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
     Change,
     Domain,
-    Event,
     Parent,
     RemoveAgent,
     RemoveConstraint,
     RemoveValue,
     Robot,
+    ScenarioEvent,
     Team,
     Variable,
 )
@@ -38,14 +38,14 @@ class ScenarioAuthor:
         self._left: list[str] = []
         self._number = 0
 
-    def scenario(self, team: Team, events: int) -> Iterator[Event]:
+    def scenario(self, team: Team, events: int) -> Iterator[ScenarioEvent]:
         """So many events for `team`, of one to three changes each; one in four in mid-run."""
         for _ in range(events):
             changes = []
             for _ in range(self._chance.choice((1, 1, 2, 3))):
                 changes.append(self._change(team))
-                team = changed(team, changes[-1:])
-            yield Event(tuple(changes), self._chance.choice((None, None, None, self._chance.randint(0, 30))))
+                team = apply_changes(team, changes[-1:])
+            yield ScenarioEvent(tuple(changes), self._chance.choice((None, None, None, self._chance.randint(0, 30))))
 
     def _change(self, team: Team) -> Change:
         while True:
@@ -126,5 +126,5 @@ def stages(team: Team) -> Iterator[Team]:
     now = replace(team, scenario=())
     yield now
     for event in team.scenario:
-        now = changed(now, event.changes)
+        now = apply_changes(now, event.changes)
         yield now

@@ -6,7 +6,7 @@ from dataclasses import replace
 from random import Random
 
 from robochoc.model.problem import Team
-from robochoc.run.orchestrator import Options, Runtime, ScheduleName
+from robochoc.run import Options, Runtime, ScheduleName
 from tests.support.loose_problems import any_order
 
 MAX_MESSAGES = 3000

@@ -8,9 +8,9 @@ from random import Random
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.journal import Header, Journal, Recorder, read_journal
 from robochoc.model.problem import Team
-from robochoc.run.orchestrator import Options, Runtime, ScheduleName, solve
+from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import protocol_named
-from robochoc.sniffer.feed import Feed
+from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.trace import Trace
 from tests.support.cost_problems import random_cost_team
 
@@ -31,6 +31,6 @@ def recorded(protocol: str, n: int = 3, schedule: ScheduleName = ScheduleName.CO
 
 
 @cache
-def feed_of(protocol: str, n: int = 3) -> Feed:
+def feed_of(protocol: str, n: int = 3) -> PageData:
     """The feed of that run."""
-    return Feed(Trace.of(recorded(protocol, n)))
+    return PageData(Trace.of(recorded(protocol, n)))

@@ -11,8 +11,8 @@ import msgspec
 from robochoc.journal.events import AnyEvent, Began, Given
 from robochoc.journal.journal import Header, Journal, Recorder, read_journal
 from robochoc.model.orders import Order
-from robochoc.model.problem import Kind, Model, Team
-from robochoc.run.orchestrator import Options, Withdrawal, solve
+from robochoc.model.problem import ConstraintModel, ProblemKind, Team
+from robochoc.run import Options, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
 from tests.support.complex_changes import random_complex_changing_team
@@ -52,7 +52,7 @@ def random_run(protocol: str, chance: Random, number: int) -> tuple[Team, Option
         options = replace(options, settings={"cycles": "8"})
     if team.dynamic:
         return team, options
-    parts = any(one.model is Model.PKC for one in team.constraints())
+    parts = any(one.model is ConstraintModel.PKC for one in team.constraints())
     order = None if parts else chance.choice((None, Order.MIN_WIDTH, Order.RANDOM))
     return team, replace(options, withdraw=withdrawal(protocol, team, chance), order=order)
 
@@ -60,9 +60,9 @@ def random_run(protocol: str, chance: Random, number: int) -> tuple[Team, Option
 def withdrawal(protocol: str, team: Team, chance: Random) -> Withdrawal | None:
     """Who may step aside, if anybody."""
     traits = protocol_named(protocol).traits
-    parts = any(one.model is Model.PKC for one in team.constraints())
+    parts = any(one.model is ConstraintModel.PKC for one in team.constraints())
     fewest = not parts and (traits.complete or not traits.costs)
-    maximal = not parts and team.kind is Kind.DISCSP
+    maximal = not parts and team.kind is ProblemKind.DISCSP
     return chance.choice([None, None, *([Withdrawal.MINIMUM] * fewest), *([Withdrawal.MAXIMAL] * maximal)])
 
 

@@ -9,13 +9,13 @@ from robochoc.formats import PREDEFINED
 from robochoc.model.problem import (
     Child,
     Constraint,
+    ConstraintModel,
     Domain,
-    Event,
-    Model,
     Parent,
     Predicate,
     Relation,
     Robot,
+    ScenarioEvent,
     Semantics,
     Team,
     Variable,
@@ -35,7 +35,7 @@ def triangle(values: int = 2) -> Team:
     return different("ABCD", "AB AC BC CD", values)
 
 
-def pair(*events: Event, values: int = 1) -> Team:
+def pair(*events: ScenarioEvent, values: int = 1) -> Team:
     """Return two robots that must take different values, and what happens to them."""
     team = team_of(dict.fromkeys("AB", range(1, values + 1)), [differ("A", "B")])
     return replace(team, scenario=events)
@@ -50,7 +50,7 @@ def graph_team(edges: Sequence[str], domains: Mapping[str, int] | None = None) -
 
 def pkc_team() -> Team:
     """Return A above B, which share a PKC, and X, which B must differ from."""
-    part = Constraint("C", DIFFERENT, ("A", "B"), ("A", "B"), model=Model.PKC)
+    part = Constraint("C", DIFFERENT, ("A", "B"), ("A", "B"), model=ConstraintModel.PKC)
     team = team_of({"A": (1, 2), "B": (1, 2), "X": (1, 2)}, [part, Constraint("D", DIFFERENT, ("B", "X"), ("B", "X"))])
     above = replace(team["RA"], children=(Child("RB", ("A",), (part,)),))
     return replace(team, robots=(above, team["RB"], team["RX"]))

@@ -16,9 +16,9 @@ from PIL import Image
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent
 from robochoc.journal.journal import read_journal
+from robochoc.run import solve
 from robochoc.run.options import Options, Runtime
-from robochoc.run.orchestrator import solve
-from robochoc.sniffer.feed import Feed
+from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.trace import Trace
 from tests.support.browser_pages import watched_page
 from tests.support.sniffer_server import journal_of
@@ -32,7 +32,7 @@ OUTCOME = solve(queens3d(4), Options(protocol="abt", runtime=Runtime.SIMULATOR, 
 WHOLE = journal_of(EVENTS, OUTCOME)
 JOURNAL = read_journal(WHOLE)
 TRACE = Trace.of(JOURNAL)
-FEED = Feed(TRACE)
+FEED = PageData(TRACE)
 COUNT = len(TRACE.messages.t)
 ALL = f"{COUNT} messages"
 

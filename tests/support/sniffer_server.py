@@ -16,8 +16,8 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent
 from robochoc.journal.journal import Header, Recorder
 from robochoc.model.outcome import Outcome
+from robochoc.run import solve
 from robochoc.run.options import Options, Runtime, Withdrawal
-from robochoc.run.orchestrator import solve
 from robochoc.sniffer.server import Server
 from robochoc.sniffer.session import Session
 from robochoc.view.address import loopback_socket, url_of

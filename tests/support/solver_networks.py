@@ -7,7 +7,7 @@ from random import Random
 
 from robochoc.model.problem import Team
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.domain import compiled_domain
+from robochoc.solver.domain import compile_domain
 from robochoc.solver.encoding import Codes, Network, Table
 
 SMALL_NETWORK = Network(((0, 1), (0, 1)), (Table((0, 1), allowed=False, rows=((0, 0),)),))
@@ -54,4 +54,4 @@ SMALL_SOLUTIONS: tuple[Codes, ...] = ((0, 1), (1, 0), (1, 1))
 
 def compiled_by_brute_force(team: Team) -> CompiledTeam:
     """Return `team`, its local problems solved by brute force."""
-    return CompiledTeam(team, lambda robot: compiled_domain(robot, brute_force))
+    return CompiledTeam(team, lambda robot: compile_domain(robot, brute_force))

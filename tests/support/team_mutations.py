@@ -8,7 +8,7 @@ from random import Random
 from typing import TypeVar
 
 from robochoc.formats import PREDEFINED
-from robochoc.model.problem import INFINITE, Constraint, Domain, Kind, Robot, Team, Term
+from robochoc.model.problem import INFINITE, Constraint, Domain, ProblemKind, Robot, Team, Term
 
 Mutation = Callable[[Robot, Team, Random], Robot]
 _Item = TypeVar("_Item")
@@ -44,7 +44,7 @@ def _no_child(robot: Robot, _: Team, chance: Random) -> Robot:
 
 
 def _costly(robot: Robot, _team: Team, _: Random) -> Robot:
-    return replace(robot, kind=Kind.DISWCSP)
+    return replace(robot, kind=ProblemKind.DISWCSP)
 
 
 def _heavy(robot: Robot, _: Team, chance: Random) -> Robot:

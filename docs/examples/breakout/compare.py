@@ -8,8 +8,8 @@ from statistics import median
 from graphs import soluble
 
 from robochoc.model.outcome import Verdict
+from robochoc.run import solve
 from robochoc.run.options import Options, Runtime
-from robochoc.run.orchestrator import solve
 
 TEAMS = [soluble(15, 32, Random(seed)) for seed in range(20)]
 ENOUGH = 20_000

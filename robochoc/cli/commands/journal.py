@@ -109,25 +109,25 @@ def export(
 def _pieces(form: str, read: Journal, trace: Trace, meant: Selection, messages: range | list[int]) -> Iterable[bytes]:
     """The export, piece by piece."""
     from robochoc.journal.journal import lines_of
+    from robochoc.sniffer.excerpt import excerpt_of
     from robochoc.sniffer.export import TooMuchToDrawError, acl_texts, drawable, mermaid, table
-    from robochoc.sniffer.feed import Feed
-    from robochoc.sniffer.part import part_of
+    from robochoc.sniffer.page_data import PageData
 
     whole = len(messages) == len(trace.messages.t)
     match form:
         case "jsonl":
-            return lines_of(read if whole else part_of(read, trace, messages))
+            return lines_of(read if whole else excerpt_of(read, trace, messages))
         case "acl":
-            return acl_texts(Feed(trace), messages)
+            return acl_texts(PageData(trace), messages)
         case "csv":
-            return table(Feed(trace), messages)
+            return table(PageData(trace), messages)
         case "mermaid":
-            feed = Feed(trace)
+            data = PageData(trace)
             try:
-                return [mermaid(feed, messages)]
+                return [mermaid(data, messages)]
             except TooMuchToDrawError as much:
                 why = f"{much} (choose some, by --robots, --types, --from and --to)"
-                raise _TooManyError(why, drawable(feed, messages)) from much
+                raise _TooManyError(why, drawable(data, messages)) from much
         case _:
             return [_page(read, trace, meant)]
 
@@ -159,13 +159,13 @@ def _page(read: Journal, trace: Trace, meant: Selection) -> bytes:
             f"{count:,} messages are too many for one page: at most {MOST_IN_PAGE:,}"
             " (look at them with 'robochoc sniff', or export another format)",
         )
-    from robochoc.sniffer.feed import Feed
-    from robochoc.sniffer.moves import whole_scene
-    from robochoc.sniffer.packed import packed_feed
+    from robochoc.sniffer.embedded import embedded_answers
     from robochoc.sniffer.page import page
+    from robochoc.sniffer.page_data import PageData
+    from robochoc.sniffer.scene import whole_scene
 
-    feed = Feed(trace, chosen=meant.robots)
-    answers = {**packed_feed(feed, read), "scene": zlib.compress(whole_scene(trace))}
+    data = PageData(trace, chosen=meant.robots)
+    answers = {**embedded_answers(data, read), "scene": zlib.compress(whole_scene(trace))}
     return page("embedded", answers, title=f"{read.header.protocol} on {read.header.team}")
 
 

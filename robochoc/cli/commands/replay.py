@@ -15,7 +15,7 @@ from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure, failure
 
 if TYPE_CHECKING:
     from robochoc.journal.journal import Journal
-    from robochoc.replay import Means, Replayed
+    from robochoc.replay import ReplayOptions, ReplayResult
 
 
 @click.command()
@@ -56,11 +56,11 @@ def replay(
     is one without steps.
     """
     from robochoc.formats import read_team
-    from robochoc.replay import Means
+    from robochoc.replay import ReplayOptions
     from robochoc.solver.cache import SolutionCache
 
     recorded = saved_journal(journal)
-    means = Means(
+    means = ReplayOptions(
         team=read_team(folder) if folder else None,
         settings=protocol_settings(settings),
         limits=limits(local_solutions, local_timeout, always_ace=always_ace),
@@ -86,7 +86,7 @@ def _altered(journal: Journal) -> bool:
     return journal.damage is not None and not journal.truncated
 
 
-def _replayed(path: Path, journal: Journal, means: Means) -> Replayed:
+def _replayed(path: Path, journal: Journal, means: ReplayOptions) -> ReplayResult:
     from robochoc.cli.reports.progress import progress_line
     from robochoc.formats import on_one_line
     from robochoc.replay import CannotReplayError

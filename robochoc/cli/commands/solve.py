@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
     from robochoc.ros.closed_loop import ClosedLoop
-    from robochoc.run.orchestrator import Options
+    from robochoc.run.options import Options
     from robochoc.verification.objective import Objective
     from robochoc.view.scene import Scene
 
@@ -178,7 +178,7 @@ def solve(
     robochoc solve instances/queens3d-4 --withdraw --html out/page.html
     robochoc solve instances/ --runtime simulator --protocol dpop --json
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.run.orchestrator import OnLoss, Options, Runtime, ScheduleName, Withdrawal
+    from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
 
     ros = ros_asked(settings)
     check_settings(settings)
@@ -274,7 +274,7 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
 def _run(team: Team, options: Options, recorder: Recorder | None, loop: ClosedLoop | None) -> Outcome:
     """Run with whatever watches, a journal, a line on the terminal, and where decisions go."""
     from robochoc.cli.reports.progress import progress_line, waiting
-    from robochoc.run.orchestrator import CENTRAL
+    from robochoc.run.options import CENTRAL
     from robochoc.run.orchestrator import solve as run
 
     told = loop and (loop.feedback or (team.dynamic and options.protocol != CENTRAL))
@@ -282,7 +282,7 @@ def _run(team: Team, options: Options, recorder: Recorder | None, loop: ClosedLo
         show = shown_and_flushed(recorder, progress)
         if loop and loop.feedback and show:
             loop.feedback.idle = waiting(show)
-        outcome = run(team, options, observer=recorder, progress=show, field=loop if told else None)
+        outcome = run(team, options, observer=recorder, progress=show, environment=loop if told else None)
     if recorder:
         recorder.outcome = outcome
         recorder.close()  # before anything else goes to where it may be written
@@ -307,7 +307,7 @@ def _header(team: Team, options: Options) -> Header:
 
 def _objective(team: Team, options: Options) -> Callable[[], Objective] | None:
     """What the journal weighs decisions by; None where nothing is minimised, or the problem changes."""
-    from robochoc.run.orchestrator import Withdrawal
+    from robochoc.run.options import Withdrawal
     from robochoc.verification.objective import Objective, withdrawal_cost
 
     fewest = options.withdraw is Withdrawal.MINIMUM

@@ -22,7 +22,7 @@ def order_for(team: Team, order: str | Path) -> Order | tuple[str, ...] | None:
     Raises:
         InvalidInputError: a file does not list the team's robots.
     """
-    from robochoc.formats.order import read_order
+    from robochoc.formats.order_file import read_order
     from robochoc.model.orders import Order
 
     if isinstance(order, Path):

@@ -70,12 +70,12 @@ def _status(error: Exception) -> int | None:
     """The exit status that stands for `error`; None for one that should not be. Imports only what may be wanted."""
     from robochoc.communication.processes.robot_link import RobotsLostError
     from robochoc.formats import InvalidInputError
-    from robochoc.run.orchestrator import RefutedError
     from robochoc.run.registry import UnknownProtocolError
     from robochoc.solver.compile import CompileError, CompileTimeoutError
     from robochoc.solver.domain import TooManySolutionsError
     from robochoc.solver.encoding import UnsupportedError
     from robochoc.solver.failures import SolverLostError, SolverMissingError
+    from robochoc.verification.checker import RefutedError
 
     statuses: dict[int, tuple[type[Exception], ...]] = {
         INVALID: (InvalidInputError,),

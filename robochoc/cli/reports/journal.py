@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from msgspec import UNSET
 
 from robochoc.formats import on_one_line
-from robochoc.sniffer.feed import Feed
-from robochoc.sniffer.rows import Run
+from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.trace import Trace
+from robochoc.sniffer.trace_tables import RunRecord
 
 _MOST_RUNS = 20
 _MOST_ROBOTS = 12
@@ -24,12 +24,12 @@ def report(trace: Trace) -> Iterator[str]:
 
 
 def _facts(trace: Trace) -> Iterator[tuple[str, str]]:
-    header, feed = trace.header, Feed(trace)
+    header, data = trace.header, PageData(trace)
     yield "team", header.team
     order = "" if header.order is UNSET else f", order {header.order if isinstance(header.order, str) else 'listed'}"
     channel = "" if header.channel is UNSET else f", channel {header.channel}"
     yield "protocol", f"{header.protocol} ({header.runtime}, seed {header.seed}{order}{channel})"
-    yield "outcome", feed.news()["verdict"]
+    yield "outcome", data.news()["verdict"]
     yield "robots", f"{len(trace.robots):,}: {_some(trace.robots)}" if trace.robots else "none"
     yield "messages", f"{len(trace.messages.t):,}, {sum(trace.messages.bytes):,} bytes"
     counts = Counter(trace.messages.kind)
@@ -43,14 +43,14 @@ def _facts(trace: Trace) -> Iterator[tuple[str, str]]:
         yield "", f"and {len(trace.runs) - _MOST_RUNS:,} more runs"
     for note in [note for note in trace.notes if note.kind in {"lost", "refused"}][:_MOST_RUNS]:
         yield "note", note.text
-    cannot = feed.cannot_replay()
+    cannot = data.cannot_replay()
     yield "replay", f"not possible: {cannot}" if cannot else "possible"
     if trace.unseen:
         yield "unseen", f"{trace.unseen:,} messages were taken in that nobody was seen to send"
     yield "whole", f"no: {trace.damage}" if trace.damage else "yes"
 
 
-def _run(run: Run, messages: int) -> str:
+def _run(run: RunRecord, messages: int) -> str:
     epoch = "" if run.epoch is None else f", epoch {run.epoch}"
     opened = "" if run.opened_by is None else f", opened by {run.opened_by}"
     return f"{run.protocol}{epoch}{opened}: {messages:,} messages"

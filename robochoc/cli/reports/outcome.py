@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from robochoc.cli.reports.table import table_lines
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
-from robochoc.model.change import changed_by
+from robochoc.model.change import team_after_events
 from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import ALL_ROBOTS, Metrics, Outcome, Verdict
-from robochoc.model.priorities import natural
-from robochoc.model.problem import Kind, Team
+from robochoc.model.priorities import natural_key
+from robochoc.model.problem import ProblemKind, Team
 
 WIDTH = 100
 _LARGE = 1 << 16
@@ -23,13 +23,13 @@ _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 def report(team: Team, outcome: Outcome) -> str:
     """Return a few lines: what happened and why, the values, the withdrawn and lost robots, and the metrics."""
     lines = [f"{on_one_line(outcome.team)}: {_verdict(team, outcome)}", *_epochs(outcome)]
-    team = changed_by(team, outcome.events)
+    team = team_after_events(team, outcome.events)
     if outcome.assignment:
         lines += _board(team, outcome.assignment) or _list(team, outcome.assignment)
     if outcome.aside:
         lines += [f"  {len(outcome.aside)} withdrawn{_weight(team, outcome)}:", *_wrapped(outcome.aside)]
     if outcome.lost:
-        lost = sorted(outcome.lost, key=natural)
+        lost = sorted(outcome.lost, key=natural_key)
         lines += [f"  {len(lost)} lost:", *_wrapped(lost)]
     order = f", order {outcome.order}" if outcome.order else ""
     lines.append(f"  {outcome.protocols}{order}, {_place(team, outcome)}: {_metrics(outcome)}{_simulated(outcome)}")
@@ -109,7 +109,7 @@ def _trusted(outcome: Outcome) -> str:
 
 
 def _not_proven(team: Team, outcome: Outcome) -> str:
-    known = team.kind is Kind.DISCSP or outcome.verdict is Verdict.OPTIMAL
+    known = team.kind is ProblemKind.DISCSP or outcome.verdict is Verdict.OPTIMAL
     return "" if known else " (not proven to be the minimum)"
 
 
@@ -132,7 +132,7 @@ def _so_far(team: Team, outcome: Outcome) -> str:
         lower = f" (lower bound {_number(bound)})" if bound else ""
         withdraw = "withdraws" if len(outcome.aside) == 1 else "withdraw"
         return f"; in the best answer so far {len(outcome.aside)} {withdraw}{_weight(team, outcome)}{lower}"
-    if team.kind is Kind.DISCSP:
+    if team.kind is ProblemKind.DISCSP:
         return ""
     known = [f"the best so far costs {_number(outcome.cost)}"] if outcome.assignment else []
     reported = ", as all robots report" if outcome.claimed_by else ""
@@ -191,7 +191,7 @@ def _board(team: Team, assignment: Mapping[str, int]) -> list[str]:
 
 
 def _list(team: Team, assignment: Mapping[str, int]) -> list[str]:
-    owners = sorted({team.owner[name] for name in assignment}, key=natural)
+    owners = sorted({team.owner[name] for name in assignment}, key=natural_key)
     own = {owner: [variable.name for variable in team[owner].variables] for owner in owners}
     values = {owner: ", ".join(f"{name} = {assignment[name]}" for name in names) for owner, names in own.items()}
     return _wrapped([f"{owner}: {values[owner]}" for owner in owners])

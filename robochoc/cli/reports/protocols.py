@@ -15,7 +15,7 @@ from robochoc.cli.reports.table import print_table
 from robochoc.formats import on_one_line
 from robochoc.protocols.protocol import NO_SETTINGS, Settings
 from robochoc.protocols.traits import Traits
-from robochoc.run.orchestrator import CENTRAL
+from robochoc.run.options import CENTRAL
 from robochoc.run.registry import Offer, offers
 from robochoc.solver import central
 

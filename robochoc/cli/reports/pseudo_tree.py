@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from robochoc.formats import on_one_line
 from robochoc.model.outcome import Outcome, PseudoTreeNode
-from robochoc.model.priorities import natural
+from robochoc.model.priorities import natural_key
 
 
 def explained(outcome: Outcome) -> str:
@@ -25,7 +25,7 @@ def explained(outcome: Outcome) -> str:
 def _children(nodes: Mapping[str, PseudoTreeNode]) -> dict[str | None, list[str]]:
     """Return the children of each robot, in natural order."""
     below: dict[str | None, list[str]] = {}
-    for name in sorted(nodes, key=natural):
+    for name in sorted(nodes, key=natural_key):
         below.setdefault(nodes[name].parent, []).append(name)
     return below
 

@@ -17,7 +17,7 @@ from robochoc.journal.events import (
     Settled,
 )
 from robochoc.journal.journal import Journal
-from robochoc.replay import Contradiction, Difference, Replayed
+from robochoc.replay import Contradiction, Difference, ReplayResult
 
 LONGEST = 400
 """Characters of one message's content."""
@@ -25,7 +25,7 @@ MOST = 20
 """So many messages of a packet are shown, and so many robots that could not be followed."""
 
 
-def report(journal: Journal, replayed: Replayed) -> str:
+def report(journal: Journal, replayed: ReplayResult) -> str:
     """For people: a few lines, and the first difference if there is one."""
     header = journal.header
     lines = [f"{header.team}: {header.protocol}, runtime {header.runtime}, seed {header.seed}"]
@@ -47,7 +47,7 @@ def report(journal: Journal, replayed: Replayed) -> str:
     return "\n".join(on_one_line(line) for line in lines)
 
 
-def result_json(journal: Journal, replayed: Replayed) -> str:
+def result_json(journal: Journal, replayed: ReplayResult) -> str:
     """The same as one JSON object."""
     header = journal.header
     told: dict[str, object] = {
@@ -68,7 +68,7 @@ def result_json(journal: Journal, replayed: Replayed) -> str:
     return msgspec.json.format(msgspec.json.encode(told), indent=2).decode()
 
 
-def _counts(replayed: Replayed) -> dict[str, int]:
+def _counts(replayed: ReplayResult) -> dict[str, int]:
     return {
         "runs": replayed.runs,
         "robots": replayed.robots,
@@ -77,7 +77,7 @@ def _counts(replayed: Replayed) -> dict[str, int]:
     }
 
 
-def _shortfalls(replayed: Replayed) -> Iterator[str]:
+def _shortfalls(replayed: ReplayResult) -> Iterator[str]:
     """What could not be played, and why."""
     if replayed.damage:
         yield f"  the journal {'ends early' if replayed.truncated else 'was altered'}: {replayed.damage}"

@@ -33,10 +33,10 @@ from robochoc.communication.resources import require_descriptors, signals_held
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.journal.events import Observer
-from robochoc.model.change import still_showing
+from robochoc.model.change import keep_interfaces
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, RunParameters
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
 
@@ -70,7 +70,7 @@ class LocalNetwork(Session):
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
         conditions: NetworkSettings = NetworkSettings(),
-        brief: RunParameters = NO_BRIEF,
+        brief: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
         super().__init__(team)
         team = self.compiled.team
@@ -144,7 +144,7 @@ class LocalNetwork(Session):
 
     def workable(self, team: Team) -> Team:
         """Return what is left of the team: robots whose values still mean what they meant. See `Session.workable`."""
-        return still_showing(team, self.compiled.team)
+        return keep_interfaces(team, self.compiled.team)
 
     def change(self, epoch: Epoch) -> None:
         """Go on without the robots that were lost: no other change can happen here."""

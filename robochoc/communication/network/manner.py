@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from robochoc.solver.compiled_team import CompileRobot
-from robochoc.solver.domain import compiled_domain
+from robochoc.solver.domain import compile_domain
 
 
 def _nothing(*_told: object) -> None:
@@ -27,7 +27,7 @@ class Manner:
     sniffed: bool = False
     place: Callable[[int, int], None] = _nothing
     stage: Callable[[str], None] = _nothing
-    compiled: CompileRobot = compiled_domain
+    compiled: CompileRobot = compile_domain
 
 
 AS_USUAL = Manner()

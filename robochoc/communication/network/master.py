@@ -128,6 +128,11 @@ class Master:
         finally:
             self._gate.close()
 
+    @property
+    def is_private(self) -> bool:
+        """Whether robots keep their values to themselves."""
+        return self._conditions.private
+
     def publish(self, publication: Publication) -> None:
         """Give what is written to `publication`, this run's journal, to those who may sniff. Before it listens."""
         publication.run = self.run

@@ -273,7 +273,7 @@ class Members:
                 tuple(parent for parent in self._links(name) if name in self.robots[parent].profile.looks_at),
                 brief.seed,
                 dict(brief.settings),
-                brief.aside,
+                brief.withdrawal_cost,
                 cards,
             )
             for name in order

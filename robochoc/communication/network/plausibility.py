@@ -20,7 +20,7 @@ from robochoc.communication.network.profile import LONGEST_NAME, MOST_VARIABLES
 from robochoc.communication.quiescence import Counts
 from robochoc.formats.diagnostics import shortened
 from robochoc.formats.names import is_name
-from robochoc.model.outcome import Thoroughness
+from robochoc.model.outcome import CheckCounts
 from robochoc.model.problem import INFINITE, Domain
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.traits import Traits
@@ -249,7 +249,7 @@ def doubts_about_values(accounts: Mapping[str, Account]) -> Iterator[Doubt]:
                 yield Doubt((other, name), f"the variable {variable} is {other}'s, and {name}'s too")
 
 
-def thoroughness(checks: Mapping[str, Checked]) -> Thoroughness:
+def thoroughness(checks: Mapping[str, Checked]) -> CheckCounts:
     """Return how many constraints others than those who hold them have checked too, and how many nobody else has.
 
     Where two say that they are differently many over the same variables, those count that both say there are.
@@ -259,7 +259,7 @@ def thoroughness(checks: Mapping[str, Checked]) -> Thoroughness:
     for one in (one for check in checks.values() for one in check.copies):
         seconded[_key(one)] = max(one.constraints, seconded.get(_key(one), 0))
     both = sum(min(one.constraints, seconded.get(_key(one), 0)) for check in checks.values() for one in check.shared)
-    return Thoroughness(both, held - both)
+    return CheckCounts(both, held - both)
 
 
 def doubts_about_checks(checks: Mapping[str, Checked]) -> Iterator[Doubt]:

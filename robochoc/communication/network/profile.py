@@ -14,7 +14,7 @@ import msgspec
 from robochoc.formats.extension import MAX_VALUES
 from robochoc.formats.names import is_name
 from robochoc.model.priorities import CycleError, priority_order
-from robochoc.model.problem import Child, Constraint, Domain, Kind, Parent, Robot, Variable
+from robochoc.model.problem import Child, Constraint, Domain, Parent, ProblemKind, Robot, Variable
 from robochoc.solver.encoding import max_cost
 
 Ranges = tuple[tuple[int, int], ...]
@@ -43,7 +43,7 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     """
 
     name: str
-    kind: Kind
+    kind: ProblemKind
     parents: tuple[str, ...]
     children: tuple[str, ...]
     variables: dict[str, Ranges]

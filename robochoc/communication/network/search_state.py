@@ -27,7 +27,7 @@ from robochoc.communication.network.plausibility import (
 from robochoc.communication.quiescence import Counts, FourCounters
 from robochoc.communication.run_result import RunResult
 from robochoc.journal.events import AnyEvent, actor
-from robochoc.model.outcome import Thoroughness, Verdict
+from robochoc.model.outcome import CheckCounts, Verdict
 
 _ASKED_ENOUGH = 2
 _TOLD = 3
@@ -213,7 +213,7 @@ class SearchState:
         return tuple(islice(objections(self._checks), _TOLD))
 
     @property
-    def thoroughness(self) -> Thoroughness:
+    def thoroughness(self) -> CheckCounts:
         """How many constraints were checked by whom."""
         return thoroughness(self._checks)
 

@@ -35,13 +35,13 @@ from robochoc.communication.resources import own_memory
 from robochoc.journal.events import AnyEvent
 from robochoc.model.message import Envelope
 from robochoc.model.outcome import Metrics
-from robochoc.model.problem import INFINITE, Constraint, Kind, Model
+from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, ProblemKind
 from robochoc.protocols.findings import NOTHING, Findings
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.explanation import Known, held
+from robochoc.solver.explanation import KeyedConstraint, held_above
 
 EVENTS_AT_ONCE = 500
 PAIR = 2
@@ -120,7 +120,7 @@ class Searcher:
         owners = {name: agent for agent, names in self._task.interfaces.items() for name in names}
         self._refuse_unfit(owners)
         if self._protocol.traits.shared_scopes:
-            known = [one for one in held(self._robot) if one.constraint.model is not Model.PKC]
+            known = [one for one in held_above(self._robot) if one.constraint.model is not ConstraintModel.PKC]
             for parent in self._robot.parents:
                 theirs = [one for one in known if parent.name in {owners.get(v) for v in one.constraint.variables}]
                 self._around.send(parent.name, Copies(self.epoch, msgspec.msgpack.encode(list(map(record_of, theirs)))))
@@ -130,11 +130,11 @@ class Searcher:
         """Raise `UnsupportedError` where the own file asks for more than the protocol can do."""
         robot, traits = self._robot, self._protocol.traits
         refused = f", which {self._task.protocol} does not support"
-        if robot.kind is Kind.DISWCSP and not traits.costs:
+        if robot.kind is ProblemKind.DISWCSP and not traits.costs:
             raise UnsupportedError(f"{robot.name} is part of a DisWCSP{refused}")
         parts = [part for child in robot.children for part in child.constraints]
         for constraint in (*robot.shared, *parts):
-            if constraint.model is Model.PKC and not traits.partially_known:
+            if constraint.model is ConstraintModel.PKC and not traits.partially_known:
                 raise UnsupportedError(
                     f"{robot.name} shares a partially known constraint (PKC, {constraint.name}){refused}"
                 )
@@ -174,7 +174,7 @@ class Searcher:
         copied = _sorted(copies, task.order)
         return AgentProblem(self._own, task.order, task.interfaces, copied, domains, task.links, task.secretive, brief)
 
-    def _known(self, sender: str, record: SharedRecord) -> Known:
+    def _known(self, sender: str, record: SharedRecord) -> KeyedConstraint:
         """The constraint that `sender` holds: only a child can, over variables that are there, mine among them."""
         known = known_of(record)
         variables = set(known.constraint.variables)
@@ -296,14 +296,16 @@ class Searcher:
         robot = self._robot
         parts = [part for child in robot.children for part in child.constraints]
         own = robot.private if self.assignment else ()
-        held = [one for one in (*own, *robot.shared, *parts) if values.keys() >= set(one.variables)]
-        cost = sum(constraint.price(values) for constraint in held)
-        shared = tuple(_judged(robot.name, [one for one in robot.shared if one.model is not Model.PKC], values))
+        held_above = [one for one in (*own, *robot.shared, *parts) if values.keys() >= set(one.variables)]
+        cost = sum(constraint.price(values) for constraint in held_above)
+        shared = tuple(
+            _judged(robot.name, [one for one in robot.shared if one.model is not ConstraintModel.PKC], values)
+        )
         known = [*((child.name, child.copies) for child in robot.children), *self._learnt.items()]
         judged = (one for holder, theirs in known for one in _judged(holder, theirs, values))
         copies = tuple(islice(judged, max(0, MOST_JUDGED - len(shared))))  # others may have told any number
         allowed = cost < INFINITE
-        return Checked(self.epoch, allowed, cost if allowed else 0, len(held), shared, copies)
+        return Checked(self.epoch, allowed, cost if allowed else 0, len(held_above), shared, copies)
 
     def _now(self) -> float:
         return time.monotonic() - self._began
@@ -319,7 +321,7 @@ def _judged(holder: str, constraints: Iterable[Constraint], values: Mapping[str,
         yield Judged(holder, variables, len(group), sum(one.price(values) for one in group))
 
 
-def _sorted(copies: Sequence[Known], order: Sequence[str]) -> tuple[Known, ...]:
+def _sorted(copies: Sequence[KeyedConstraint], order: Sequence[str]) -> tuple[KeyedConstraint, ...]:
     """In the order of those who hold them, as all runtimes have it, whoever was heard first."""
     rank = {name: place for place, name in enumerate(order)}
     return tuple(sorted(copies, key=lambda known: rank.get(known.key.partition("<")[0], -1)))

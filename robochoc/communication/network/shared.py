@@ -10,8 +10,8 @@ import msgspec
 from robochoc.formats.diagnostics import shortened
 from robochoc.formats.names import is_name
 from robochoc.model.expression import Expression, ExpressionError, Type, parse, text
-from robochoc.model.problem import Constraint, Model, Predicate, Relation, Semantics, Term
-from robochoc.solver.explanation import Known
+from robochoc.model.problem import Constraint, ConstraintModel, Predicate, Relation, Semantics, Term
+from robochoc.solver.explanation import KeyedConstraint
 
 MOST_TERMS = 1000
 """In a scope, or of parameters: few enough to look names up among them."""
@@ -48,17 +48,17 @@ class SharedRecord(msgspec.Struct, frozen=True, array_like=True):
     definition: RelationRecord | PredicateRecord
     scope: tuple[Term, ...]
     parameters: tuple[Term, ...]
-    model: Model | None
+    model: ConstraintModel | None
     cost: float
 
 
-def record_of(known: Known) -> SharedRecord:
+def record_of(known: KeyedConstraint) -> SharedRecord:
     """`known` as it travels."""
     one = known.constraint
     return SharedRecord(known.key, one.name, _defined(one.definition), one.scope, one.parameters, one.model, one.cost)
 
 
-def known_of(record: SharedRecord) -> Known:
+def known_of(record: SharedRecord) -> KeyedConstraint:
     """The constraint in `record`. Raises `SharedConstraintError`."""
     if max(len(record.scope), len(record.parameters)) > MOST_TERMS:
         raise SharedConstraintError(f"{shortened(record.name)!r} has more than {MOST_TERMS} terms")
@@ -71,7 +71,7 @@ def known_of(record: SharedRecord) -> Known:
         raise SharedConstraintError(
             f"{shortened(record.name)!r} has {len(record.parameters)} arguments where {arity} are needed"
         )
-    return Known(
+    return KeyedConstraint(
         record.key,
         Constraint(record.name, definition, record.scope, record.parameters, record.model, record.cost),
     )

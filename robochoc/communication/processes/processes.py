@@ -44,7 +44,7 @@ from robochoc.journal.events import AnyEvent, Lost, Observer, Registered
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, AgentProblem, RunParameters
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 
@@ -77,7 +77,7 @@ class ProcessesRun(Session):
         start_method: StartMethod = "fork",
         survive: bool = False,
         patience_s: float | None = None,
-        brief: RunParameters = NO_BRIEF,
+        brief: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
         super().__init__(team)
         self._protocol = protocol

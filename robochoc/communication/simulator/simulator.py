@@ -20,7 +20,7 @@ from robochoc.model.message import Envelope
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.agent_problem import NO_BRIEF, AgentProblem, RunParameters
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 
 PROGRESS_EVERY = 256
@@ -41,7 +41,7 @@ class Simulation(Session):
         *,
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
-        brief: RunParameters = NO_BRIEF,
+        brief: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
         super().__init__(team)
         self._protocol = protocol

@@ -1,13 +1,13 @@
-"""Functional expressions: what a predicate says, as a tree (FORMAT.md, "Functional expressions"; Figure 2).
+"""Functional expressions: what a predicate says, as a tree (docs/reference/format.md; Figure 2).
 
 The vocabulary is XCSP 2.1's. A text is parsed by hand and type-checked, never handed to `eval`; what is computed
-stays within 64 bits, so that no expression can eat the machine. `evaluate` walks the tree and `compiled` builds
-closures: two independent implementations of the same meaning, and the tests hold them against each other.
+stays within 64 bits, so that no expression can eat the machine. `evaluate` walks the tree and `compile_expression`
+builds closures: two independent implementations of the same meaning, and the tests hold them against each other.
 
 All arguments of an operator are evaluated, whatever the others are; only `if` chooses. Booleans are 0 and 1.
 """
 
-from robochoc.model.expression.closures import compiled
+from robochoc.model.expression.closures import compile_expression
 from robochoc.model.expression.operators import ALIASES, OPERATORS, evaluate
 from robochoc.model.expression.parser import ExpressionError, parse
 from robochoc.model.expression.tree import Apply, Constant, Expression, Name, Type, UndefinedValueError, names, text
@@ -22,7 +22,7 @@ __all__ = [
     "Name",
     "Type",
     "UndefinedValueError",
-    "compiled",
+    "compile_expression",
     "evaluate",
     "names",
     "parse",

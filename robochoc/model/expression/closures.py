@@ -14,7 +14,7 @@ from robochoc.model.expression.tree import BOUND, Apply, Constant, Expression, N
 Closure = Callable[[Sequence[int]], int]
 
 
-def compiled(expression: Expression, names: Sequence[str]) -> Closure:
+def compile_expression(expression: Expression, names: Sequence[str]) -> Closure:
     """`expression` as a function of the values of `names`, in their order: what `evaluate` says, but faster.
 
     The function raises `UndefinedValueError` where `evaluate` does. Raises `ValueError` when a name is not in `names`.
@@ -25,10 +25,10 @@ def compiled(expression: Expression, names: Sequence[str]) -> Closure:
         case Name(name):
             return arithmetic.itemgetter(names.index(name))
         case Apply("if", (condition, then, otherwise)):
-            test, yes, no = (compiled(part, names) for part in (condition, then, otherwise))
+            test, yes, no = (compile_expression(part, names) for part in (condition, then, otherwise))
             return lambda values: yes(values) if test(values) else no(values)
         case Apply(operator, arguments):
-            return _CLOSURES[operator](*(compiled(argument, names) for argument in arguments))
+            return _CLOSURES[operator](*(compile_expression(argument, names) for argument in arguments))
 
 
 def _within(value: int) -> int:

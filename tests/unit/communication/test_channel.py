@@ -23,7 +23,7 @@ from robochoc.journal.journal import Header, Recorder, lines_of, metrics_of, rea
 from robochoc.model.message import Envelope
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
-from robochoc.run.orchestrator import Options, Runtime, ScheduleName, Withdrawal, solve
+from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.problems import random_team, solutions, teams
 from tests.support.program import ROOT

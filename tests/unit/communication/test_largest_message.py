@@ -13,8 +13,8 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.journal.journal import metrics_of
 from robochoc.model.outcome import Metrics
+from robochoc.run import solve
 from robochoc.run.options import Options, Runtime, Withdrawal
-from robochoc.run.orchestrator import solve
 from tests.support.problems import ON_ONE_MACHINE
 
 

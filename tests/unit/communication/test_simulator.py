@@ -14,7 +14,7 @@ from robochoc.journal.journal import Header, Recorder, lines_of, metrics_of, rea
 from robochoc.model.message import Envelope
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.run.orchestrator import Options, Runtime, ScheduleName, Withdrawal, solve
+from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from tests.support import golden
 from tests.support.clocks import waiting
 from tests.support.problems import team_of, teams

@@ -13,8 +13,8 @@ from robochoc.flight.crafts import Craft, crafts_of
 from robochoc.flight.layout import Axis, layout_of
 from robochoc.flight.mission import VAST_M, Mission, mission_of
 from robochoc.model.expression import Apply, Constant, Name
-from robochoc.model.outcome import Epoch, Outcome, Verdict
-from robochoc.model.problem import AddAgent, Domain, Event, Robot, Team, Topic, Variable
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.problem import AddAgent, Domain, Robot, ScenarioEvent, Team, Topic, Variable
 
 
 def robot(name: str, z: str, x: int, y: int, *, times: int = 1) -> Robot:
@@ -62,12 +62,12 @@ def test_without_a_solution_everybody_stays() -> None:
 
 def test_each_epoch_is_a_leg() -> None:
     late = robot("C", "c", 2, 2)
-    team = Team("trio", TEAM.robots, (Event((AddAgent(late),)),))
+    team = Team("trio", TEAM.robots, (ScenarioEvent((AddAgent(late),)),))
     epochs = (
-        Epoch(Verdict.SOLUTION, ("A", "B"), assignment={"a": 1, "b": 2}),
-        Epoch(Verdict.SOLUTION, ("A", "B", "C"), "+C", {"a": 1, "b": 3, "c": 2}),
-        Epoch(Verdict.NO_SOLUTION, ("A", "B", "C"), "fog"),
-        Epoch(Verdict.SOLUTION, ("B", "C"), "-A", {"b": 4, "c": 1}),
+        EpochOutcome(Verdict.SOLUTION, ("A", "B"), assignment={"a": 1, "b": 2}),
+        EpochOutcome(Verdict.SOLUTION, ("A", "B", "C"), "+C", {"a": 1, "b": 3, "c": 2}),
+        EpochOutcome(Verdict.NO_SOLUTION, ("A", "B", "C"), "fog"),
+        EpochOutcome(Verdict.SOLUTION, ("B", "C"), "-A", {"b": 4, "c": 1}),
     )
     outcome = Outcome("trio", "dynabt", "simulator", 0, Verdict.SOLUTION, {"b": 4, "c": 1}, epochs=epochs)
     mission = mission_of(outcome, team)

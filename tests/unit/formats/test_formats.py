@@ -29,11 +29,11 @@ from robochoc.model.problem import (
     INFINITE,
     Child,
     Constraint,
+    ConstraintModel,
     Domain,
-    Kind,
-    Model,
     Parent,
     Predicate,
+    ProblemKind,
     Relation,
     Robot,
     Semantics,
@@ -52,7 +52,7 @@ XSD = ROOT / "xsd"
 def test_figure_2_says_what_the_paper_says() -> None:
     robot = read_robot(FIGURE_2)
     assert robot.name == "Robot3.1"
-    assert robot.kind is Kind.DISCSP
+    assert robot.kind is ProblemKind.DISCSP
     assert [(variable.name, list(variable.domain)) for variable in robot.variables] == [("V3.1", [1, 2, 3, 4])]
     assert robot.topics == (Topic("/drone3.1/waypoint3.1"),)
     assert [parent.name for parent in robot.parents] == ["Robot1.1", "Robot2.1", "Robot1.3", "Robot2.2"]
@@ -64,7 +64,7 @@ def test_figure_2_says_what_the_paper_says() -> None:
     assert text(first.definition.body) == "and(ne(X,Y),ne(abs(sub(X,Y)),abs(sub(i,j))))"
     assert second.definition is first.definition
     assert third.definition == fourth.definition == PREDEFINED["neq"]
-    assert {constraint.model for constraint in robot.shared} == {Model.TKC}
+    assert {constraint.model for constraint in robot.shared} == {ConstraintModel.TKC}
     assert first.allows({"V1.1": 1, "V3.1": 2})
     assert not first.allows({"V1.1": 1, "V3.1": 3})
 
@@ -106,7 +106,7 @@ def test_copies_in_other_words_are_checked_and_dropped() -> None:
     assert child.constraints == ()
     assert len(team["A2"].shared) == 3
     assert len(list(team.constraints())) == 5
-    assert {constraint.model for constraint in team["A1"].private} == {Model.TKC}  # as their file says
+    assert {constraint.model for constraint in team["A1"].private} == {ConstraintModel.TKC}  # as their file says
 
 
 def test_a_team_in_priority_order(tmp_path: Path) -> None:
@@ -118,7 +118,7 @@ def test_a_team_in_priority_order(tmp_path: Path) -> None:
     assert team.owner == {"V1": "Robot1", "W1": "Robot1", "V2": "Robot2", "V3": "Robot3"}
     assert team["Robot3"].interface == ("V3",)
     (part,) = team["Robot1"].children[0].constraints
-    assert part.model is Model.PKC
+    assert part.model is ConstraintModel.PKC
     (topic,) = team["Robot3"].topics
     assert topic.x == Apply("mul", (Constant(2), Name("V3")))
     assert (topic.y, topic.z) == (Constant(-1), Name("V3"))
@@ -211,8 +211,10 @@ def domains(draw: st.DrawFn, name: str) -> Domain:
 
 
 @st.composite
-def relations(draw: st.DrawFn, name: str, arity: int, kind: Kind) -> Relation:
-    semantics = draw(st.sampled_from(Semantics if kind is Kind.DISWCSP else [Semantics.SUPPORTS, Semantics.CONFLICTS]))
+def relations(draw: st.DrawFn, name: str, arity: int, kind: ProblemKind) -> Relation:
+    semantics = draw(
+        st.sampled_from(Semantics if kind is ProblemKind.DISWCSP else [Semantics.SUPPORTS, Semantics.CONFLICTS])
+    )
     tuples = tuple(draw(st.lists(st.tuples(*[INTEGERS] * arity), unique=True, max_size=5)))
     if semantics is not Semantics.SOFT:
         return Relation(name, arity, semantics, tuples)
@@ -221,7 +223,9 @@ def relations(draw: st.DrawFn, name: str, arity: int, kind: Kind) -> Relation:
 
 
 @st.composite
-def constraints(draw: st.DrawFn, scope: tuple[str, ...], kind: Kind, model: Model | None, number: int) -> Constraint:
+def constraints(
+    draw: st.DrawFn, scope: tuple[str, ...], kind: ProblemKind, model: ConstraintModel | None, number: int
+) -> Constraint:
     name, described = f"C{number}", f"d{number}"
     if draw(st.booleans()):
         return Constraint(name, draw(relations(described, len(scope), kind)), scope, scope, model)
@@ -230,7 +234,7 @@ def constraints(draw: st.DrawFn, scope: tuple[str, ...], kind: Kind, model: Mode
     body: Expression = Apply(draw(st.sampled_from(["ne", "lt", "ge"])), (Name(formal[0]), Constant(draw(INTEGERS))))
     for parameter in formal[1:]:
         body = Apply("or", (body, Apply("eq", (Name(parameter), Constant(0)))))
-    cost = draw(st.integers(0, 99)) if kind is Kind.DISWCSP and draw(st.booleans()) else INFINITE
+    cost = draw(st.integers(0, 99)) if kind is ProblemKind.DISWCSP and draw(st.booleans()) else INFINITE
     predicate = Predicate(described, formal, body)
     if len(formal) == 2 and draw(st.booleans()):
         predicate = PREDEFINED[draw(st.sampled_from(sorted(PREDEFINED)))]
@@ -239,7 +243,7 @@ def constraints(draw: st.DrawFn, scope: tuple[str, ...], kind: Kind, model: Mode
 
 @st.composite
 def robots(draw: st.DrawFn) -> Robot:
-    kind = draw(st.sampled_from(Kind))
+    kind = draw(st.sampled_from(ProblemKind))
     names = draw(st.lists(WORDS, min_size=1, max_size=3, unique=True))
     values = [draw(domains(f"D{number}")) for number in range(2)]
     variables = tuple(Variable(name, draw(st.sampled_from(values))) for name in names)
@@ -248,15 +252,17 @@ def robots(draw: st.DrawFn) -> Robot:
     )
     count = iter(range(99))
 
-    def shared(model: Model, other: str) -> tuple[Constraint, ...]:
+    def shared(model: ConstraintModel, other: str) -> tuple[Constraint, ...]:
         scope = (draw(st.sampled_from(names)), f"other_{other}")
         return tuple(draw(constraints(scope, kind, model, next(count))) for _ in range(draw(st.integers(0, 2))))
 
     private = tuple(draw(constraints(tuple(names), kind, None, next(count))) for _ in range(draw(st.integers(0, 2))))
     split = draw(st.integers(0, len(others)))
-    parents = tuple(Parent(other, shared(draw(st.sampled_from(Model)), other)) for other in others[:split])
+    parents = tuple(Parent(other, shared(draw(st.sampled_from(ConstraintModel)), other)) for other in others[:split])
     told = [tuple(name for name in names if draw(st.booleans())) for _ in others]
-    children = tuple(Child(other, told[i], shared(Model.PKC, other)) for i, other in enumerate(others[split:]))
+    children = tuple(
+        Child(other, told[i], shared(ConstraintModel.PKC, other)) for i, other in enumerate(others[split:])
+    )
     where = st.one_of(st.none(), st.builds(Constant, INTEGERS), st.builds(Name, st.sampled_from(names)))
     topics = tuple(
         Topic(f"/t{i}", draw(st.sampled_from([Topic.type, "std/Int"])), x=draw(where))

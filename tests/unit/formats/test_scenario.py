@@ -7,20 +7,20 @@ from pathlib import Path
 import pytest
 
 from robochoc.formats import InvalidInputError, find_teams, read_robot, read_team
-from robochoc.model.change import changed, changed_by
+from robochoc.model.change import apply_changes, team_after_events
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
     Change,
     Constraint,
-    Event,
-    Model,
+    ConstraintModel,
     Predicate,
     Relation,
     RemoveAgent,
     RemoveConstraint,
     RemoveValue,
+    ScenarioEvent,
     Team,
 )
 from tests.support.broken_case import TEAM, write_files
@@ -66,7 +66,7 @@ def test_added_constraints_refer_to_what_their_robots_file_defines(tmp_path: Pat
     assert (first.agent, first.parent) == (second.agent, second.parent) == ("Robot2", "Robot1")
     assert isinstance(first.constraint.definition, Relation)
     assert first.constraint.definition.tuples == ((1, 1), (2, 2), (3, 3))
-    assert first.constraint.model is Model.TKC
+    assert first.constraint.model is ConstraintModel.TKC
     assert second.constraint.name == "N2"
     assert not second.constraint.allows({"W1": 2, "V2": 1})
 
@@ -92,7 +92,7 @@ def test_files_below_the_folder_are_no_robots_of_the_first_team(tmp_path: Path) 
     team = team_with(tmp_path, scenario(ADD_9))
     assert team.order == ("Robot1", "Robot2", "Robot3")
     assert find_teams(tmp_path) == [tmp_path / "squad"]
-    assert changed_by(team, 1).order == ("Robot1", "Robot2", "Robot3", "Robot9")
+    assert team_after_events(team, 1).order == ("Robot1", "Robot2", "Robot3", "Robot9")
 
 
 def test_a_later_constraint_may_refer_to_what_an_added_file_defines(tmp_path: Path) -> None:
@@ -121,9 +121,9 @@ def test_an_event_happens_when_the_problem_is_solved_or_after_so_many_messages(t
         <event after="0 messages"><remove_value variable="V1" value="5"/></event>
     </scenario>"""
     assert team_with(tmp_path, text).scenario == (
-        Event((AddValue("V1", 5), AddValue("V1", 6)), None),
-        Event((), 200),
-        Event((RemoveValue("V1", 5),), 0),
+        ScenarioEvent((AddValue("V1", 5), AddValue("V1", 6)), None),
+        ScenarioEvent((), 200),
+        ScenarioEvent((RemoveValue("V1", 5),), 0),
     )
 
 
@@ -141,14 +141,14 @@ def test_a_change_is_held_against_the_team_as_it_stands_then(tmp_path: Path) -> 
         '<remove_constraint agent="Robot9" parent="Robot2" name="N"/>',
     )
     team = team_with(tmp_path, text)
-    assert changed(team, team.scenario[0].changes).order == ("Robot1", "Robot2", "Robot9")
+    assert apply_changes(team, team.scenario[0].changes).order == ("Robot1", "Robot2", "Robot9")
 
 
 def test_all_may_leave_when_others_come(tmp_path: Path) -> None:
     alone = ROBOT_9[: ROBOT_9.index("      <agent")] + ROBOT_9[ROBOT_9.index("    </agents_parent>") :]
     leave = [f'<remove_agent name="Robot{number}"/>' for number in (1, 2, 3)]
     team = team_with(tmp_path, scenario(*leave, '<add_agent file="alone/Robot9.xml"/>'), **{"alone/Robot9.xml": alone})
-    assert changed_by(team, 1).order == ("Robot9",)
+    assert team_after_events(team, 1).order == ("Robot9",)
 
 
 def test_a_link_out_of_the_folder_is_not_followed(tmp_path: Path) -> None:

@@ -27,8 +27,8 @@ from robochoc.formats import (
 from robochoc.formats import validation as validating
 from robochoc.formats.objects import Objects
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.change import changed
-from robochoc.model.orders import reordered
+from robochoc.model.change import apply_changes
+from robochoc.model.orders import with_priorities
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
@@ -36,18 +36,18 @@ from robochoc.model.problem import (
     Change,
     Constraint,
     Domain,
-    Event,
-    Kind,
+    ProblemKind,
     Relation,
     RemoveAgent,
     RemoveValue,
     Robot,
+    ScenarioEvent,
     Semantics,
     Team,
     Variable,
 )
+from robochoc.run import solve
 from robochoc.run.options import Options, Runtime
-from robochoc.run.orchestrator import solve
 from tests.support.broken import CASES
 from tests.support.broken_case import TEAM, write_files
 from tests.support.broken_objects import AS_IN_FILES, OF_OBJECTS, breakages
@@ -114,9 +114,9 @@ def test_every_case_breaks_the_team(team: Team) -> None:
 
 def test_lines_of_files_are_not_believed(team: Team) -> None:
     """A robot that was read and then changed is not what its file says."""
-    changed = AS_IN_FILES["a variable that its owner does not have"](team)
-    assert changed["Robot3"].file
-    (mistake,) = refused(changed).diagnostics
+    apply_changes = AS_IN_FILES["a variable that its owner does not have"](team)
+    assert apply_changes["Robot3"].file
+    (mistake,) = refused(apply_changes).diagnostics
     assert str(mistake).startswith("robot Robot3, constraint C4 (V9 V3): no robot has the variable 'V9' (")
 
 
@@ -142,12 +142,12 @@ def costly() -> Team:
     rows = tuple((one, other) for one in range(1, 4) for other in range(1, 4))
     soft = Relation("r", 2, Semantics.SOFT, rows, tuple(32 if one == other == 1 else 11 for one, other in rows), 0)
     team = team_of({"A": range(1, 4), "B": range(1, 4)}, [Constraint("C", soft, ("A", "B"), ("A", "B"))])
-    return replace(team, robots=tuple(replace(one, kind=Kind.DISWCSP) for one in team.robots))
+    return replace(team, robots=tuple(replace(one, kind=ProblemKind.DISWCSP) for one in team.robots))
 
 
 def test_costs_in_a_discsp_are_not_called_a_solution() -> None:
     assert solve(costly(), replace(HERE, protocol="sfb")).cost == 11
-    wrong = replace(costly(), robots=tuple(replace(one, kind=Kind.DISCSP) for one in costly().robots))
+    wrong = replace(costly(), robots=tuple(replace(one, kind=ProblemKind.DISCSP) for one in costly().robots))
     for attempt in (lambda: solve(wrong, HERE), lambda: robochoc.Problem(wrong)):
         with pytest.raises(InvalidInputError, match="a soft relation in a DisCSP"):
             attempt()
@@ -175,9 +175,9 @@ def test_nothing_is_solved_or_told_of_an_invalid_team(protocol: str, team: Team)
 
 def test_what_changes_leave_can_be_solved(team: Team) -> None:
     for change in (RemoveAgent("Robot2"), RemoveValue("V2", 3), RemoveAgent("Robot1")):
-        check_team(changed(team, [change]))
+        check_team(apply_changes(team, [change]))
     simple = team_of({"A": range(1, 3), "B": range(1, 3)}, [])
-    dynamic = replace(simple, scenario=(Event((RemoveAgent("RB"), RemoveValue("A", 1))), Event(())))
+    dynamic = replace(simple, scenario=(ScenarioEvent((RemoveAgent("RB"), RemoveValue("A", 1))), ScenarioEvent(())))
     assert solve(dynamic, HERE).assignment == {"A": 2}
 
 
@@ -200,9 +200,9 @@ def test_what_changes_leave_can_be_solved(team: Team) -> None:
 def test_what_a_field_says_is_held_against_the_rules(change: Change, message: str) -> None:
     team = team_of({"A": range(1, 3), "B": range(1, 3)}, [])
     newcomer = AddAgent(Robot("RC", (Variable("C", Domain("D", (range(2),))),)))
-    event = Event((newcomer, change))
+    event = ScenarioEvent((newcomer, change))
     with pytest.raises(InvalidInputError, match=message):
-        solve(team, replace(HERE, protocol="dynabt"), field=lambda *_: event)
+        solve(team, replace(HERE, protocol="dynabt"), environment=lambda *_: event)
 
 
 # Found valid once
@@ -260,7 +260,7 @@ def test_an_order_may_say_more_than_the_links() -> None:
         drawn = random_team(Random(number))
         names = list(drawn.order)
         chance.shuffle(names)
-        check_team(reordered(drawn, names))
+        check_team(with_priorities(drawn, names))
     apart = Team("apart", tuple(team_of({name: range(2)}, []).robots[0] for name in "BAC"))
     check_team(apart)
 
@@ -300,7 +300,7 @@ def test_nothing_is_written_of_what_is_not_valid(name: str, team: Team, tmp_path
 def test_what_files_cannot_say_is_not_written(team: Team, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robochoc.formats.xml.MAX_BYTES", 2 * 1024 * 1024)
     showing = replace(team, robots=(*team.robots[:2], replace(team["Robot3"], shown=("V3",))))
-    dynamic = replace(team, scenario=(Event((RemoveAgent("Robot3"),)),))
+    dynamic = replace(team, scenario=(ScenarioEvent((RemoveAgent("Robot3"),)),))
     big = Relation("r", 3, Semantics.CONFLICTS, tuple((10**17 + number, 10**17, 10**17) for number in range(40_000)))
     large = team_of({"A": range(2), "B": range(2)}, [Constraint("C", big, ("A", "B", 1), ("A", "B", 1))])
     for unwritable, why in ((showing, "shows 'V3'"), (dynamic, "scenario"), (large, "larger than 2 MiB")):

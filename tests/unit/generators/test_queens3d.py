@@ -11,8 +11,8 @@ from robochoc.formats import read_robot, read_team, write_team
 from robochoc.generators.queens3d import QueensModel, queens3d
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal, solve
-from robochoc.verification.checker import could_join, objections
+from robochoc.run import Options, Runtime, Withdrawal, solve
+from robochoc.verification.checker import needlessly_withdrawn, violations
 from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import ROOT
 
@@ -98,8 +98,8 @@ def test_four_has_no_solution_and_some_can_fly(model: QueensModel, runtime: Runt
     assert solve(team, Options(runtime=runtime)).verdict is Verdict.NO_SOLUTION
     outcome = solve(team, Options(runtime=runtime, withdraw=Withdrawal.MAXIMAL))
     assert outcome.verdict is Verdict.SOLUTION
-    assert not list(objections(team, outcome.assignment, outcome.withdrawn))
-    assert not list(could_join(team, outcome.assignment, outcome.withdrawn))
+    assert not list(violations(team, outcome.assignment, outcome.withdrawn))
+    assert not list(needlessly_withdrawn(team, outcome.assignment, outcome.withdrawn))
     most = {QueensModel.PLANAR: 10, QueensModel.FULL: 7}[model]
     assert len(outcome.assignment) <= most
 

@@ -11,8 +11,8 @@ import pytest
 from robochoc.formats import read_team, write_team
 from robochoc.generators.coloring import coloring
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.orders import neighbours
-from robochoc.model.problem import INFINITE, Kind, Semantics, Team
+from robochoc.model.orders import constraint_graph
+from robochoc.model.problem import INFINITE, ProblemKind, Semantics, Team
 from tests.support.binary_problems import edges_of, relation_of, shared_constraints
 from tests.support.program import robochoc
 
@@ -20,12 +20,12 @@ from tests.support.program import robochoc
 def test_the_graph_is_model_bs() -> None:
     for seed in range(5):
         team = random_csp(12, 3, 0.4, 0, seed, max_cost=9)
-        assert team.kind is Kind.DISWCSP
+        assert team.kind is ProblemKind.DISWCSP
         assert team.name == f"random-12-3-0.4-0.0-cost9-{seed}"
         assert len(edges_of(team)) == len(shared_constraints(team)) == round(0.4 * 66)
         assert {relation_of(one).semantics for one in shared_constraints(team)} == {Semantics.SOFT}
     linked = random_csp(12, 3, 0.2, 0, 1, connected=True, max_cost=9)
-    assert all(neighbours(linked).values())
+    assert all(constraint_graph(linked).values())
 
 
 def test_so_many_pairs_are_forbidden_all_others_cost_something() -> None:
@@ -62,7 +62,7 @@ def test_a_graph_to_be_coloured_has_the_degree_that_was_asked_for() -> None:
     assert len(edges_of(team)) == 30
     assert {one.cost for one in shared_constraints(team)} == {1}
     assert all(list(one.domain) == [1, 2, 3] for one in team.variables.values())
-    assert all(neighbours(coloring(15, 3, 3, 7, connected=True)).values())
+    assert all(constraint_graph(coloring(15, 3, 3, 7, connected=True)).values())
 
 
 @pytest.mark.parametrize(

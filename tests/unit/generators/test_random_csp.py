@@ -10,7 +10,7 @@ import pytest
 
 from robochoc.formats import read_team, write_team
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.orders import neighbours
+from robochoc.model.orders import constraint_graph
 from robochoc.model.problem import Robot, Semantics
 from tests.support.binary_problems import edges_of, relation_of, shared_constraints
 from tests.support.program import robochoc
@@ -87,7 +87,7 @@ def test_connected_draws_connected_graphs_alone_all_alike() -> None:
     for seed in range(3000):
         team = random_csp(4, 1, 0.5, 0, seed, connected=True)
         graphs[edges_of(team)] += 1
-        assert all(neighbours(team).values())
+        assert all(constraint_graph(team).values())
     assert len(graphs) == 16  # Cayley: the trees on 4 labelled nodes
     assert max(graphs.values()) < 1.4 * min(graphs.values())
 
@@ -138,7 +138,7 @@ def test_generate_random_writes_where_it_says(tmp_path: Path) -> None:
     assert "--force" in again.stderr
     assert robochoc(*words, "--force", folder=tmp_path).returncode == 0
     assert robochoc(*words, "--connected", "-o", tmp_path / "linked").returncode == 0
-    assert all(neighbours(read_team(tmp_path / "linked")).values())
+    assert all(constraint_graph(read_team(tmp_path / "linked")).values())
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Metrics, Outcome, Verdict
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from tests.support.flights import scene_of
 from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import robochoc

@@ -11,9 +11,9 @@ import pytest
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Given
 from robochoc.journal.given import GivenProblemError, TeamReader, TeamWriter, brief_of, void_of
-from robochoc.model.change import without
-from robochoc.model.orders import Order, OrderError, in_order
-from robochoc.model.problem import Constraint, Domain, Kind, Relation, Robot, Semantics, Team, Variable
+from robochoc.model.change import without_robots
+from robochoc.model.orders import Order, OrderError, with_order
+from robochoc.model.problem import Constraint, Domain, ProblemKind, Relation, Robot, Semantics, Team, Variable
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.explanation import invalidated_by
 from tests.support.complex_changes import random_complex_changing_team
@@ -65,7 +65,7 @@ def through(given: Given) -> Given:
 
 def arranged(team: Team, chance: Random) -> Team:
     try:
-        return in_order(team, chance.choice((Order.GIVEN, Order.MIN_WIDTH, Order.MAX_DEGREE)))
+        return with_order(team, chance.choice((Order.GIVEN, Order.MIN_WIDTH, Order.MAX_DEGREE)))
     except OrderError:
         return team
 
@@ -78,7 +78,7 @@ def test_a_team_comes_back(family) -> None:  # type: ignore[no-untyped-def]  # n
         team = family(chance)
         writer, reader = TeamWriter(), TeamReader()
         epochs = list(stages(team))
-        epochs += [arranged(epochs[-1], chance), without(epochs[-1], [chance.choice(epochs[-1].order)])]
+        epochs += [arranged(epochs[-1], chance), without_robots(epochs[-1], [chance.choice(epochs[-1].order)])]
         for epoch in epochs:
             given = through(writer.given(epoch))
             assert not given.why
@@ -90,14 +90,14 @@ def test_only_what_is_new_is_told() -> None:
     writer = TeamWriter()
     assert {*writer.given(team).robots} == {*team.order}
     assert writer.given(team).robots == {}
-    smaller = without(team, ["Robot1.1"])
+    smaller = without_robots(team, ["Robot1.1"])
     changed = {robot.name for robot in smaller.robots if robot != team[robot.name]}
     assert {*writer.given(smaller).robots} == changed
 
 
 def test_what_stands_beside_the_problem_comes_back() -> None:
     team, brief = queens3d(2), RunParameters(7, {"cycles": "3"}, 12)
-    stale = invalidated_by(team, without(team, ["Robot1.1"]))
+    stale = invalidated_by(team, without_robots(team, ["Robot1.1"]))
     given = through(TeamWriter().given(team, brief, stale, fresh=["Robot2.1"], quiet=False))
     assert (brief_of(given), void_of(given), given.fresh, given.quiet) == (brief, stale, ("Robot2.1",), False)
     assert isinstance(given.aside, int)
@@ -106,7 +106,7 @@ def test_what_stands_beside_the_problem_comes_back() -> None:
 def test_a_team_that_cannot_be_written_is_told_so() -> None:
     relation = Relation("R", 2, Semantics.SOFT, ((1, 2),), (5.0,), 0)
     team = team_of({"A": [1, 2], "B": [1, 2]}, [Constraint("C", relation, ("A", "B"), ("A", "B"))])
-    team = replace(team, robots=tuple(replace(robot, kind=Kind.DISWCSP) for robot in team.robots))
+    team = replace(team, robots=tuple(replace(robot, kind=ProblemKind.DISWCSP) for robot in team.robots))
     given = TeamWriter().given(team)
     assert given.why == "RB cannot be written: the cost 5.0 of C is no integer"
     assert given.robots == {}

@@ -34,7 +34,7 @@ from robochoc.journal.journal import (
 )
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.verification.objective import Objective
 from tests.support.events import any_event, headers, outcomes
 from tests.support.problems import team_of

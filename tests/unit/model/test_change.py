@@ -7,22 +7,22 @@ from dataclasses import replace
 
 import pytest
 
-from robochoc.model.change import ChangeError, changed, changed_by, rejoined, without
+from robochoc.model.change import ChangeError, apply_changes, rejoin, team_after_events, without_robots
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
     Change,
     Child,
+    ConstraintModel,
     Domain,
-    Event,
-    Kind,
-    Model,
     Parent,
+    ProblemKind,
     RemoveAgent,
     RemoveConstraint,
     RemoveValue,
     Robot,
+    ScenarioEvent,
     Team,
     Variable,
 )
@@ -37,7 +37,7 @@ def links(team: Team) -> dict[str, dict[str, tuple[str, ...]]]:
 
 def refused(team: Team, *changes: Change) -> ChangeError:
     with pytest.raises(ChangeError) as caught:
-        changed(team, changes)
+        apply_changes(team, changes)
     assert str(caught.value) == caught.value.message
     assert caught.value.hint
     return caught.value
@@ -47,7 +47,7 @@ def refused(team: Team, *changes: Change) -> ChangeError:
 
 
 def test_a_robot_leaves_with_its_variables_links_and_constraints() -> None:
-    team = changed(triangle(), [RemoveAgent("RB")])
+    team = apply_changes(triangle(), [RemoveAgent("RB")])
     assert team.order == ("RA", "RC", "RD")
     assert list(team.variables) == ["A", "C", "D"]
     assert [
@@ -61,15 +61,15 @@ def test_a_robot_leaves_with_its_variables_links_and_constraints() -> None:
 
 def test_an_n_ary_constraint_goes_with_any_of_its_robots_and_the_links_of_the_others_stay() -> None:
     team = team_of(dict.fromkeys("ABC", (1, 2)), [named_constraint("N", "A", "B", "C")])
-    left = without(team, ["RA"])
+    left = without_robots(team, ["RA"])
     assert list(left.constraints()) == []
     assert [parent.name for parent in left["RC"].parents] == ["RB"]
     assert links(left) == {"RB": {"RC": ("B",)}, "RC": {}}
 
 
 def test_many_leave_at_once_and_everybody_may() -> None:
-    assert without(triangle(), ["RA", "RC"]).order == ("RB", "RD")
-    assert without(triangle(), ["RA", "RB", "RC", "RD"]).robots == ()
+    assert without_robots(triangle(), ["RA", "RC"]).order == ("RB", "RD")
+    assert without_robots(triangle(), ["RA", "RB", "RC", "RD"]).robots == ()
 
 
 def test_nobody_leaves_who_is_not_there() -> None:
@@ -82,7 +82,7 @@ def test_nobody_leaves_who_is_not_there() -> None:
 
 def test_a_robot_comes_last_and_its_parents_list_it() -> None:
     robot = newcomer(Parent("RA"), Parent("RD", (named_constraint("N", "D", "E"),)))
-    team = changed(triangle(), [AddAgent(robot)])
+    team = apply_changes(triangle(), [AddAgent(robot)])
     assert team.order[-1] == "RE"
     assert team["RE"] == robot
     assert (links(team)["RA"]["RE"], links(team)["RD"]["RE"]) == ((), ("D",))
@@ -90,12 +90,12 @@ def test_a_robot_comes_last_and_its_parents_list_it() -> None:
 
 def test_a_robot_that_comes_with_an_n_ary_constraint_is_told_by_all() -> None:
     robot = newcomer(Parent("RA"), Parent("RD", (named_constraint("N", "D", "E", "A"),)))
-    team = changed(triangle(), [AddAgent(robot)])
+    team = apply_changes(triangle(), [AddAgent(robot)])
     assert (links(team)["RA"]["RE"], links(team)["RD"]["RE"]) == (("A",), ("D",))
 
 
 def test_a_robot_can_come_again() -> None:
-    team = changed(triangle(), [RemoveAgent("RA"), AddAgent(newcomer(name="RA", variable="A"))])
+    team = apply_changes(triangle(), [RemoveAgent("RA"), AddAgent(newcomer(name="RA", variable="A"))])
     assert team.order == ("RB", "RC", "RD", "RA")
 
 
@@ -104,7 +104,7 @@ def test_a_robot_can_come_again() -> None:
     [
         (newcomer(name="RA"), "the robot 'RA' is there already", 0),
         (newcomer(variable="A"), "the variable 'A' belongs to 'RA'", 0),
-        (replace(newcomer(), kind=Kind.DISWCSP), "'RE' is a DisWCSP in a team of DisCSP", 0),
+        (replace(newcomer(), kind=ProblemKind.DISWCSP), "'RE' is a DisWCSP in a team of DisCSP", 0),
         (replace(newcomer(), children=(Child("RA", line=7),)), "'RE' has the child 'RA'", 7),
         (newcomer(Parent("RX", line=8)), "there is no robot 'RX'", 8),
         (
@@ -146,19 +146,19 @@ def test_values_go_and_come_and_the_domain_keeps_its_order() -> None:
         (AddValue("A", 2), [-5, 1, 2, 3]),
         (RemoveValue("A", 1), [-5, 2, 3]),
     ):
-        team = changed(team, [change])
+        team = apply_changes(team, [change])
         assert list(team.variables["A"].domain) == values
         assert len(team.variables["A"].domain) == len(values)
 
 
 def test_a_value_within_a_long_range() -> None:
     alone = Team("one", (Robot("RA", (Variable("A", Domain("D", (range(10**15),))),)),))
-    team = changed(alone, [RemoveValue("A", 77)])
+    team = apply_changes(alone, [RemoveValue("A", 77)])
     assert team.variables["A"].domain.ranges == (range(77), range(78, 10**15))
 
 
 def test_the_last_value_may_go() -> None:
-    team = changed(team_of({"A": (1,)}, []), [RemoveValue("A", 1)])
+    team = apply_changes(team_of({"A": (1,)}, []), [RemoveValue("A", 1)])
     assert list(team.variables["A"].domain) == []
 
 
@@ -174,37 +174,37 @@ def test_values_that_cannot_go_or_come() -> None:
 
 
 def test_a_constraint_comes_to_a_pair_that_is_linked() -> None:
-    team = changed(triangle(), [AddConstraint("RC", "RA", named_constraint("N", "C", "A"))])
+    team = apply_changes(triangle(), [AddConstraint("RC", "RA", named_constraint("N", "C", "A"))])
     assert [constraint.name for constraint in team["RC"].parents[0].constraints] == ["C", "N"]
     assert links(team) == links(triangle())
 
 
 def test_a_constraint_links_those_who_were_not() -> None:
-    team = changed(triangle(), [AddConstraint("RD", "RB", named_constraint("N", "B", "D", "A"))])
+    team = apply_changes(triangle(), [AddConstraint("RD", "RB", named_constraint("N", "B", "D", "A"))])
     assert [parent.name for parent in team["RD"].parents] == ["RC", "RA", "RB"]
     assert (links(team)["RA"]["RD"], links(team)["RB"]["RD"]) == (("A",), ("B",))
 
 
 def test_a_constraint_goes_and_its_link_stays() -> None:
-    team = changed(triangle(), [RemoveConstraint("RC", "RB", "C")])
+    team = apply_changes(triangle(), [RemoveConstraint("RC", "RB", "C")])
     assert team["RC"].parents[1] == Parent("RB")
     assert links(team) == links(triangle())
 
 
 def test_all_of_one_name_go() -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [differ("A", "B"), named_constraint("N", "A", "B"), differ("B", "A")])
-    assert [one.name for one in changed(team, [RemoveConstraint("RB", "RA", "C")]).constraints()] == ["N"]
+    assert [one.name for one in apply_changes(team, [RemoveConstraint("RB", "RA", "C")]).constraints()] == ["N"]
 
 
 @pytest.mark.parametrize("sides", [("RA", "RB"), ("RA",), ("RB",)])
 def test_both_parts_of_a_partially_known_constraint_go(sides: tuple[str, ...]) -> None:
     above, below = triangle().robots[:2]
-    part = replace(named_constraint("P", "A", "B"), model=Model.PKC)
+    part = replace(named_constraint("P", "A", "B"), model=ConstraintModel.PKC)
     above = replace(above, children=(Child("RB", ("A",), (part,) if "RA" in sides else ()),))
     below = replace(below, parents=(Parent("RA", (part,) if "RB" in sides else ()),), children=())
     team = Team("pair", (above, below))
     assert len(list(team.constraints())) == len(sides)
-    assert list(changed(team, [RemoveConstraint("RB", "RA", "P")]).constraints()) == []
+    assert list(apply_changes(team, [RemoveConstraint("RB", "RA", "P")]).constraints()) == []
 
 
 @pytest.mark.parametrize(
@@ -237,20 +237,23 @@ def test_names_in_messages_are_shortened() -> None:
 
 def test_changes_come_one_after_the_other_and_the_team_itself_stays_as_it_was() -> None:
     team = triangle()
-    new = changed(team, [RemoveAgent("RD"), AddAgent(newcomer(name="RD", variable="D")), AddValue("D", 7)])
+    new = apply_changes(team, [RemoveAgent("RD"), AddAgent(newcomer(name="RD", variable="D")), AddValue("D", 7)])
     assert list(new.variables["D"].domain) == [1, 2, 7]
     assert team == triangle()
-    assert changed(team, []) == team
+    assert apply_changes(team, []) == team
 
 
 def test_changed_by_so_many_events_has_no_scenario_left() -> None:
-    events = (Event((AddValue("A", 7),)), Event((AddValue("A", 8), RemoveAgent("RX"), AddValue("A", 9))))
+    events = (
+        ScenarioEvent((AddValue("A", 7),)),
+        ScenarioEvent((AddValue("A", 8), RemoveAgent("RX"), AddValue("A", 9))),
+    )
     team = replace(triangle(), scenario=events)
     for count, values in enumerate(([1, 2], [1, 2, 7], [1, 2, 7, 8, 9])):
-        new = changed_by(team, count)
+        new = team_after_events(team, count)
         assert list(new.variables["A"].domain) == values
         assert not new.dynamic
-    assert changed_by(triangle(), 0) == triangle()
+    assert team_after_events(triangle(), 0) == triangle()
 
 
 # A robot that was lost comes back
@@ -258,35 +261,35 @@ def test_changed_by_so_many_events_has_no_scenario_left() -> None:
 
 def test_a_robot_rejoins_as_its_file_says() -> None:
     team = triangle()
-    less = changed(team, [RemoveConstraint("RC", "RB", "C"), RemoveValue("C", 1)])
-    assert rejoined(less, team["RC"]) == team
+    less = apply_changes(team, [RemoveConstraint("RC", "RB", "C"), RemoveValue("C", 1)])
+    assert rejoin(less, team["RC"]) == team
 
 
 def test_a_robot_rejoins_without_those_who_have_left() -> None:
     team = triangle()
-    left = without(team, ["RA"])
-    assert rejoined(left, team["RC"]) == left
+    left = without_robots(team, ["RA"])
+    assert rejoin(left, team["RC"]) == left
 
 
 def test_what_a_robot_tells_may_follow_from_the_constraints() -> None:
     """A file need not say it: then the reader of a single file does not know it."""
     team = triangle()
     unsaid = replace(team["RA"], children=(Child("RB"), Child("RC")))
-    assert rejoined(team, unsaid) == team
+    assert rejoin(team, unsaid) == team
 
 
 def test_links_that_came_later_stay_when_a_robot_rejoins() -> None:
     team = triangle()
-    later = changed(
+    later = apply_changes(
         team,
         [
             AddConstraint("RD", "RA", named_constraint("N", "A", "D")),
             AddConstraint("RC", "RA", named_constraint("N", "A", "C")),
         ],
     )
-    back = rejoined(later, team["RA"])
+    back = rejoin(later, team["RA"])
     assert links(back)["RA"] == {"RB": ("A",), "RC": ("A",), "RD": ("A",)}
-    assert [parent.name for parent in rejoined(later, team["RD"])["RD"].parents] == ["RC", "RA"]
+    assert [parent.name for parent in rejoin(later, team["RD"])["RD"].parents] == ["RC", "RA"]
 
 
 @pytest.mark.parametrize(
@@ -308,4 +311,4 @@ def test_a_file_that_has_changed_meanwhile_may_not_fit(robot: Robot, message: st
     above = replace(team["RD"], children=(Child("RE", ("D",)),))
     team = replace(team, robots=(*team.robots[:3], above, below))
     with pytest.raises(ChangeError, match=re.escape(message)):
-        rejoined(team, robot)
+        rejoin(team, robot)

@@ -8,7 +8,7 @@ from pathlib import Path
 from random import Random
 
 from robochoc.formats import read_robot, read_team, write_team
-from robochoc.model.change import ChangeError, rejoined, without
+from robochoc.model.change import ChangeError, rejoin, without_robots
 from robochoc.model.problem import Domain, Robot, Team
 from tests.support.complex_changes import random_complex_changing_team
 from tests.support.problems import solutions, with_unique_definitions
@@ -54,12 +54,12 @@ def test_a_team_that_a_robot_rejoined_could_stand_in_files(tmp_path: Path) -> No
     for _ in range(40):
         first, *_, last = stages(random_complex_changing_team(chance, 4))
         gone = chance.sample(last.order, chance.choice((0, 0, 1)))
-        last = without(last, gone)
+        last = without_robots(last, gone)
         for name in first.order:
             if name not in last:
                 continue
             try:
-                back = rejoined(last, first[name])
+                back = rejoin(last, first[name])
             except ChangeError:
                 continue
             came += 1
@@ -74,4 +74,4 @@ def test_a_robot_whose_file_leaves_out_what_children_are_told_rejoins(tmp_path: 
     file = folder / "RA.xml"
     file.write_text(file.read_text().replace(' variable="A"', ""))
     assert all(not child.variables for child in read_robot(file).children)
-    assert rejoined(read_team(folder), read_robot(file)) == read_team(folder)
+    assert rejoin(read_team(folder), read_robot(file)) == read_team(folder)

@@ -7,15 +7,15 @@ from dataclasses import replace
 import pytest
 
 from robochoc.formats import PREDEFINED
-from robochoc.model.change import changed, without
+from robochoc.model.change import apply_changes, without_robots
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
     Change,
     Child,
+    ConstraintModel,
     Domain,
-    Model,
     Parent,
     RemoveAgent,
     RemoveConstraint,
@@ -49,12 +49,12 @@ def told(old: Team, new: Team) -> tuple[set[str], set[str]]:
     ],
 )
 def test_what_a_change_makes_void(change: Change, keys: set[str], agents: set[str]) -> None:
-    assert told(triangle(), changed(triangle(), [change])) == (keys, agents)
+    assert told(triangle(), apply_changes(triangle(), [change])) == (keys, agents)
 
 
 def test_what_comes_back_in_one_event_was_never_gone() -> None:
     back: list[Change] = [RemoveValue("B", 1), AddValue("B", 1), RemoveConstraint("RB", "RA", "C"), differ_again()]
-    assert told(triangle(), changed(triangle(), back)) == (set(), set())
+    assert told(triangle(), apply_changes(triangle(), back)) == (set(), set())
 
 
 def differ_again() -> AddConstraint:
@@ -66,12 +66,14 @@ def test_another_constraint_of_the_same_name_voids_what_the_first_explained() ->
         RemoveConstraint("RB", "RA", "C"),
         AddConstraint("RB", "RA", named_constraint("C", "A", "B")),
     ]
-    assert told(triangle(), changed(triangle(), changes)) == ({"RB<RA:C"}, set())
+    assert told(triangle(), apply_changes(triangle(), changes)) == ({"RB<RA:C"}, set())
 
 
 def test_an_n_ary_constraint_is_void_with_any_of_its_robots() -> None:
     team = team_of(dict.fromkeys("ABC", (1, 2)), [named_constraint("N", "A", "B", "C")])
-    assert told(team, without(team, ["RA"])) == ({"RA=", "RC<RB:N"}, {"RA", "RC"}), "RC has nothing to show any more"
+    assert told(team, without_robots(team, ["RA"])) == ({"RA=", "RC<RB:N"}, {"RA", "RC"}), (
+        "RC has nothing to show any more"
+    )
 
 
 def test_a_domain_grows_with_other_private_constraints_and_other_variables() -> None:
@@ -90,14 +92,14 @@ def test_who_shows_other_variables_means_something_else() -> None:
     above = Robot("RA", (Variable("A", bits), Variable("W", bits)), children=(Child("RB", ("A",)),))
     below = Robot("RB", (Variable("B", bits),), parents=(Parent("RA", (differ("A", "B"),)),))
     team = Team("pair", (above, below))
-    more = changed(team, [AddConstraint("RB", "RA", differ("W", "B"))])
+    more = apply_changes(team, [AddConstraint("RB", "RA", differ("W", "B"))])
     assert told(team, more) == (set(), {"RA"})
-    alone = without(team, ["RB"])
+    alone = without_robots(team, ["RB"])
     assert invalidated_by(team, alone).agents == {"RA", "RB"}
 
 
 def test_parts_of_partially_known_constraints_have_keys_of_their_own() -> None:
-    part = replace(named_constraint("P", "A", "B"), model=Model.PKC)
+    part = replace(named_constraint("P", "A", "B"), model=ConstraintModel.PKC)
     above, below = triangle().robots[:2]
     held = replace(above, children=(Child("RB", ("A",), (part,)),))
     empty = replace(above, children=(Child("RB", ("A",)),))

@@ -20,7 +20,7 @@ from robochoc.model.expression import (
     Name,
     Type,
     UndefinedValueError,
-    compiled,
+    compile_expression,
     evaluate,
     names,
     parse,
@@ -125,7 +125,7 @@ def value(expression: Expression, values: Mapping[str, int]) -> int | None:
 
 def compiled_value(expression: Expression, values: Mapping[str, int]) -> int | None:
     try:
-        return compiled(expression, list(values))(list(values.values()))
+        return compile_expression(expression, list(values))(list(values.values()))
     except UndefinedValueError:
         return None
 
@@ -149,7 +149,7 @@ def test_every_operator_is_generated_and_has_two_implementations() -> None:
     for operator, row in OPERATORS.items():
         arguments = tuple(Constant(1) for _ in row.takes)
         expression = Apply(operator, arguments)
-        assert compiled(expression, ())(()) == evaluate(expression, {}) == oracle(expression, {})
+        assert compile_expression(expression, ())(()) == evaluate(expression, {}) == oracle(expression, {})
 
 
 def test_figure_2_as_it_stands() -> None:

@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 from robochoc.model.headline import describe_outcome
-from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 
 SOLVED = Outcome("team", "abt", "simulator", 0, Verdict.SOLUTION, {"V1": 1})
 SIX = tuple(f"Robot{number}" for number in range(6))
-EPOCHS = (Epoch(Verdict.SOLUTION, SIX, assignment={"V1": 1}), Epoch(Verdict.SOLUTION, SIX[:3]))
+EPOCHS = (EpochOutcome(Verdict.SOLUTION, SIX, assignment={"V1": 1}), EpochOutcome(Verdict.SOLUTION, SIX[:3]))
 
 
 @pytest.mark.parametrize(

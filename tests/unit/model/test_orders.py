@@ -13,11 +13,11 @@ import pytest
 
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.orders import Order, OrderError, in_order, neighbours, order_of, reordered
-from robochoc.model.priorities import natural
-from robochoc.model.problem import Child, Constraint, Event, Model, Parent, Relation, Semantics
+from robochoc.model.orders import Order, OrderError, compute_order, constraint_graph, with_order, with_priorities
+from robochoc.model.priorities import natural_key
+from robochoc.model.problem import Child, Constraint, ConstraintModel, Parent, Relation, ScenarioEvent, Semantics
 from robochoc.protocols.order import PseudoTree
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.problems import random_team, shuffled, solutions, team_of, with_unique_definitions
@@ -44,7 +44,7 @@ def test_the_problem_stays_the_same(make: type) -> None:
     for number in range(100):
         team = make(chance)
         names = shuffled(chance, team)
-        turned = reordered(team, names)
+        turned = with_priorities(team, names)
         assert turned.order == tuple(names)
         assert Counter(map(meaning, turned.constraints())) == Counter(map(meaning, team.constraints()))
         assert turned.owner == team.owner
@@ -61,7 +61,7 @@ def test_each_constraint_stands_with_its_lowest_robot_and_the_others_are_its_par
     chance = Random(f"lowest {make.__name__}")
     for _ in range(200):
         team = make(chance)
-        turned = reordered(team, shuffled(chance, team))
+        turned = with_priorities(team, shuffled(chance, team))
         rank = {name: place for place, name in enumerate(turned.order)}
         for robot in turned.robots:
             parents = {parent.name for parent in robot.parents}
@@ -77,7 +77,7 @@ def test_the_files_of_the_team_are_valid_and_say_the_same(make: type, tmp_path: 
     chance = Random(f"files {make.__name__}")
     for number in range(40):
         team = with_unique_definitions(make(chance))
-        turned = reordered(team, shuffled(chance, team))
+        turned = with_priorities(team, shuffled(chance, team))
         write_team(turned, tmp_path / str(number))
         again = read_team(tmp_path / str(number))
         for robot in turned.robots:
@@ -93,9 +93,9 @@ def test_a_turned_team_is_what_its_author_would_have_written() -> None:
         owned = {name: [variable.name for variable in team[name].variables] for name in names}
         domains = {name: list(variable.domain) for name, variable in team.variables.items()}
         constraints = [one for robot in team.robots for one in (*robot.shared, *robot.private)]
-        constraints = [replace(one, model=Model.TKC) for one in constraints]
+        constraints = [replace(one, model=ConstraintModel.TKC) for one in constraints]
         written = complex_team(owned, domains, constraints)
-        turned = reordered(team, names)
+        turned = with_priorities(team, names)
         for name in names:
             mine, theirs = turned[name], written[name]
             assert Counter(map(meaning, mine.shared)) == Counter(map(meaning, theirs.shared))
@@ -109,7 +109,7 @@ def test_turning_back_gives_the_team_again() -> None:
     chance = Random("back")
     for _ in range(100):
         team = random_complex_team(chance)
-        back = reordered(reordered(team, shuffled(chance, team)), team.order)
+        back = with_priorities(with_priorities(team, shuffled(chance, team)), team.order)
         for name in team.order:
             told = {one.name: {*one.variables} for one in team[name].children}
             assert {one.name: {*one.variables} for one in back[name].children} == told
@@ -119,16 +119,16 @@ def test_turning_back_gives_the_team_again() -> None:
 
 def test_the_same_order_is_the_same_team() -> None:
     team = queens3d(3)
-    assert reordered(team, team.order) is team
-    assert in_order(team, None) is team
-    assert in_order(team, Order.GIVEN) is team
+    assert with_priorities(team, team.order) is team
+    assert with_order(team, None) is team
+    assert with_order(team, Order.GIVEN) is team
 
 
 def test_an_order_has_to_name_each_robot_once() -> None:
     team = graph_team(["AB"])
     for names in ([], ["RA"], ["RA", "RA"], ["RA", "RX"], ["RA", "RB", "RB"]):
         with pytest.raises(ValueError, match="each robot"):
-            reordered(team, names)
+            with_priorities(team, names)
 
 
 def test_a_link_without_constraints_stays_a_link() -> None:
@@ -142,10 +142,10 @@ def test_a_link_without_constraints_stays_a_link() -> None:
             replace(alone, parents=(Parent("RA"),)),
         ),
     )
-    same_way = reordered(linked, ["RA", "RC", "RB"])
+    same_way = with_priorities(linked, ["RA", "RC", "RB"])
     assert [one.name for one in same_way["RC"].parents] == ["RA"]
     assert Child("RC", ("A",)) in same_way["RA"].children
-    turned = reordered(linked, ["RC", "RB", "RA"])
+    turned = with_priorities(linked, ["RC", "RB", "RA"])
     assert turned["RC"].children == (Child("RA"),)
     assert Parent("RC") in turned["RA"].parents
 
@@ -154,7 +154,7 @@ def test_a_link_of_a_constraint_that_is_held_elsewhere_goes() -> None:
     rows = ((1, 1, 1), (2, 2, 2))
     scope = ("A", "B", "C")
     same = Constraint("C", Relation("same", 3, Semantics.SUPPORTS, rows), scope, scope)
-    turned = reordered(team_of(dict.fromkeys("ABC", (1, 2)), [same]), ["RC", "RB", "RA"])
+    turned = with_priorities(team_of(dict.fromkeys("ABC", (1, 2)), [same]), ["RC", "RB", "RA"])
     assert {one.name for one in turned["RA"].parents} == {"RB", "RC"}
     assert not turned["RB"].parents
     # The links leave open who of the two comes first; a reader takes the natural order, in which RC is the lower.
@@ -173,8 +173,8 @@ def test_what_a_child_is_told_beyond_its_constraints_it_goes_on_being_told() -> 
             third,
         ),
     )
-    assert reordered(told, ["R1", "R3", "R2"])["R1"].children == (Child("R2", ("B", "A")),)
-    assert reordered(told, ["R2", "R3", "R1"])["R2"].children == (Child("R1", ("C",)),)
+    assert with_priorities(told, ["R1", "R3", "R2"])["R1"].children == (Child("R2", ("B", "A")),)
+    assert with_priorities(told, ["R2", "R3", "R1"])["R2"].children == (Child("R1", ("C",)),)
 
 
 def test_a_link_stays_for_what_is_told_beyond_constraints() -> None:
@@ -183,8 +183,8 @@ def test_a_link_stays_for_what_is_told_beyond_constraints() -> None:
     values = {name: [1, 2] for name in "ABCD"}
     team = complex_team({"R1": ["A", "B"], "R2": ["C"], "R3": ["D"]}, values, [three])
     told = replace(team, robots=(replace(team["R1"], children=(Child("R3", ("A", "B")),)), team["R2"], team["R3"]))
-    assert reordered(told, ["R1", "R3", "R2"])["R1"].children == (Child("R3", ("B",)), Child("R2", ("A",)))
-    assert reordered(team, ["R1", "R3", "R2"])["R1"].children == (Child("R2", ("A",)),)
+    assert with_priorities(told, ["R1", "R3", "R2"])["R1"].children == (Child("R3", ("B",)), Child("R2", ("A",)))
+    assert with_priorities(team, ["R1", "R3", "R2"])["R1"].children == (Child("R2", ("A",)),)
 
 
 def test_definitions_of_one_name_in_two_files_do_not_become_one() -> None:
@@ -192,27 +192,27 @@ def test_definitions_of_one_name_in_two_files_do_not_become_one() -> None:
         return Constraint("C", Relation("R", 2, Semantics.CONFLICTS, rows), (first, second), (first, second))
 
     given = [apart("A", "B", (1, 1)), apart("A", "C", (2, 2)), apart("A", "D", (2, 2)), apart("A", "E", (1, 1))]
-    turned = reordered(team_of(dict.fromkeys("ABCDE", (1, 2)), given), ["RB", "RC", "RD", "RE", "RA"])
+    turned = with_priorities(team_of(dict.fromkeys("ABCDE", (1, 2)), given), ["RB", "RC", "RD", "RE", "RA"])
     definitions = {constraint.scope[1]: constraint.definition for constraint in turned["RA"].shared}
     assert {name: one.name for name, one in definitions.items()} == {"B": "R", "C": "R_2", "D": "R_2", "E": "R"}
     assert [meaning(one) for one in turned["RA"].shared] == [meaning(one) for one in given]
 
 
 def test_a_partially_known_constraint_stays_as_it_is_held() -> None:
-    turned = reordered(pkc_team(), ["RX", "RA", "RB"])
+    turned = with_priorities(pkc_team(), ["RX", "RA", "RB"])
     assert turned["RA"].children == pkc_team()["RA"].children
-    assert [one.model for one in turned["RB"].shared] == [Model.PKC, Model.TKC]
+    assert [one.model for one in turned["RB"].shared] == [ConstraintModel.PKC, ConstraintModel.TKC]
     with pytest.raises(OrderError, match=r"RB .*PKC, C.* RA before it"):
-        reordered(pkc_team(), ["RX", "RB", "RA"])
+        with_priorities(pkc_team(), ["RX", "RB", "RA"])
     with pytest.raises(UnsupportedError, match="PKC"):
         solve(pkc_team(), replace(SIMULATED, order=("RB", "RA", "RX")))
 
 
 def test_a_team_with_a_scenario_keeps_its_order() -> None:
-    team = replace(graph_team(["AB"]), scenario=(Event(()),))
-    assert reordered(team, team.order) is team
+    team = replace(graph_team(["AB"]), scenario=(ScenarioEvent(()),))
+    assert with_priorities(team, team.order) is team
     with pytest.raises(OrderError, match=r"scenario\.xml"):
-        reordered(team, ["RB", "RA"])
+        with_priorities(team, ["RB", "RA"])
 
 
 # Orders by name
@@ -221,7 +221,7 @@ def test_a_team_with_a_scenario_keeps_its_order() -> None:
 def test_neighbours_are_those_of_a_constraint_and_of_a_link() -> None:
     scope = ("A", "B", "C")
     three = Constraint("C", Relation("even", 3, Semantics.SUPPORTS, ((1, 1, 1),)), scope, scope)
-    graph = neighbours(team_of(dict.fromkeys("ABCD", (1, 2)), [three]))
+    graph = constraint_graph(team_of(dict.fromkeys("ABCD", (1, 2)), [three]))
     assert graph == {"RA": {"RB", "RC"}, "RB": {"RA", "RC"}, "RC": {"RA", "RB"}, "RD": frozenset()}
 
 
@@ -229,28 +229,28 @@ def test_the_order_of_a_team_does_not_change_what_orders_by_name_say() -> None:
     chance = Random("names")
     for _ in range(30):
         team = random_team(chance)
-        turned = reordered(team, shuffled(chance, team))
+        turned = with_priorities(team, shuffled(chance, team))
         for order in set(Order) - {Order.GIVEN}:
-            assert sorted(order_of(team, order)) == sorted(team.order)
+            assert sorted(compute_order(team, order)) == sorted(team.order)
             if all(len(constraint.variables) < 3 for constraint in team.constraints()):
-                assert order_of(turned, order, 7) == order_of(team, order, 7), order
+                assert compute_order(turned, order, 7) == compute_order(team, order, 7), order
 
 
 def test_lexicographic_is_natural() -> None:
-    team = reordered(queens3d(4), queens3d(4).order[::-1])
-    assert order_of(team, Order.LEXICOGRAPHIC) == tuple(sorted(team.order, key=natural)) == queens3d(4).order
+    team = with_priorities(queens3d(4), queens3d(4).order[::-1])
+    assert compute_order(team, Order.LEXICOGRAPHIC) == tuple(sorted(team.order, key=natural_key)) == queens3d(4).order
 
 
 def test_max_degree_begins_with_those_that_have_most_neighbours() -> None:
-    assert letters(order_of(graph_team(["AD", "BD", "CD", "BC"]), Order.MAX_DEGREE)) == "DBCA"
+    assert letters(compute_order(graph_team(["AD", "BD", "CD", "BC"]), Order.MAX_DEGREE)) == "DBCA"
 
 
 def test_min_width_has_freuders_width() -> None:
-    assert letters(order_of(graph_team(["AD", "BD", "CD", "BC"]), Order.MIN_WIDTH)) == "BCDA"
-    assert letters(order_of(graph_team([], dict.fromkeys("ABC", 2)), Order.MIN_WIDTH)) == "ABC"
+    assert letters(compute_order(graph_team(["AD", "BD", "CD", "BC"]), Order.MIN_WIDTH)) == "BCDA"
+    assert letters(compute_order(graph_team([], dict.fromkeys("ABC", 2)), Order.MIN_WIDTH)) == "ABC"
     chance = Random("width")
     for _ in range(60):
-        graph = neighbours(random_team(chance))
+        graph = constraint_graph(random_team(chance))
         widths = {names: width(graph, names) for names in itertools.permutations(graph)} if len(graph) < 7 else {}
         if widths:
             assert width(graph, order_of_graph(graph, Order.MIN_WIDTH)) == min(widths.values())
@@ -260,7 +260,7 @@ def order_of_graph(graph: Mapping[str, frozenset[str]], order: Order) -> tuple[s
     """`order` of a team with that graph."""
     edges = [(one[1:], other[1:]) for one in graph for other in graph[one] if one < other]
     constraints = [Constraint("C", DIFFERENT, edge, edge) for edge in edges]
-    return order_of(team_of({name[1:]: (1, 2) for name in sorted(graph)}, constraints), order)
+    return compute_order(team_of({name[1:]: (1, 2) for name in sorted(graph)}, constraints), order)
 
 
 def width(graph: Mapping[str, frozenset[str]], names: Sequence[str]) -> int:
@@ -270,29 +270,31 @@ def width(graph: Mapping[str, frozenset[str]], names: Sequence[str]) -> int:
 
 def test_dom_deg_begins_with_the_smallest_domain_a_neighbour() -> None:
     team = graph_team(["AB", "BC", "CD", "BD"], {"A": 3, "B": 9, "C": 2, "D": 4, "E": 1})
-    assert letters(order_of(team, Order.DOM_DEG)) == "CDABE"  # 1, 2, 3, 3; E has no neighbour
+    assert letters(compute_order(team, Order.DOM_DEG)) == "CDABE"  # 1, 2, 3, 3; E has no neighbour
 
 
 def test_dom_deg_multiplies_the_domains_of_a_complex_robot() -> None:
     domains = {"A": [1, 2, 3], "B": [1, 2, 3], "C": list(range(8))}
     constraint = Constraint("C", DIFFERENT, ("A", "C"), ("A", "C"))
     team = complex_team({"R1": ["A", "B"], "R2": ["C"]}, domains, [constraint])
-    assert order_of(team, Order.DOM_DEG) == ("R2", "R1")
+    assert compute_order(team, Order.DOM_DEG) == ("R2", "R1")
 
 
 def test_random_follows_its_seed() -> None:
     team = graph_team([], dict.fromkeys("ABCD", 2))
-    seen = Counter(order_of(team, Order.RANDOM, seed) for seed in range(24 * 50))
+    seen = Counter(compute_order(team, Order.RANDOM, seed) for seed in range(24 * 50))
     assert len(seen) == 24
     assert max(seen.values()) < 100
-    assert letters(order_of(team, Order.RANDOM, 1)) == "ADCB"
-    assert order_of(team, Order.RANDOM, 1) == order_of(reordered(team, team.order[::-1]), Order.RANDOM, 1)
+    assert letters(compute_order(team, Order.RANDOM, 1)) == "ADCB"
+    assert compute_order(team, Order.RANDOM, 1) == compute_order(
+        with_priorities(team, team.order[::-1]), Order.RANDOM, 1
+    )
 
 
 def test_dfs_goes_on_to_the_neighbour_with_most_neighbours() -> None:
     # E has most; of A, D, F and G it goes to D; G and H are a part of their own, I another.
     team = graph_team(["EA", "ED", "EF", "DB", "DC", "CB", "GH"], {"I": 2})
-    assert letters(order_of(team, Order.DFS)) == "DEAFBCGHI"
+    assert letters(compute_order(team, Order.DFS)) == "DEAFBCGHI"
 
 
 def test_dfs_induces_its_own_pseudo_tree() -> None:
@@ -300,10 +302,10 @@ def test_dfs_induces_its_own_pseudo_tree() -> None:
     chance = Random("tree")
     for _ in range(150):
         team = random_team(chance)
-        turned = in_order(team, Order.DFS)
-        graph = neighbours(turned)
+        turned = with_order(team, Order.DFS)
+        graph = constraint_graph(turned)
         links = {robot.name: [parent.name for parent in robot.parents] for robot in turned.robots}
         tree = PseudoTree.induced(turned.order, links)
         for name in team.order:
             assert graph[name] <= {*tree.ancestors(name), *tree.descendants(name)}
-            assert tree.parents[name] is None or tree.parents[name] in neighbours(team)[name]
+            assert tree.parents[name] is None or tree.parents[name] in constraint_graph(team)[name]

@@ -30,10 +30,11 @@ from robochoc.journal.journal import Header, Journal, Recorder, read_journal
 from robochoc.model.message import Message, Value
 from robochoc.protocols.abt import ABT, Nogood
 from robochoc.protocols.dynabt import DynABT
-from robochoc.replay import CannotReplayError, Means, Replayed, replay
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal
+from robochoc.replay import CannotReplayError, ReplayOptions, ReplayResult, replay
+from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_names
-from robochoc.run.scenario import Announcer, ScenarioRun
+from robochoc.run.scenario import ScenarioRun
+from robochoc.run.start_events import StartEvents
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
@@ -67,7 +68,7 @@ def four() -> Journal:
     return recorded(queens3d(4), FOUR)
 
 
-def identical(replayed: Replayed) -> bool:
+def identical(replayed: ReplayResult) -> bool:
     """Whether all was played, and the same."""
     return replayed.identical and not (replayed.stopped or replayed.unfinished)
 
@@ -81,7 +82,7 @@ def test_what_was_recorded_is_said_again(protocol: str, numbers: range, warm: Ac
     for number in numbers:
         team, options = random_run(protocol, Random(f"replay {protocol} {number}"), number)
         journal = recorded(team, options, warm)
-        replayed = replay(in_text(journal) if number % 2 else journal, Means(solver=warm))
+        replayed = replay(in_text(journal) if number % 2 else journal, ReplayOptions(solver=warm))
         assert identical(replayed) or not replayed.runs, (team, options, replayed)
         assert replayed.messages == sum(isinstance(event, Sent) for event in journal.events)
         steps += replayed.steps
@@ -92,7 +93,7 @@ def test_what_was_recorded_is_said_again(protocol: str, numbers: range, warm: Ac
 def test_what_was_recorded_in_processes_is_said_again(protocol: str, warm: AceProcess) -> None:
     team, options = random_run(protocol, Random(f"processes {protocol}"), 0)
     journal = recorded(team, replace(options, runtime=Runtime.PROCESSES, delay=0), warm)
-    assert identical(replay(journal, Means(solver=warm)))
+    assert identical(replay(journal, ReplayOptions(solver=warm)))
 
 
 def test_a_network_of_processes_is_one_more_runtime() -> None:
@@ -169,18 +170,18 @@ def test_robots_are_lost_and_come_back(spares: int, tmp_path: Path) -> None:
     write_team(odd_team(), tmp_path / "team")
     team = read_team(tmp_path / "team")
     Meteor.flag = tmp_path / "hit"
-    journey = ScenarioRun(team, None, CompiledTeam, lambda: None, spares=spares, brief=RunParameters(0, {}))
+    journey = ScenarioRun(team, None, CompiledTeam, lambda: None, spares=spares, parameters=RunParameters(0, {}))
     recorder = Recorder(Header(team="team", protocol="dynabt", runtime="processes", seed=0))
-    announce = Announcer(recorder)
+    events = StartEvents(recorder)
     with ProcessesRun(journey.compiled(), Meteor, observer=recorder, survive=True) as session:
-        played = list(journey.go(session, lambda opening: announce(Meteor, opening, session)))
+        played = list(journey.epochs(session, lambda opening: events.report(Meteor, opening, session)))
     journal = read_journal(recorder.content())
     assert len(played) == 2
     assert any(isinstance(event, Lost) for event in journal.events)
     given = [event for event in journal.events if isinstance(event, Given)]
     assert given[1].fresh == (("RB",) if spares else ())
     assert not given[1].quiet
-    replayed = replay(journal, Means(protocols={"Meteor": DynABT}))
+    replayed = replay(journal, ReplayOptions(protocols={"Meteor": DynABT}))
     assert replayed.identical
     assert {one.robot for one in replayed.stopped} <= {*team.order}
     assert replayed.runs == 2
@@ -257,7 +258,7 @@ def test_a_step_that_stands_there_twice_is_a_difference(four: Journal, every: in
 
 
 def test_a_protocol_that_was_changed_is_caught_where_it_first_does_something_else(four: Journal) -> None:
-    replayed = replay(four, Means(protocols={"ABT": Forgetful}))
+    replayed = replay(four, ReplayOptions(protocols={"ABT": Forgetful}))
     difference = replayed.difference
     assert difference is not None
     assert difference.run == 0
@@ -268,7 +269,7 @@ def test_a_protocol_that_was_changed_is_caught_where_it_first_does_something_els
 
 
 def test_what_a_protocol_raises_is_told_with_its_place(four: Journal) -> None:
-    difference = replay(four, Means(protocols={"ABT": Fragile})).difference
+    difference = replay(four, ReplayOptions(protocols={"ABT": Fragile})).difference
     assert difference is not None
     assert difference.raised.startswith("KeyError: (")
     assert "test_replay.py:" in difference.raised
@@ -284,7 +285,7 @@ class Stubborn(ABT):
 
 
 def test_a_protocol_that_goes_round_in_a_circle_is_stopped(four: Journal) -> None:
-    difference = replay(four, Means(protocols={"ABT": Stubborn})).difference
+    difference = replay(four, ReplayOptions(protocols={"ABT": Stubborn})).difference
     assert difference is not None
     assert "and no end of it" in difference.raised
 
@@ -306,21 +307,21 @@ def test_files_help_where_the_journal_does_not_say_what_robots_were_given() -> N
     with pytest.raises(CannotReplayError, match="--team DIR") as caught:
         replay(journal)
     assert not caught.value.broken
-    assert identical(replay(journal, Means(team=team)))
+    assert identical(replay(journal, ReplayOptions(team=team)))
     masters = with_events(journal, [e for e in journal.events if not isinstance(e, Began)][: len(journal.events) // 2])
-    assert replay(masters, Means(team=team)).runs == 1
+    assert replay(masters, ReplayOptions(team=team)).runs == 1
 
 
 def test_settings_and_orders_that_only_the_command_line_knows() -> None:
     team = queens3d(2)
     options = Options(protocol="dsa", runtime=Runtime.SIMULATOR, settings={"cycles": "3"}, seed=4)
     journal = without_given(recorded(team, options))
-    assert not replay(journal, Means(team=team)).identical
-    assert identical(replay(journal, Means(team=team, settings={"cycles": "3"})))
+    assert not replay(journal, ReplayOptions(team=team)).identical
+    assert identical(replay(journal, ReplayOptions(team=team, settings={"cycles": "3"})))
     order = tuple(reversed(team.order))
     journal = without_given(recorded(team, replace(FOUR, withdraw=None, order=order)))
     header = msgspec.structs.replace(journal.header, order=order)
-    assert identical(replay(replace(journal, header=header), Means(team=team)))
+    assert identical(replay(replace(journal, header=header), ReplayOptions(team=team)))
 
 
 def test_a_protocol_that_is_not_installed(four: Journal) -> None:

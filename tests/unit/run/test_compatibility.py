@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import pytest
 
-from robochoc.model.problem import Constraint, Kind, Model, Relation, Semantics, Team
+from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind, Relation, Semantics, Team
 from robochoc.run import compatibility as refusals
+from robochoc.run import solve
 from robochoc.run.options import Options, Runtime, Withdrawal
-from robochoc.run.orchestrator import solve
 from robochoc.run.registry import Offer, offers
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.exact import EXACT
+from robochoc.solver.exact_costs import EXACT
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of
 
@@ -28,7 +28,9 @@ def dear(cost: int, pairs: str = "AB BC") -> Team:
 
 def partly_known(cost: int) -> Team:
     """The same, and a partially known constraint."""
-    part = Constraint("P", Relation("N", 2, Semantics.CONFLICTS, ((0, 0),)), ("A", "C"), ("A", "C"), Model.PKC)
+    part = Constraint(
+        "P", Relation("N", 2, Semantics.CONFLICTS, ((0, 0),)), ("A", "C"), ("A", "C"), ConstraintModel.PKC
+    )
     team = dear(cost)
     last = team["RC"]
     parents = (*last.parents, replace(last.parents[0], name="RA", constraints=(part,)))
@@ -92,7 +94,7 @@ def test_whoever_is_named_in_any_refusal_takes_the_team(withdraw: Withdrawal | N
 
 
 def test_where_no_protocol_does_the_judge_may() -> None:
-    for kind, asked in ((Kind.DISWCSP, "sfb"), (Kind.DISWCSP, "abt")):
+    for kind, asked in ((ProblemKind.DISWCSP, "sfb"), (ProblemKind.DISWCSP, "abt")):
         team = replace(partly_known(3), robots=tuple(replace(one, kind=kind) for one in partly_known(3).robots))
         said = refused(team, Options(protocol=asked))
         assert said.endswith("; no protocol does, but the central judge (--protocol central)")

@@ -14,10 +14,10 @@ import pytest
 
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.change import without
+from robochoc.model.change import without_robots
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from tests.support.faults import PROGRAM, Run, running
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
@@ -77,7 +77,7 @@ def test_the_others_go_on_and_are_right(seed: int, folders: dict[str, Path], tmp
     withdrawn = answer["withdrawn"]
     assert isinstance(withdrawn, list)
     assert len(withdrawn) <= killed
-    rest = without(TEAMS[name], withdrawn)
+    rest = without_robots(TEAMS[name], withdrawn)
     assert answer["verdict"] == truth(rest)
     assignment = answer["assignment"]
     assert isinstance(assignment, dict)

@@ -11,7 +11,7 @@ import pytest
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.formats import PREDEFINED, read_team, write_team
-from robochoc.model.change import changed, changed_by, without
+from robochoc.model.change import apply_changes, team_after_events, without_robots
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import (
     AddAgent,
@@ -19,10 +19,10 @@ from robochoc.model.problem import (
     AddValue,
     Change,
     Constraint,
-    Event,
     RemoveAgent,
     RemoveConstraint,
     RemoveValue,
+    ScenarioEvent,
     Team,
 )
 from robochoc.run.scenario import ScenarioRun
@@ -74,12 +74,12 @@ def team(tmp_path: Path) -> Team:
 def travel(team: Team, losses: Sequence[str], spares: int = 0) -> tuple[ScenarioRun, Losing, list[Team]]:
     journey = ScenarioRun(team, None, CompiledTeam, lambda: None, spares=spares)
     session = Losing(journey.team, losses)
-    return journey, session, [played.team for played in journey.go(session, lambda _: None)]
+    return journey, session, [played.team for played in journey.epochs(session, lambda _: None)]
 
 
 def test_who_is_lost_leaves(team: Team) -> None:
     journey, session, teams = travel(team, ["RB"])
-    assert teams == [team, without(team, ["RB"])]
+    assert teams == [team, without_robots(team, ["RB"])]
     assert journey.withdrawn == ["RB"]
     assert session.epochs[0].restarted == frozenset()
 
@@ -102,21 +102,24 @@ def test_so_many_come_back_as_there_are_spares(team: Team) -> None:
 
 @pytest.mark.parametrize("name", ["RA", "RB", "RC", "RD"])
 def test_who_comes_back_after_changes_has_them_too(team: Team, name: str) -> None:
-    scenario = (Event(tuple(CHANGES)),)
+    scenario = (ScenarioEvent(tuple(CHANGES)),)
     *_, last = travel(replace(team, scenario=scenario), ["", name], spares=1)[2]
-    now = changed_by(replace(team, scenario=scenario), 1)
+    now = team_after_events(replace(team, scenario=scenario), 1)
     assert {robot.name: robot for robot in last.robots} == {robot.name: robot for robot in now.robots}
 
 
 def test_changes_of_one_who_left_do_not_concern_who_comes_under_its_name(team: Team) -> None:
     again = replace(team["RD"], parents=team["RD"].parents)
-    events = (Event((AddValue("D", 7),)), Event((RemoveAgent("RD"), AddAgent(again))))
+    events = (ScenarioEvent((AddValue("D", 7),)), ScenarioEvent((RemoveAgent("RD"), AddAgent(again))))
     *_, last = travel(replace(team, scenario=events), ["", "", "RD"], spares=1)[2]
     assert list(last.variables["D"].domain) == [1, 2]
 
 
 def test_what_the_scenario_says_of_those_who_are_lost_is_passed_over(team: Team) -> None:
-    events = (Event((AddValue("D", 7), AddValue("C", 7))), Event((RemoveAgent("RD"), RemoveValue("C", 1))))
+    events = (
+        ScenarioEvent((AddValue("D", 7), AddValue("C", 7))),
+        ScenarioEvent((RemoveAgent("RD"), RemoveValue("C", 1))),
+    )
     journey, _, teams = travel(replace(team, scenario=events), ["RD"])
     assert list(teams[-1].variables["C"].domain) == [2, 7]
     assert journey.withdrawn == [], "it would have left by now"
@@ -126,13 +129,13 @@ def test_a_file_that_cannot_be_read_keeps_its_robot_away(team: Team) -> None:
     Path(team["RB"].file).write_text("<instance>")
     journey, _, _ = travel(team, ["RB"], spares=1)
     assert journey.withdrawn == ["RB"]
-    assert "RB could not come back" in journey.regrets[0]
+    assert "RB could not come back" in journey.failed_returns[0]
 
 
 def test_a_file_that_has_lost_a_variable_meanwhile_does_not_stop_the_scenario(team: Team) -> None:
-    alone = without(team, ["RA", "RB", "RC"])
+    alone = without_robots(team, ["RA", "RB", "RC"])
     file = Path(alone["RD"].file)
-    events = (Event((AddValue("D", 7),)),)
+    events = (ScenarioEvent((AddValue("D", 7),)),)
     text = file.read_text()
     start, end = text.index("<agents_neighbours>"), text.index("</agents_neighbours>")
     bare = text[:start] + text[end:].replace("</agents_neighbours>", "<agents_neighbours/>")
@@ -150,6 +153,6 @@ def test_nobody_is_left(team: Team) -> None:
 
 def test_definitions_of_added_constraints_stay(team: Team) -> None:
     less = Constraint("L", PREDEFINED["lt"], ("B", "C"), ("B", "C"))
-    events = (Event((AddConstraint("RC", "RB", less),)),)
+    events = (ScenarioEvent((AddConstraint("RC", "RB", less),)),)
     *_, last = travel(replace(team, scenario=events), ["", "RC"], spares=1)[2]
-    assert changed(team, events[0].changes)["RC"].shared == last["RC"].shared
+    assert apply_changes(team, events[0].changes)["RC"].shared == last["RC"].shared

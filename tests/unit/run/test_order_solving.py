@@ -9,15 +9,15 @@ import pytest
 
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.orders import Order, reordered
+from robochoc.model.orders import Order, with_priorities
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import (
     Team,
 )
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named
-from robochoc.solver.central import CentralSolver, Judgement
-from robochoc.verification.checker import objections
+from robochoc.solver.central import CentralAnswer, CentralSolver
+from robochoc.verification.checker import violations
 from tests.support.complex_problems import random_complex_team
 from tests.support.problems import random_team, shuffled, solutions
 from tests.support.small_teams import graph_team
@@ -43,12 +43,12 @@ def test_complex_robots_solve_in_any_order() -> None:
     chance = Random("solve complex")
     for seed in range(25):
         team = random_complex_team(chance)
-        turned = reordered(team, shuffled(chance, team))
+        turned = with_priorities(team, shuffled(chance, team))
         result = Simulation(compiled_by_brute_force(turned), protocol_named("abt"), RandomChannels(seed)).run(30)
         assert (result.verdict is Verdict.SOLUTION) is any(solutions(team))
         if result.verdict is Verdict.SOLUTION:
             found = {name: value for own in result.assignments.values() for name, value in own.items()}
-            assert not list(objections(team, found))
+            assert not list(violations(team, found))
 
 
 def test_the_priority_is_the_orders() -> None:
@@ -64,9 +64,9 @@ def test_judge_and_checker_see_the_files(monkeypatch: pytest.MonkeyPatch) -> Non
     team = graph_team(["AB", "BC", "AC"])
     seen = []
 
-    def judged(_judge: CentralSolver, merged: Team, **_: object) -> Judgement:
+    def judged(_judge: CentralSolver, merged: Team, **_: object) -> CentralAnswer:
         seen.append(merged)
-        return Judgement(Verdict.NO_SOLUTION)
+        return CentralAnswer(Verdict.NO_SOLUTION)
 
     monkeypatch.setattr(CentralSolver, "judge", judged)
     assert solve(team, replace(SIMULATED, order=Order.DFS, verify=True)).verified

@@ -11,7 +11,7 @@ from robochoc.communication.session import Epoch, Session
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats import read_team, write_team
-from robochoc.model.change import changed
+from robochoc.model.change import apply_changes
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import (
     AddAgent,
@@ -20,20 +20,20 @@ from robochoc.model.problem import (
     Change,
     Constraint,
     Domain,
-    Event,
     Parent,
     Relation,
     RemoveAgent,
     RemoveConstraint,
     RemoveValue,
     Robot,
+    ScenarioEvent,
     Semantics,
     Team,
     Variable,
 )
 from robochoc.protocols.dynabt import DynABT
-from robochoc.run.orchestrator import Options, Runtime, solve
-from robochoc.run.scenario import Played, ScenarioRun
+from robochoc.run import Options, Runtime, solve
+from robochoc.run.scenario import FinishedEpoch, ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import invalidated_by
 from tests.support.problems import team_of
@@ -73,19 +73,19 @@ def losing(*names: str) -> RunResult:
     return replace(DONE, verdict=Verdict.UNKNOWN, lost=dict.fromkeys(names, "it was hit by a meteor"))
 
 
-def event(*changes: Change) -> Event:
-    return Event(changes)
+def event(*changes: Change) -> ScenarioEvent:
+    return ScenarioEvent(changes)
 
 
 def journey_of(team: Team, *, spares: int = 0, messages: int | None = None) -> ScenarioRun:
     return ScenarioRun(team, None, CompiledTeam, lambda: None, messages=messages, spares=spares)
 
 
-def travel(journey: ScenarioRun, session: Scripted) -> list[Played]:
-    return list(journey.go(session, lambda _: None))
+def travel(journey: ScenarioRun, session: Scripted) -> list[FinishedEpoch]:
+    return list(journey.epochs(session, lambda _: None))
 
 
-def teams(played: Sequence[Played]) -> list[tuple[str, ...]]:
+def teams(played: Sequence[FinishedEpoch]) -> list[tuple[str, ...]]:
     return [one.team.order for one in played]
 
 
@@ -128,7 +128,7 @@ def test_a_team_that_all_have_left_may_be_joined() -> None:
     assert teams(travel(journey_of(team), Scripted(team))) == [("RA", "RB", "RC"), (), ("RD",)]
     news = iter(team.scenario)
     here = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
-    outcome = solve(BASE, here, field=lambda *_: next(news, None))  # a scenario must leave somebody, as in files
+    outcome = solve(BASE, here, environment=lambda *_: next(news, None))  # a scenario must leave somebody, as in files
     assert [str(epoch.verdict) for epoch in outcome.epochs] == ["solution"] * 3
 
 
@@ -177,8 +177,8 @@ def test_two_changes_in_a_row_tell_a_new_child() -> None:
         {"A": range(1, 4), "B": range(1, 4), "C": range(3, 5), "D": range(3, 5), "Z": range(1, 4)},
         [differ("A", "C"), differ("B", "D")],
     )
-    linked = changed(team, [AddConstraint("RB", "RA", differ("A", "B"))])
-    less = changed(linked, [RemoveAgent("RZ")])
+    linked = apply_changes(team, [AddConstraint("RB", "RA", differ("A", "B"))])
+    less = apply_changes(linked, [RemoveAgent("RZ")])
     session = Simulation(team, DynABT, Concurrent(0))
     session.search()
     session.change(Epoch(CompiledTeam(linked), invalidated_by(team, linked)))  # and before the search goes on
@@ -201,14 +201,14 @@ def test_links_that_were_asked_for_outlive_a_change_of_the_interface() -> None:
         Robot("V", (variable("v", 1, 2), variable("w", 1))),
         Robot("Y", (variable("y", 1),)),
     )
-    team = changed(
+    team = apply_changes(
         Team("links", robots),
         [
             AddConstraint("V", "P", forbids("q", ("p", "w"), (5, 5))),
             AddConstraint("Y", "V", forbids("c", ("x", "v", "y"), (1, 1, 1), (2, 1, 1))),
         ],
     )
-    hidden = Event((RemoveConstraint("V", "P", "q"), RemoveValue("x", 1)))
+    hidden = ScenarioEvent((RemoveConstraint("V", "P", "q"), RemoveValue("x", 1)))
     outcome = solve(
         replace(team, scenario=(hidden,)), Options(protocol="dynabt", runtime=Runtime.SIMULATOR, messages=500)
     )

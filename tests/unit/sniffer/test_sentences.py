@@ -20,9 +20,9 @@ from robochoc.model.wording import Wording, listed
 from robochoc.protocols.dfs import Token
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.orchestrator import Options, Runtime, Withdrawal
+from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_named, protocol_names
-from robochoc.sniffer.feed import Feed
+from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.sentences import sentence
 from robochoc.sniffer.trace import Trace
 from tests.support.complex_problems import random_complex_team
@@ -157,7 +157,7 @@ def said(protocol: str) -> dict[str, set[str]]:
     return words_of(feed)
 
 
-def words_of(feed: Feed) -> dict[str, set[str]]:
+def words_of(feed: PageData) -> dict[str, set[str]]:
     told: dict[str, set[str]] = {kind: set() for kind in feed.trace.kinds}
     for message, kind in enumerate(feed.trace.messages.kind):
         told[feed.trace.kinds[kind]].add(feed.words(message))
@@ -183,11 +183,11 @@ def test_every_type_of_every_protocol_has_its_words(kind: type[Message]) -> None
 def test_a_solution_that_is_found_and_who_steps_aside() -> None:
     team = random_team(Random(3))
     options = Options(protocol="afc-ng", runtime=Runtime.SIMULATOR, cache=False)
-    told = words_of(Feed(Trace.of(record(team, options))))
+    told = words_of(PageData(Trace.of(record(team, options))))
     (solved,) = told["Solved"]
     assert solved.startswith(f"{team.order[-1]} says: a solution is found, and the search is over: ")
     options = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL, cache=False)
-    told = words_of(Feed(Trace.of(record(queens3d(3), options))))
+    told = words_of(PageData(Trace.of(record(queens3d(3), options))))
     assert "Robot1.1 says: I fly, with V1.1 = 1" in told["Placed"]
     assert any(sentence.endswith("says: I step aside") for sentence in told["Placed"])
 
@@ -195,7 +195,7 @@ def test_a_solution_that_is_found_and_who_steps_aside() -> None:
 def test_a_tree_names_the_robots_on_the_branch_only() -> None:
     for seed in range(40):
         team = random_team(Random(seed))
-        feed = Feed(Trace.of(record(team, Options(protocol="afc-tree", runtime=Runtime.SIMULATOR, cache=False))))
+        feed = PageData(Trace.of(record(team, Options(protocol="afc-tree", runtime=Runtime.SIMULATOR, cache=False))))
         told = words_of(feed)
         if any(len(one) > 30 for one in told.get("CPA", ())) and "Accept" in told:
             break
@@ -224,7 +224,7 @@ FACT = re.compile(r"(V\S+) (?:=|cannot be) (-?\d+)")
 def test_robots_with_several_variables_are_told_by_those_that_matter(seed: int) -> None:
     team = random_complex_team(Random(seed))
     team = replace(team, robots=tuple(replace(robot, private=()) for robot in team.robots))  # what needs no solver
-    feed = Feed(Trace.of(record(team, Options(protocol="abt", runtime=Runtime.SIMULATOR, cache=False))))
+    feed = PageData(Trace.of(record(team, Options(protocol="abt", runtime=Runtime.SIMULATOR, cache=False))))
     of = feed.trace.messages
     for message in range(len(of.t)):
         sender, receiver = (feed.trace.robots[robot[message]] for robot in (of.sender, of.receiver))
@@ -246,7 +246,7 @@ def test_names_follow_the_team_through_its_epochs() -> None:
     for seed in range(40):
         team = random_changing_team(Random(seed))
         options = Options(protocol="dynabt", runtime=Runtime.SIMULATOR, cache=False)
-        feed = Feed(Trace.of(record(team, options)))
+        feed = PageData(Trace.of(record(team, options)))
         of = feed.trace.messages
         joined = set(feed.trace.robots) - set(team.order)
         for message in range(len(of.t)):

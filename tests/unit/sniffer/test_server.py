@@ -22,8 +22,8 @@ from robochoc.journal.events import AnyEvent
 from robochoc.journal.journal import lines_of, read_journal
 from robochoc.model.outcome import Outcome
 from robochoc.run.options import Runtime
-from robochoc.sniffer import following, server
-from robochoc.sniffer.feed import columns_of, steps_of
+from robochoc.sniffer import live_trace, server
+from robochoc.sniffer.page_data import message_columns, step_columns
 from robochoc.sniffer.session import Session
 from robochoc.sniffer.trace import Trace
 from tests.support.faults import wait_until
@@ -37,7 +37,7 @@ TRACE = Trace.of(read_journal(WHOLE))
 @pytest.fixture(autouse=True)
 def whole(monkeypatch: pytest.MonkeyPatch) -> None:
     """A journal is shown when it has been read to its end, however slow the machine is at the moment."""
-    monkeypatch.setattr(following, "_AT_ONCE_S", math.inf)
+    monkeypatch.setattr(live_trace, "_AT_ONCE_S", math.inf)
 
 
 @pytest.fixture
@@ -57,9 +57,9 @@ def test_every_answer_is_the_journals(page: SnifferServer, file: Path) -> None:
     about = page.json("about")
     messages, steps = len(TRACE.messages.t), len(TRACE.steps.t)
     assert (about["messages"], about["steps"], about["over"], about["chosen"]) == (messages, steps, True, ["Robot1.*"])
-    assert page.get(f"columns?from=0&to={messages}") == columns_of(TRACE, 0, messages)
-    assert page.get(f"columns?from=3&to={messages - 5}") == columns_of(TRACE, 3, messages - 5)
-    assert page.get(f"steps?from=2&to={steps}") == steps_of(TRACE, 2, steps)
+    assert page.get(f"columns?from=0&to={messages}") == message_columns(TRACE, 0, messages)
+    assert page.get(f"columns?from=3&to={messages - 5}") == message_columns(TRACE, 3, messages - 5)
+    assert page.get(f"steps?from=2&to={steps}") == step_columns(TRACE, 2, steps)
     assert page.json("decisions?from=0&to=2") == [list(decision) for decision in TRACE.decisions[:2]]
     details = page.json("details?chunk=0")
     assert len(details) == min(messages, 1024)
@@ -71,7 +71,7 @@ def test_the_text_form_is_served_too(tmp_path: Path) -> None:
     path = tmp_path / "run.jsonl"
     path.write_bytes(b"".join(lines_of(read_journal(WHOLE))))
     with sniffer_server(Session(path)) as page:
-        assert page.get("columns?from=0&to=50") == columns_of(TRACE, 0, 50)
+        assert page.get("columns?from=0&to=50") == message_columns(TRACE, 0, 50)
 
 
 def test_what_a_robot_knew_comes_in_chunks(page: SnifferServer) -> None:
@@ -218,8 +218,8 @@ def test_bundles_out_of_order_are_put_in_order_at_the_end(tmp_path: Path, monkey
     events, outcome = run_events(Runtime.PROCESSES)
     content = journal_of(events, outcome, header("processes"))
     expected = Trace.of(read_journal(content))
-    monkeypatch.setattr(following, "PIECE_BYTES", 700)
-    monkeypatch.setattr(following, "_EVENTS_AT_ONCE", 50)
+    monkeypatch.setattr(live_trace, "PIECE_BYTES", 700)
+    monkeypatch.setattr(live_trace, "_EVENTS_AT_ONCE", 50)
     path = tmp_path / "run.journal"
     path.write_bytes(content)
     session = Session(path)
@@ -230,7 +230,7 @@ def test_bundles_out_of_order_are_put_in_order_at_the_end(tmp_path: Path, monkey
     assert (news["generation"], news["over"]) == (1, True)
     assert not any(over[:-1])  # what is over does not change any more
     count = len(expected.messages.t)
-    assert session.rows("columns", 0, count) == columns_of(expected, 0, count)
+    assert session.rows("columns", 0, count) == message_columns(expected, 0, count)
     session.close()
 
 

@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Began, Decided, Received, Refused, Sent, Settled
 from robochoc.journal.journal import Header, Journal
-from robochoc.run.orchestrator import Options, Runtime, ScheduleName
+from robochoc.run import Options, Runtime, ScheduleName
 from robochoc.sniffer.columns import NOT_YET
-from robochoc.sniffer.feed import columns_of, steps_of
+from robochoc.sniffer.page_data import message_columns, step_columns
 from robochoc.sniffer.trace import MOST_COUNTED, MOST_NAMES, Trace, TraceTooLargeError
 from tests.support.recorded_journals import record, recorded
 
@@ -292,7 +292,7 @@ def test_contents_of_any_kind_come_back() -> None:
 def test_columns_are_little_endian_one_after_the_other() -> None:
     trace = Trace.of(recorded("abt"))
     first, end = 3, 40
-    content, rows = columns_of(trace, first, end), end - first
+    content, rows = message_columns(trace, first, end), end - first
     place = 0
     for name, kind in zip(
         ("t", "clock", "step", "bytes", "sender", "receiver", "kind", "run"),
@@ -309,7 +309,7 @@ def test_steps_travel_with_what_they_took_in() -> None:
     trace = Trace.of(recorded("abt"))
     count = len(trace.steps.t)
     for first, end in ((0, count), (5, 20), (7, 7)):
-        content, rows = steps_of(trace, first, end), end - first
+        content, rows = step_columns(trace, first, end), end - first
         ends = np.frombuffer(content, "<u4", rows, 24 * rows).tolist()
         assert ends == list(trace.steps.packet_end[first:end])
         begin = trace.steps.packet_end[first - 1] if first else 0

@@ -23,12 +23,12 @@ from robochoc.formats.xcsp3 import xcsp3
 from robochoc.generators.queens3d import QueensModel, QueensRobots, queens3d
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics
-from robochoc.run.orchestrator import Options, solve
+from robochoc.run import Options, solve
 from robochoc.solver import ace as front
 from robochoc.solver import propagation
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.ace_words import Strategy
-from robochoc.solver.encoding import LONGEST_ALLOWED, Network, Table
+from robochoc.solver.ace_messages import Strategy
+from robochoc.solver.encoding import MAX_ALLOWED_ROWS, Network, Table
 from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
 from tests.support.clocks import waiting
 from tests.support.complex_problems import complex_team
@@ -37,7 +37,7 @@ from tests.support.program import PROGRAM, ROOT, robochoc
 from tests.support.solver_networks import SMALL_NETWORK, brute_force, queens_network, random_network
 
 STRATEGIES: tuple[Strategy, Strategy] = ("default", "static")
-TABLES_AT_MOST = (LONGEST_ALLOWED, 5)
+TABLES_AT_MOST = (MAX_ALLOWED_ROWS, 5)
 """With the second, most tables of forbidden tuples stay what they are."""
 _FORBIDDEN = Table((0, 1), allowed=False, rows=((0, 3), (0, 4), (3, 1), (5, 1)))
 MISCOUNTED = Network(((0, 3, 5), (1, 3, 4), (2,)), (_FORBIDDEN, Table((0, 2), allowed=False, rows=((0, 2),))))
@@ -123,7 +123,7 @@ def test_forbidden_tuples_and_a_single_value_are_counted_right(warm: AceProcess,
 
 
 def test_ace_alone_still_counts_wrongly(warm: AceProcess, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Once this fails, ACE has been mended, and `propagated` has less to do."""
+    """Once this fails, ACE has been mended, and `propagate` has less to do."""
     monkeypatch.setattr(front, "propagated", lambda network: network)
     assert warm.solve(MISCOUNTED).found == 6
 
@@ -141,7 +141,7 @@ def test_what_is_propagated_keeps_its_solutions(longest: int, monkeypatch: pytes
     solvable = smaller = forbidding = 0
     for _ in range(1500):
         network = random_network(chance)
-        result = propagation.propagated(network)
+        result = propagation.propagate(network)
         assert brute_force(result) == brute_force(network), network
         for table in result.tables:
             assert table.allowed or len(list(itertools.product(*(result.domains[p] for p in table.scope)))) > longest

@@ -20,7 +20,7 @@ from robochoc.model.problem import Robot
 from robochoc.solver import cache as cache_module
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.cache import SolutionCache
-from robochoc.solver.compile import Compilation, Compiler, Source
+from robochoc.solver.compile import Compilation, CompiledFrom, Compiler
 from robochoc.solver.encoding import Codes, Network, Table
 from tests.support.program import ROOT, robochoc
 from tests.support.solver_networks import SMALL_NETWORK, SMALL_SOLUTIONS
@@ -182,14 +182,14 @@ def test_a_robot_is_compiled_again_when_its_file_is_damaged(
     cache: SolutionCache, solver: AceProcess, row: Robot, damage: str
 ) -> None:
     first = compiled(row, cache, solver)
-    assert (first.source, first.domain.total) == (Source.ACE, 2)
-    assert compiled(row, cache, solver) == replace(first, source=Source.CACHE)
+    assert (first.source, first.domain.total) == (CompiledFrom.ACE, 2)
+    assert compiled(row, cache, solver) == replace(first, source=CompiledFrom.CACHE)
     (path,) = cache.files()
     whole = path.read_bytes()
     path.write_bytes(DAMAGES[damage](path))
     assert compiled(row, cache, solver) == first
     assert path.read_bytes() == whole
-    assert compiled(row, cache, solver).source is Source.CACHE
+    assert compiled(row, cache, solver).source is CompiledFrom.CACHE
 
 
 def test_another_version_has_other_files(cache: SolutionCache, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -236,7 +236,7 @@ def test_a_folder_that_cannot_be_written_is_done_without(
     assert cache.get(SMALL_NETWORK) is None
     for _ in range(2):
         found = compiled(row, cache, solver)
-        assert (found.source, found.domain.total) == (Source.ACE, 2)
+        assert (found.source, found.domain.total) == (CompiledFrom.ACE, 2)
     assert (list(cache.files()), cache.clear()) == ([], 0)
     assert (tmp_path / "file").read_text() == "in the way"
 
@@ -246,7 +246,7 @@ def test_a_folder_in_the_place_of_a_file_is_done_without(cache: SolutionCache, s
     (path,) = cache.files()
     path.unlink()
     path.mkdir()
-    assert [compiled(row, cache, solver).source for _ in range(2)] == [Source.ACE] * 2
+    assert [compiled(row, cache, solver).source for _ in range(2)] == [CompiledFrom.ACE] * 2
     assert [found.name for found in cache.folder.iterdir()] == [path.name]
 
 

@@ -17,15 +17,16 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.model.expression import Type, parse
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Predicate, Relation, Semantics, Team
-from robochoc.run.orchestrator import Options, RefutedError, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.ace_words import Solved
-from robochoc.solver.central import CentralSolver, Judgement
-from robochoc.solver.cliques import cliques, strengthened
+from robochoc.solver.ace_messages import Solved
+from robochoc.solver.central import CentralAnswer, CentralSolver
+from robochoc.solver.cliques import cliques, with_cliques
 from robochoc.solver.encoding import Codes, Component, Network, Table
 from robochoc.solver.failures import SolverLostError
-from robochoc.solver.merged import identifiers
-from robochoc.solver.symmetry import Symmetry, broken, orbits, symmetries
+from robochoc.solver.symmetry import Symmetry, break_symmetries, orbits, symmetries
+from robochoc.solver.team_network import identifiers
+from robochoc.verification.checker import RefutedError
 from tests.support.clocks import waiting
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.problems import solutions
@@ -88,7 +89,7 @@ def test_symmetries_are_found_and_broken_without_losing_an_orbit(batch: int) -> 
         group = symmetries(part)
         assert set(wanted) <= {*group, Symmetry(tuple(range(len(names))), reflects=False)}
         every = set(brute_force(network))
-        firsts = set(brute_force(broken(network, group)))
+        firsts = set(brute_force(break_symmetries(network, group)))
         assert firsts <= every
         assert orbits(sorted(firsts), group, network) == every
         seen += len(every) > len(firsts) > 0
@@ -124,8 +125,8 @@ def test_cliques_made_explicit_keep_the_solutions() -> None:
                 tables.append(Table(scope, allowed=True, rows=tuple(rows)))
         network = Network(tuple(domain for _ in range(size)), tuple(tables))
         every = set(brute_force(network))
-        assert set(brute_force(strengthened(network, lambda _: None))) == every
-        assert set(brute_force(strengthened(network, lambda part: tuple(brute_force(part))))) == every
+        assert set(brute_force(with_cliques(network, lambda _: None))) == every
+        assert set(brute_force(with_cliques(network, lambda part: tuple(brute_force(part))))) == every
 
 
 @pytest.mark.parametrize(
@@ -194,7 +195,7 @@ def test_when_the_time_is_over_the_judge_says_unknown() -> None:
 
 
 def test_a_no_solution_that_the_judge_refutes_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(CentralSolver, "judge", lambda *_, **__: Judgement(Verdict.SOLUTION))
+    monkeypatch.setattr(CentralSolver, "judge", lambda *_, **__: CentralAnswer(Verdict.SOLUTION))
     with pytest.raises(RefutedError, match="no solution, and a judge has found one"):
         solve(queens3d(4), Options(runtime=Runtime.SIMULATOR, verify=True))
 

@@ -19,16 +19,16 @@ from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.incumbent import absent
-from robochoc.run.orchestrator import Options, RefutedError, Runtime, Withdrawal, solve
-from robochoc.run.second_opinion import contradiction
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.ace_words import Solved
-from robochoc.solver.central import CentralSolver, Judgement
+from robochoc.solver.ace_messages import Solved
+from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.failures import SolverLostError
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import RefutedError, violations
 from robochoc.verification.objective import withdrawal_cost
+from robochoc.verification.second_opinion import contradiction
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import (
     cost_of,
@@ -133,7 +133,7 @@ def test_counting_is_for_problems_without_costs() -> None:
 
 def test_an_answer_that_does_not_cost_what_the_judge_says_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     team = coloring(3, 2, 2)
-    wrong = Judgement(Verdict.OPTIMAL, dict.fromkeys(team.variables, 1), cost=1, bound=1)
+    wrong = CentralAnswer(Verdict.OPTIMAL, dict.fromkeys(team.variables, 1), cost=1, bound=1)
     monkeypatch.setattr(CentralSolver, "judge", lambda *_, **__: wrong)
     with pytest.raises(SolverLostError, match="costs 3, and it says 1"):
         solve(team, CENTRAL)
@@ -175,7 +175,7 @@ def test_as_few_as_possible_step_aside_by_weight(batch: int, solver: AceProcess)
         outcome = solve(team, FEWEST, solver=solver)
         assert sum(team[name].weight for name in outcome.withdrawn) == minimum_withdrawal(team)
         assert outcome.verdict is (Verdict.OPTIMAL if outcome.withdrawn else Verdict.SOLUTION)
-        assert not list(objections(team, outcome.assignment, outcome.withdrawn))
+        assert not list(violations(team, outcome.assignment, outcome.withdrawn))
         aside += bool(outcome.withdrawn)
     assert (10 if batch else 5) < aside < (50 if batch else 25)
 
@@ -288,8 +288,8 @@ def test_more_aside_than_need_be_is_refuted(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_what_contradicts_a_claim() -> None:
-    none, found = Judgement(Verdict.NO_SOLUTION), Judgement(Verdict.OPTIMAL, {"A": 1}, cost=3, bound=3)
-    broken_off = Judgement(Verdict.UNKNOWN, {"A": 1}, cost=7, bound=2)
+    none, found = CentralAnswer(Verdict.NO_SOLUTION), CentralAnswer(Verdict.OPTIMAL, {"A": 1}, cost=3, bound=3)
+    broken_off = CentralAnswer(Verdict.UNKNOWN, {"A": 1}, cost=7, bound=2)
     assert contradiction(none, INFINITE) is None
     assert contradiction(none, 3) == "none"
     assert contradiction(found, INFINITE) == "one"
@@ -298,7 +298,7 @@ def test_what_contradicts_a_claim() -> None:
     assert contradiction(found, 2) == "that nothing costs less than 3"
     assert contradiction(broken_off, 5) is None
     assert contradiction(broken_off, INFINITE) == "one"
-    assert contradiction(Judgement(Verdict.UNKNOWN, bound=2), INFINITE) is None
+    assert contradiction(CentralAnswer(Verdict.UNKNOWN, bound=2), INFINITE) is None
 
 
 def test_a_no_solution_of_costs_is_refuted_too(monkeypatch: pytest.MonkeyPatch) -> None:

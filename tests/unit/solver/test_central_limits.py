@@ -14,14 +14,14 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics
+from robochoc.run import Options, solve
 from robochoc.run.incumbent import absent
-from robochoc.run.orchestrator import Options, solve
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.central import CentralSolver, Judgement
+from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.encoding import Codes, Network, Table
 from robochoc.solver.failures import SolverTimeoutError
-from robochoc.solver.weighted import priced
-from robochoc.verification.checker import cost, objections
+from robochoc.solver.weighted import weighted_components
+from robochoc.verification.checker import assignment_cost, violations
 from tests.support.clocks import once, waiting
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of
@@ -48,7 +48,7 @@ def test_when_the_time_is_over_the_best_so_far_is_told(warm: AceProcess) -> None
     outcome = once(lambda outcome: bool(outcome.assignment), solved)
     assert outcome.verdict is Verdict.UNKNOWN
     assert outcome.bound is not None
-    assert outcome.cost == cost(team, outcome.assignment) > outcome.bound
+    assert outcome.cost == assignment_cost(team, outcome.assignment) > outcome.bound
     assert outcome.verified
 
 
@@ -59,7 +59,7 @@ def test_without_an_answer_until_then_there_is_a_bound() -> None:
     domains = {"A": (1, 2), "B": (1, 2), "C": (1, 2)}
     team = with_costs(team_of(domains, [differ, Constraint("U", unary, ("C",), ("C",))]))
     judgement = CentralSolver(deadline=time.monotonic()).judge(team)
-    assert judgement == Judgement(Verdict.UNKNOWN, bound=4)
+    assert judgement == CentralAnswer(Verdict.UNKNOWN, bound=4)
 
 
 def test_what_was_found_for_another_task_is_not_told(warm: AceProcess) -> None:
@@ -75,7 +75,7 @@ def test_what_was_found_for_another_task_is_not_told(warm: AceProcess) -> None:
 
 def test_a_task_that_is_given_up_has_a_best_once_ace_has_one(warm: AceProcess) -> None:
     team = HARD
-    (part,) = priced(team.variables.values(), list(team.constraints()))
+    (part,) = weighted_components(team.variables.values(), list(team.constraints()))
 
     def best_of(limit: float) -> Codes | None:
         warm.begin(part.network, costs=part.costs)
@@ -85,7 +85,7 @@ def test_a_task_that_is_given_up_has_a_best_once_ace_has_one(warm: AceProcess) -
 
     best = once(lambda best: best is not None, best_of)
     assert best is not None
-    assert part.cost(best) == cost(team, part.decoded(best))
+    assert part.cost(best) == assignment_cost(team, part.decoded(best))
 
 
 def test_when_the_time_is_over_those_who_stay_so_far_are_told(warm: AceProcess) -> None:
@@ -97,4 +97,4 @@ def test_when_the_time_is_over_those_who_stay_so_far_are_told(warm: AceProcess) 
     away = absent(team, judgement.assignment)
     assert judgement.verdict is Verdict.UNKNOWN
     assert judgement.cost == len(away) == 36 - len(judgement.assignment)
-    assert not list(objections(team, judgement.assignment, away))
+    assert not list(violations(team, judgement.assignment, away))

@@ -15,18 +15,18 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats import PREDEFINED
 from robochoc.journal.events import Began, Decided, Improved, Lost
 from robochoc.journal.journal import Header, Recorder, read_journal
-from robochoc.model.change import still_showing, without
-from robochoc.model.orders import favourable, reordered
-from robochoc.model.problem import AddConstraint, Child, Constraint, Event, Parent, Robot, Team
+from robochoc.model.change import keep_interfaces, without_robots
+from robochoc.model.orders import with_dom_deg_order, with_priorities
+from robochoc.model.problem import AddConstraint, Child, Constraint, Parent, Robot, ScenarioEvent, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.traits import Traits
-from robochoc.replay.rebuild import Cast, Means
-from robochoc.replay.steps import Run
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.replay.rebuild import Rebuilder, ReplayOptions
+from robochoc.replay.steps import RecordedRun
+from robochoc.run import Options, Runtime, solve
 from robochoc.run.scenario import ScenarioRun
-from robochoc.solver.agent_problem import NO_BRIEF, agent_problems
-from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, as_compiled
-from robochoc.solver.domain import CompiledDomain, compiled_domain
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, agent_problems
+from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, ensure_compiled
+from robochoc.solver.domain import CompiledDomain, compile_domain
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.objective import Objective
 from tests.support.cost_problems import with_costs
@@ -48,7 +48,7 @@ def lined_up(compiled: CompiledTeam) -> bool:
 
 def test_the_turned_team_has_domains_of_its_own() -> None:
     team = turned_interface()
-    turned = reordered(team, ("C", "A", "B"))
+    turned = with_priorities(team, ("C", "A", "B"))
     assert (team["A"].interface, turned["A"].interface) == (("x", "y"), ("y",))
     assert len(CompiledTeam(team)["A"].values) == 6
     assert CompiledTeam(turned)["A"].values == ((7,), (8,))
@@ -62,16 +62,16 @@ def test_every_form_of_a_team_lines_up_with_its_domains() -> None:
         for order in every_order(team, chance):
             journey = ScenarioRun(team, order if isinstance(order, tuple) else None, CompiledTeam, lambda: None)
             assert lined_up(journey.compiled())
-            assert journey.compiled().team == journey.arranged()
-        assert lined_up(CompiledTeam(favourable(team)))
-        left = without(team, chance.sample(team.order, len(team.order) - 1))
+            assert journey.compiled().team == journey.ordered_team()
+        assert lined_up(CompiledTeam(with_dom_deg_order(team)))
+        left = without_robots(team, chance.sample(team.order, len(team.order) - 1))
         assert lined_up(CompiledTeam(left))
-        assert lined_up(CompiledTeam(still_showing(left, team)))
+        assert lined_up(CompiledTeam(keep_interfaces(left, team)))
 
 
 def test_a_robot_cannot_get_another_ones_domain() -> None:
     own = CompiledRobot(turned_interface()["A"])
-    other = reordered(turned_interface(), ("C", "A", "B"))["A"]
+    other = with_priorities(turned_interface(), ("C", "A", "B"))["A"]
     with pytest.raises(TypeError):
         replace(own, robot=other)
     with pytest.raises(AttributeError):
@@ -91,7 +91,7 @@ def test_a_robot_with_other_links_is_compiled_again_only_if_it_shows_something_e
 
     def noted(robot: Robot) -> CompiledDomain:
         compiled.append(robot.name)
-        return compiled_domain(robot)
+        return compile_domain(robot)
 
     own = CompiledRobot(turned_interface()["A"], noted)
     same = replace(own.robot, children=(Child("B", ("y", "x")),))
@@ -106,11 +106,11 @@ def test_only_those_who_are_asked_for_are_compiled() -> None:
     some = CompiledTeam(turned_interface(), only={"B"})
     assert list(some.robots) == ["B"]
     assert list(agent_problems(some)) == ["B"]
-    assert as_compiled(some) is some
+    assert ensure_compiled(some) is some
 
 
 def test_a_session_says_what_its_robots_work_on() -> None:
-    turned = CompiledTeam(reordered(turned_interface(), ("C", "A", "B")))
+    turned = CompiledTeam(with_priorities(turned_interface(), ("C", "A", "B")))
     assert Simulation(turned, ABT, SCHEDULE).compiled is turned
 
 
@@ -156,7 +156,7 @@ def all_shown(team: Team) -> Members:
 def test_who_shows_more_than_its_file_says_means_what_others_read() -> None:
     """The master lists what was asked for last, wherever it stands in the file."""
     team = untold_interface()
-    task = all_shown(team).tasks(1, "abt", Traits(), NO_BRIEF)["A"]
+    task = all_shown(team).tasks(1, "abt", Traits(), DEFAULT_PARAMETERS)["A"]
     own = CompiledRobot(team["A"]).relinked(among(team["A"], task.interfaces))
     assert own.robot.interface == task.interfaces["A"] == ("y", "x")
     assert own.domain.values[0] == (7, 1)
@@ -174,8 +174,8 @@ def test_who_is_left_shows_what_it_showed_and_keeps_its_place() -> None:
         before = members.order
         members.remove(gone)
         assert members.order == tuple(name for name in before if name not in gone)
-        left = still_showing(without(team, gone), team)
-        for name, task in members.tasks(2, "abt", Traits(), NO_BRIEF).items():
+        left = keep_interfaces(without_robots(team, gone), team)
+        for name, task in members.tasks(2, "abt", Traits(), DEFAULT_PARAMETERS).items():
             assert task.interfaces == {robot.name: robot.interface for robot in left.robots}
             assert among(team[name], task.interfaces).interface == left[name].interface
 
@@ -197,12 +197,12 @@ def test_who_plays_machines_again_knows_what_they_showed_and_what_it_cost_to_ste
     pairs = [("A", "B"), ("B", "C")]
     constraints = [Constraint("C", _UNLIKE, pair, pair, cost=5) for pair in pairs]
     team = with_costs(team_of(dict.fromkeys("ABC", (1, 2)), constraints))
-    cast = Cast(Header(team="t", protocol="abt", runtime="network", seed=0), Means(team=team))
+    cast = Rebuilder(Header(team="t", protocol="abt", runtime="network", seed=0), ReplayOptions(team=team))
     decided = Decided(t=0, robot="RA", assignment={}, clock=0)
-    cast.enter(Run(0, Began(t=0, protocol="DPOP"), None, [decided, Lost(t=1, robot="RB", why="gone")]))
-    part = cast.enter(Run(1, Began(t=0, protocol="DPOP"), None, [decided])).parts["RC"]
+    cast.enter(RecordedRun(0, Began(t=0, protocol="DPOP"), None, [decided, Lost(t=1, robot="RB", why="gone")]))
+    part = cast.enter(RecordedRun(1, Began(t=0, protocol="DPOP"), None, [decided])).parts["RC"]
     assert part.interfaces == {"RA": ("A",), "RC": ("C",)}
-    assert part.brief.aside == 1 + 5
+    assert part.parameters.withdrawal_cost == 1 + 5
 
 
 # Changes
@@ -216,4 +216,6 @@ def test_costs_that_come_later_must_fit_as_well() -> None:
         for number in range(5)
     ]
     with pytest.raises(UnsupportedError, match="scale them down"):
-        solve(replace(team, scenario=(Event(tuple(dear)),)), Options(protocol="dpop", runtime=Runtime.SIMULATOR))
+        solve(
+            replace(team, scenario=(ScenarioEvent(tuple(dear)),)), Options(protocol="dpop", runtime=Runtime.SIMULATOR)
+        )

@@ -15,18 +15,25 @@ import pytest
 from robochoc.formats import PREDEFINED, write_team
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Team
-from robochoc.run.orchestrator import Options, Runtime, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.solver import ace as front
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.central import CentralSolver
-from robochoc.solver.compile import Compiler, Limits, Source
+from robochoc.solver.compile import CompiledFrom, Compiler, Limits
 from robochoc.solver.domain import TooManySolutionsError
 from robochoc.solver.encoding import Codes, Network, Table
-from robochoc.solver.enumeration import STEPS_BEFORE_ACE, STEPS_EACH, Budget, OutOfStepsError, cheapest, enumerated
-from robochoc.solver.propagation import propagated
-from robochoc.solver.question import Means
-from robochoc.solver.weighted import Priced, priced
+from robochoc.solver.enumeration import (
+    STEPS_BEFORE_ACE,
+    STEPS_EACH,
+    Budget,
+    OutOfStepsError,
+    enumerate_solutions,
+    minimum_solution,
+)
+from robochoc.solver.propagation import propagate
+from robochoc.solver.query import SolvedBy
+from robochoc.solver.weighted import WeightedComponent, weighted_components
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.meetings import meetings
@@ -75,15 +82,15 @@ def test_what_is_enumerated_is_what_brute_force_finds() -> None:
     chance = Random("enumerated")
     several = 0
     for _ in range(600):
-        network = propagated(random_network(chance))
+        network = propagate(random_network(chance))
         every = brute_force(network)
         if network.impossible:
             continue
-        found = enumerated(network, Budget(ENOUGH), limit=None, count_only=False)
+        found = enumerate_solutions(network, Budget(ENOUGH), limit=None, count_only=False)
         assert found == (len(every), True, every), network
-        assert enumerated(network, Budget(ENOUGH), limit=None, count_only=True) == (len(every), True, [])
+        assert enumerate_solutions(network, Budget(ENOUGH), limit=None, count_only=True) == (len(every), True, [])
         limit = chance.randint(2, 8)
-        cut = enumerated(network, Budget(ENOUGH), limit=limit, count_only=False)
+        cut = enumerate_solutions(network, Budget(ENOUGH), limit=limit, count_only=False)
         assert (cut.number, cut.complete) == (min(limit, len(every)), len(every) <= limit), network
         assert len(set(cut.solutions)) == cut.number
         assert set(cut.solutions) <= set(every)
@@ -91,10 +98,10 @@ def test_what_is_enumerated_is_what_brute_force_finds() -> None:
     assert several > 150
 
 
-def parts_of(chance: Random) -> list[Priced]:
+def parts_of(chance: Random) -> list[WeightedComponent]:
     """The parts of a random team with costs that brute force can try."""
     team = random_cost_team(chance) if chance.random() < 0.7 else random_complex_cost_team(chance)
-    return priced(team.variables.values(), list(team.constraints()))
+    return weighted_components(team.variables.values(), list(team.constraints()))
 
 
 def combinations(network: Network) -> int:
@@ -109,10 +116,10 @@ def test_the_cheapest_is_brute_forces() -> None:
     seen = 0
     while seen < 150:
         for part in parts_of(chance):
-            network = propagated(part.network)
+            network = propagate(part.network)
             if network.impossible or not part.costs or combinations(network) > 5_000:
                 continue
-            best = cheapest(network, Budget(ENOUGH), part.costs)
+            best = minimum_solution(network, Budget(ENOUGH), part.costs)
             expected = least(network, part.costs)
             assert (best and sum(best[place] for place in part.costs)) == expected, (network, part.costs)
             assert best is None or best in brute_force(network)
@@ -122,11 +129,11 @@ def test_the_cheapest_is_brute_forces() -> None:
 def test_any_variables_may_be_costs() -> None:
     chance = Random("any costs")
     for _ in range(300):
-        network = propagated(random_network(chance))
+        network = propagate(random_network(chance))
         if network.impossible:
             continue
         costs = tuple(chance.sample(range(len(network.domains)), chance.randint(1, len(network.domains))))
-        best = cheapest(network, Budget(ENOUGH), costs)
+        best = minimum_solution(network, Budget(ENOUGH), costs)
         assert (best and sum(best[place] for place in costs)) == least(network, costs), network
 
 
@@ -143,7 +150,7 @@ def test_ace_has_the_same_solutions_in_the_same_order(batch: int, ace: AceProces
             network = random_network(chance)
             ours, theirs = here.solve(network, strategy="static"), ace.solve(network, strategy="static")
             assert replace(ours, means=theirs.means) == theirs, network
-            asked += theirs.means is Means.ACE
+            asked += theirs.means is SolvedBy.ACE
         assert here.pid is None
     assert asked > 15
 
@@ -158,9 +165,9 @@ def test_robots_are_compiled_alike(batch: int, ace: AceProcess) -> None:
             for robot in team.robots:
                 ours, theirs = here.compile(robot), by_ace.compile(robot)
                 assert ours.domain == theirs.domain, robot
-                assert (ours.source is Source.ENUMERATED) is (theirs.source is Source.ACE), robot
+                assert (ours.source is CompiledFrom.ENUMERATED) is (theirs.source is CompiledFrom.ACE), robot
                 seen.add(theirs.source)
-    assert seen >= {Source.ACE, Source.DIRECT}
+    assert seen >= {CompiledFrom.ACE, CompiledFrom.DIRECT}
 
 
 @pytest.mark.parametrize("batch", BATCHES)
@@ -174,7 +181,7 @@ def test_ace_has_nothing_cheaper(batch: int, ace: AceProcess) -> None:
                 ace.begin(part.network, costs=part.costs)
                 ours, theirs = here.answer(), ace.answer()
                 assert [part.cost(one) for one in ours.solutions] == [part.cost(one) for one in theirs.solutions]
-                asked += theirs.means is Means.ACE
+                asked += theirs.means is SolvedBy.ACE
     assert asked > 5
 
 
@@ -182,17 +189,17 @@ def test_ace_has_nothing_cheaper(batch: int, ace: AceProcess) -> None:
 
 
 def test_the_same_steps_are_taken_every_time() -> None:
-    network = propagated(queens_network(7))
+    network = propagate(queens_network(7))
     used = []
     for _ in range(3):
         budget = Budget(ENOUGH)
-        assert enumerated(network, budget, limit=None, count_only=True).number == 40
+        assert enumerate_solutions(network, budget, limit=None, count_only=True).number == 40
         used.append(budget.used)
     assert len(set(used)) == 1
-    assert enumerated(network, Budget(used[0]), limit=None, count_only=True).number == 40
+    assert enumerate_solutions(network, Budget(used[0]), limit=None, count_only=True).number == 40
     short = Budget(used[0] - 1)
     with pytest.raises(OutOfStepsError):
-        enumerated(network, short, limit=None, count_only=True)
+        enumerate_solutions(network, short, limit=None, count_only=True)
     assert short.used == short.steps
 
 
@@ -200,20 +207,20 @@ def test_a_task_that_takes_too_many_steps_goes_to_ace(monkeypatch: pytest.Monkey
     monkeypatch.setattr(front, "STEPS_BEFORE_ACE", 0)
     monkeypatch.setattr(front, "STEPS_EACH", 20_000)
     with AceProcess() as solver:
-        assert solver.solve(queens_network(6)).means is Means.ENUMERATION
+        assert solver.solve(queens_network(6)).means is SolvedBy.ENUMERATION
         handed_over = solver.solve(queens_network(8), strategy="static")
-        assert (handed_over.means, handed_over.found) == (Means.ACE, 92)
+        assert (handed_over.means, handed_over.found) == (SolvedBy.ACE, 92)
         assert solver.pid is not None
-        assert solver.solve(queens_network(6)).means is Means.ENUMERATION
+        assert solver.solve(queens_network(6)).means is SolvedBy.ENUMERATION
     with AceProcess(always=True) as always:
-        assert always.solve(queens_network(6)).means is Means.ACE
+        assert always.solve(queens_network(6)).means is SolvedBy.ACE
 
 
 @pytest.mark.usefixtures("no_process")
 def test_what_all_tasks_may_take_together_is_used_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Many tasks that are each not quite small would take longer than to start ACE."""
     budget = Budget(ENOUGH)
-    enumerated(propagated(queens_network(7)), budget, limit=None, count_only=True)
+    enumerate_solutions(propagate(queens_network(7)), budget, limit=None, count_only=True)
     monkeypatch.setattr(front, "STEPS_EACH", budget.used // 2)
     monkeypatch.setattr(front, "STEPS_BEFORE_ACE", 2 * budget.used)
     with AceProcess() as solver:
@@ -234,7 +241,7 @@ def test_wide_domains_take_steps_before_they_take_memory(width: int) -> None:
     tracemalloc.start()
     try:
         with pytest.raises(OutOfStepsError):
-            enumerated(network, Budget(STEPS_EACH + STEPS_BEFORE_ACE), limit=2, count_only=False)
+            enumerate_solutions(network, Budget(STEPS_EACH + STEPS_BEFORE_ACE), limit=2, count_only=False)
         assert tracemalloc.get_traced_memory()[1] < 1 << 20
     finally:
         tracemalloc.stop()
@@ -251,7 +258,7 @@ def test_two_variables_of_five_values_take_no_time_limit_and_no_cache(tmp_path: 
     for _ in range(2):
         with Compiler(Limits(time_s=1e-9), cache) as compiler:
             compilation = compiler.compile(team.robots[0])
-        assert (compilation.source, compilation.domain.total) == (Source.ENUMERATED, 10)
+        assert (compilation.source, compilation.domain.total) == (CompiledFrom.ENUMERATED, 10)
     assert not list(cache.files())
 
 

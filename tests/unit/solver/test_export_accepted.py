@@ -10,7 +10,7 @@ import pytest
 
 from robochoc.formats import PREDEFINED, write_team
 from robochoc.formats.xcsp3 import xcsp3
-from robochoc.model.problem import INFINITE, Constraint, Kind, Relation, Semantics, Team
+from robochoc.model.problem import INFINITE, Constraint, ProblemKind, Relation, Semantics, Team
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.complex_problems import complex_team, random_complex_team
@@ -49,7 +49,7 @@ def check(teams: list[Team], folder: Path) -> None:
     said = ace_said(files)
     assert len(said) == len(teams), f"ACE gives up on {teams[len(said)]}: {files[len(said)].read_text()}"
     for team, answer in zip(teams, said, strict=True):
-        if team.kind is Kind.DISWCSP:
+        if team.kind is ProblemKind.DISWCSP:
             least = least_cost(team)
             bound = re.search(r"^d BOUND +(\d+)", answer, re.MULTILINE)
             assert (float(bound[1]) if bound else INFINITE) == least, (team, answer)

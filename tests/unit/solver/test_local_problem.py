@@ -68,7 +68,7 @@ def test_conflicts_are_those_of_the_files(batch: int) -> None:
                 assert value is not None
                 broken = sum(own in c.variables and not c.allows({**given, own: value}) for c in shared)
                 told = problem.conflicts(index, _view(team, given))
-                assert len(told) == broken == problem.violated(index, _view(team, given))
+                assert len(told) == broken == problem.violation_count(index, _view(team, given))
                 seen[min(broken, 2)] += 1
     assert min(seen[0], seen[1], seen[2]) > 50
 
@@ -82,11 +82,11 @@ def test_burdens_are_broken_constraints_and_what_the_others_charge() -> None:
         Constraint("P", prices, ("C",), ("C",)),
     ]
     problem = LocalProblem(agent_problems(team_of(dict.fromkeys("ABC", (1, 2)), constraints))["RC"])
-    assert problem.burdens({}) == [(0, 7), (0, 0)]
+    assert problem.lexicographic_costs({}) == [(0, 7), (0, 0)]
     assert problem.checks == 0
-    assert problem.burdens({"RA": (1,), "RB": (1,)}) == [(0, 10), (1, 0)]
+    assert problem.lexicographic_costs({"RA": (1,), "RB": (1,)}) == [(0, 10), (1, 0)]
     assert problem.checks == 4
-    assert problem.burdens({"RA": (2,), "RB": (2,)}) == [(1, 12), (0, 0)]
+    assert problem.lexicographic_costs({"RA": (2,), "RB": (2,)}) == [(1, 12), (0, 0)]
 
 
 @pytest.mark.parametrize("batch", range(2))
@@ -102,10 +102,10 @@ def test_burdens_are_costs_where_nothing_is_broken(batch: int) -> None:
             view = {name: value for name, value in _view(team, given).items() if chance.random() < 0.8}
             costs = problem.costs(view)
             checks = problem.checks
-            burdens = problem.burdens(view)
+            burdens = problem.lexicographic_costs(view)
             assert problem.checks == 2 * checks
             for index, (broken, cost) in enumerate(burdens):
-                assert broken == problem.violated(index, view)
+                assert broken == problem.violation_count(index, view)
                 assert (costs[index] == cost) if broken == 0 else (costs[index] == INFINITE > cost)
                 seen[broken > 0] += 1
     assert min(seen[True], seen[False]) > 50
@@ -160,7 +160,7 @@ def test_the_least_is_what_the_cheapest_values_of_the_others_cost(batch: int, mo
         for name, part in agent_problems(team, shared_scopes=True).items():
             problem = LocalProblem(part)
             (own,) = (variable.name for variable in team[name].variables)
-            least = problem.least(robots - {name})
+            least = problem.lower_bounds(robots - {name})
             for index, shown in enumerate(problem.values):
                 if not shown:
                     continue
@@ -178,15 +178,17 @@ def test_the_least_is_what_the_cheapest_values_of_the_others_cost(batch: int, mo
                 assert least[index] == expected
                 seen[expected > 0] += 1
             monkeypatch.setattr(compiled, "WIDE", 0)
-            assert problem.least(robots) == [0] * len(problem.values)
+            assert problem.lower_bounds(robots) == [0] * len(problem.values)
             monkeypatch.undo()
     assert min(seen.values()) > 50, seen
 
 
 def test_nothing_is_sure_to_be_charged_where_robots_may_step_aside() -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [Constraint("C", ONE, ("A", "B"), ("A", "B"))])
-    assert LocalProblem(agent_problems(team, shared_scopes=True)["RA"]).least({"RB"}) == [0, INFINITE]
-    assert LocalProblem(agent_problems(team, brief=RunParameters(aside=1), shared_scopes=True)["RA"]).least({"RB"}) == [
+    assert LocalProblem(agent_problems(team, shared_scopes=True)["RA"]).lower_bounds({"RB"}) == [0, INFINITE]
+    assert LocalProblem(
+        agent_problems(team, parameters=RunParameters(withdrawal_cost=1), shared_scopes=True)["RA"]
+    ).lower_bounds({"RB"}) == [
         0,
         0,
         0,
@@ -202,8 +204,8 @@ def _compare(part: AgentProblem, chance: Random) -> None:
             if chance.random() < 0.8
         }
         told = problem.conflicts(index, view)
-        assert problem.explained(index, view) == next(iter(told), None)
-        assert problem.violated(index, view) == len(told)
+        assert problem.conflict_with_key(index, view) == next(iter(told), None)
+        assert problem.violation_count(index, view) == len(told)
 
 
 def _view(team: Team, given: dict[str, int]) -> dict[str, Value]:

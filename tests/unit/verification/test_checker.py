@@ -15,8 +15,14 @@ from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.orchestrator import Options, RefutedError, Runtime, solve
-from robochoc.verification.checker import cost, could_join, objections, price
+from robochoc.run import Options, Runtime, solve
+from robochoc.verification.checker import (
+    RefutedError,
+    assignment_cost,
+    constraint_cost,
+    needlessly_withdrawn,
+    violations,
+)
 from tests.support.problems import ON_ONE_MACHINE, team_of, teams
 
 
@@ -32,12 +38,12 @@ def some_assignments(team: Team) -> Iterator[dict[str, int]]:
 def test_it_agrees_with_the_model_of_the_problem(team: Team) -> None:
     for assignment in some_assignments(team):
         truth = all(constraint.allows(assignment) for constraint in team.constraints())
-        assert (not list(objections(team, assignment))) is truth
+        assert (not list(violations(team, assignment))) is truth
 
 
 def test_every_kind_of_fault_is_told() -> None:
     team = queens3d(2)
-    assert list(objections(team, {"V1.1": 1, "V1.2": 1, "V2.1": 3, "V9.9": 1}))[:4] == [
+    assert list(violations(team, {"V1.1": 1, "V1.2": 1, "V2.1": 3, "V9.9": 1}))[:4] == [
         "V2.1 = 3 is not in its domain",
         "V2.2 has no value",
         "V9.9 is no variable of a robot that flies",
@@ -48,15 +54,15 @@ def test_every_kind_of_fault_is_told() -> None:
 def test_a_robot_that_stepped_aside_must_not_be_placed_and_need_not_be() -> None:
     team = queens3d(2)
     rest = ("Robot1.2", "Robot2.1", "Robot2.2")
-    assert not list(objections(team, {"V1.1": 1}, rest))
-    assert next(objections(team, {"V1.1": 1, "V1.2": 2}, rest)) == "V1.2 is no variable of a robot that flies"
+    assert not list(violations(team, {"V1.1": 1}, rest))
+    assert next(violations(team, {"V1.1": 1, "V1.2": 2}, rest)) == "V1.2 is no variable of a robot that flies"
 
 
 def test_whoever_could_join_is_named() -> None:
     domains = {"A": (1, 2), "B": (1, 2)}
     differ = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2)))
     team = team_of(domains, [Constraint("C", differ, ("A", "B"), ("A", "B"))])
-    assert list(could_join(team, {"A": 1}, ("RB",))) == ["RB"]
+    assert list(needlessly_withdrawn(team, {"A": 1}, ("RB",))) == ["RB"]
 
 
 @pytest.mark.parametrize(
@@ -75,15 +81,15 @@ def test_prices_in_extension(semantics: Semantics, row: tuple[int, int], expecte
     relation = Relation("R", 2, semantics, ((1, 2),), (5,) if soft else (), 1 if soft else 0)
     constraint = Constraint("C", relation, ("A", "B"), ("A", "B"))
     assignment = dict(zip("AB", row, strict=True))
-    assert price(constraint, assignment) == expected == constraint.price(assignment)
+    assert constraint_cost(constraint, assignment) == expected == constraint.price(assignment)
 
 
 def test_an_undefined_predicate_is_a_broken_one() -> None:
     predicate = Predicate("p", ("X", "Y"), parse("eq(div(X, Y), 0)", ("X", "Y"), Type.BOOLEAN))
     constraint = Constraint("C", predicate, ("A", "B"), ("A", "B"), cost=7)
-    assert price(constraint, {"A": 1, "B": 0}) == 7
+    assert constraint_cost(constraint, {"A": 1, "B": 0}) == 7
     team = team_of({"A": (1,), "B": (0,)}, [constraint])
-    assert cost(team, {"A": 1, "B": 0}) == 7
+    assert assignment_cost(team, {"A": 1, "B": 0}) == 7
 
 
 class Liar(Protocol):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robochoc.flight.mission import mission_of
-from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from tests.support.flights import scene_of
 
 
@@ -20,11 +20,11 @@ def test_what_is_flown_in_cells_is_said_not_to_be_to_scale(values: dict[str, int
     assert scene.playback
     assert scene.playback.duration_s < 10
     assert facts["flown"].endswith(" s, not to scale")
-    assert "nearest" not in facts
+    assert "separation" not in facts
 
 
 def test_more_epochs_than_are_flown_for_a_picture() -> None:
-    many = tuple(Epoch(Verdict.SOLUTION, (), assignment={"V1.1": number % 3 + 1}) for number in range(100))
+    many = tuple(EpochOutcome(Verdict.SOLUTION, (), assignment={"V1.1": number % 3 + 1}) for number in range(100))
     scene = scene_of(Outcome("many", "dynabt", "simulator", 0, Verdict.SOLUTION, {"V1.1": 1}, epochs=many))
     assert scene.playback is None
     assert dict(scene.facts)["flight"].startswith("none: 1 drone in 100 epochs")

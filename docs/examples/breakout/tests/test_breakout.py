@@ -17,7 +17,7 @@ from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from robochoc.verification.checker import objections
+from robochoc.verification.checker import violations
 
 
 def agents(team: Team) -> dict[str, Breakout]:
@@ -162,7 +162,7 @@ def test_random_graphs_are_coloured(seed: int) -> None:
     team = soluble(10, 20, Random(seed))
     result = Simulation(team, Breakout, _schedule(seed)).search(messages=50_000)
     assert result.verdict is Verdict.SOLUTION
-    assert not list(objections(team, {name: v for own in result.assignments.values() for name, v in own.items()}))
+    assert not list(violations(team, {name: v for own in result.assignments.values() for name, v in own.items()}))
 
 
 def test_delays_change_nothing() -> None:

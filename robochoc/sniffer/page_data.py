@@ -17,16 +17,16 @@ from typing import Any, assert_never
 import msgspec
 
 from robochoc.formats.result import result_json
-from robochoc.model.outcome import Epoch, Outcome, Verdict
-from robochoc.model.priorities import natural
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.priorities import natural_key
 from robochoc.sniffer.acl import text
+from robochoc.sniffer.acl_messages import AclMessages
 from robochoc.sniffer.columns import packed
-from robochoc.sniffer.names import Names
 from robochoc.sniffer.recorded_messages import RunProtocols
-from robochoc.sniffer.rows import Note, Run
 from robochoc.sniffer.sentences import sentence
-from robochoc.sniffer.speech import Speech
+from robochoc.sniffer.team_names import TeamNames
 from robochoc.sniffer.trace import Trace
+from robochoc.sniffer.trace_tables import Note, RunRecord
 
 FORMAT = 1
 MOST_ROWS = 1 << 16
@@ -49,14 +49,14 @@ class BadRequestError(ValueError):
     """There is no such answer."""
 
 
-def columns_of(trace: Trace, first: int, end: int) -> bytes:
+def message_columns(trace: Trace, first: int, end: int) -> bytes:
     """The messages from `first` to before `end`."""
     of = trace.messages
     columns = (of.t, of.clock, of.step, of.bytes, of.sender, of.receiver, of.kind, of.run)
     return packed(column[first:end] for column in columns)
 
 
-def steps_of(trace: Trace, first: int, end: int) -> bytes:
+def step_columns(trace: Trace, first: int, end: int) -> bytes:
     """The steps from `first` to before `end`, and what they took in."""
     of = trace.steps
     packets = trace.packets[_end_before(of.packet_end, first) : _end_before(of.packet_end, end)]
@@ -68,7 +68,7 @@ def _end_before(ends: Sequence[int], step: int) -> int:
     return ends[step - 1] if step else 0
 
 
-class Feed:
+class PageData:
     """The answers about one trace. `live`: more may come.
 
     `chosen` are names, or patterns of names (`patterns.py`), of the robots to begin with; none: all.
@@ -79,8 +79,8 @@ class Feed:
         self._live = live
         self._chosen = list(chosen)
         self.protocols = RunProtocols(trace)
-        self.names = Names(trace, self.protocols)
-        self.speech = Speech(trace, self.protocols)
+        self.names = TeamNames(trace, self.protocols)
+        self.acl_messages = AclMessages(trace, self.protocols)
 
     def about(self) -> bytes:
         """What was run, who took part, and how far it is."""
@@ -138,12 +138,12 @@ class Feed:
     def columns(self, first: int, end: int) -> bytes:
         """Messages. Raises `BadRequestError`, as the others do."""
         _check(first, end, len(self.trace.messages.t))
-        return columns_of(self.trace, first, end)
+        return message_columns(self.trace, first, end)
 
     def steps(self, first: int, end: int) -> bytes:
         """Steps, and what they took in."""
         _check(first, end, len(self.trace.steps.t))
-        return steps_of(self.trace, first, end)
+        return step_columns(self.trace, first, end)
 
     def decisions(self, first: int, end: int) -> bytes:
         """Who decided what."""
@@ -160,12 +160,12 @@ class Feed:
 
     def detail(self, message: int) -> dict[str, Any]:
         """What one message holds: its fields, in words, and as FIPA ACL."""
-        acl = self.speech.acl_of(message)
+        acl = self.acl_messages.acl_of(message)
         return {
-            "content": self.speech.plain(message),
+            "content": self.acl_messages.plain(message),
             "words": self.words(message),
             "acl": text(acl),
-            "fields": self.speech.fields(acl),
+            "fields": self.acl_messages.fields(acl),
         }
 
     def words(self, message: int) -> str:
@@ -188,7 +188,7 @@ def _check(first: int, end: int, count: int) -> None:
         raise BadRequestError(f"{end - first} rows are too many at once: at most {MOST_ROWS}")
 
 
-def _run(run: Run) -> dict[str, Any]:
+def _run(run: RunRecord) -> dict[str, Any]:
     return {
         "number": run.number,
         "protocol": run.protocol,
@@ -253,7 +253,7 @@ def _by(outcome: Outcome) -> str:
     return f", as {outcome.ruled_out if outcome.verdict is Verdict.NO_SOLUTION else f'{outcome.witness} has concluded'}"
 
 
-def _epochs(epochs: Sequence[Epoch]) -> str:
+def _epochs(epochs: Sequence[EpochOutcome]) -> str:
     """How many there were, and how each of the first ones ended."""
     ends = [f"{_cut(epoch.lost, 3)} lost" if epoch.lost else _said(epoch.verdict) for epoch in epochs[:MOST_EPOCHS]]
     more = len(epochs) - len(ends)
@@ -261,6 +261,6 @@ def _epochs(epochs: Sequence[Epoch]) -> str:
 
 
 def _cut(names: Sequence[str], most: int = 8) -> str:
-    shown = sorted(names, key=natural)
+    shown = sorted(names, key=natural_key)
     more = f" and {len(shown) - most} more" if len(shown) > most else ""
     return ", ".join(shown[:most]) + more

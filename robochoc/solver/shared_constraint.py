@@ -8,12 +8,12 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 
 from robochoc.model.message import Value
 from robochoc.model.problem import Constraint
-from robochoc.solver.encoding import holds_on, max_cost, price_on
+from robochoc.solver.encoding import allows_function, cost_function, max_cost
 
 Conflict = Mapping[str, Value]
 """Assignments of other robots that rule out an own value: the left side of a nogood."""
 
-Others = tuple[int, ...]
+OtherValues = tuple[int, ...]
 """What a constraint sees of the others: their variables' values, in the order in which it looks at them."""
 
 
@@ -76,19 +76,19 @@ class SharedConstraint:
         ]
         self._names = [known[agent][place] for agent, place in self._seen]
         self._widths = {agent: len(known[agent]) for agent in self.agents}
-        self._masks: dict[Others, int] = {}
-        self._prices: dict[Others, list[float]] = {}
-        self._conflicts: dict[Others, Conflict] = {}
+        self._masks: dict[OtherValues, int] = {}
+        self._costs: dict[OtherValues, list[float]] = {}
+        self._conflicts: dict[OtherValues, Conflict] = {}
 
     def compile(self, own: OwnValues) -> None:
         """Get ready for the own compiled domain."""
         self._own = own
         self._places, names = own.seen(self._scope)
-        self._test = holds_on(self._constraint, [*self._names, *names])
-        self._price = price_on(self._constraint, [*self._names, *names])
+        self._test = allows_function(self._constraint, [*self._names, *names])
+        self._price = cost_function(self._constraint, [*self._names, *names])
         self.codes, self._distinct = own.codes(self._places)
 
-    def others(self, view: Mapping[str, Value]) -> Others | None:
+    def other_values(self, view: Mapping[str, Value]) -> OtherValues | None:
         """What the constraint sees in `view`; None as long as a part of it is unknown, or has stepped aside."""
         try:
             seen = [view[agent][place] for agent, place in self._seen]
@@ -96,7 +96,7 @@ class SharedConstraint:
             return None
         return None if None in seen else tuple(seen)  # type: ignore[arg-type]
 
-    def holds(self, others: Others) -> list[bool]:
+    def holds(self, others: OtherValues) -> list[bool]:
         """For each code of own values, whether it goes with `others`."""
         return [self._holds((*others, *own)) for own in self._distinct]
 
@@ -105,19 +105,19 @@ class SharedConstraint:
         return None in values or self._test(values)  # type: ignore[arg-type]
 
     @property
-    def dearest(self) -> float:
+    def max_cost(self) -> float:
         """The most that it charges short of being broken."""
         return max_cost(self._constraint)
 
-    def prices(self, others: Others) -> list[float]:
+    def costs(self, others: OtherValues) -> list[float]:
         """What each own value pays when the others are as `others` says."""
-        prices = self._prices.get(others)
+        prices = self._costs.get(others)
         if prices is None:
             paid = [0 if None in own else self._price((*others, *own)) for own in self._distinct]  # type: ignore[arg-type]
-            prices = self._prices[others] = [paid[code] for code in self.codes]
+            prices = self._costs[others] = [paid[code] for code in self.codes]
         return prices
 
-    def least(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[float]]:
+    def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[float]]:
         """How many checks it takes, and what each own value pays at the least; the others' variables are in `domains`.
 
         With more than `wide` combinations nobody looks, and it is 0.
@@ -128,14 +128,14 @@ class SharedConstraint:
             return 0, least
         checks = 0
         for number, others in enumerate(itertools.product(*columns)):
-            prices = self.prices(others)
+            prices = self.costs(others)
             least = list(map(min, least, prices)) if number else prices
             checks += len(prices)
             if not any(least):
                 break
         return checks, least
 
-    def mask(self, others: Others) -> int:
+    def mask(self, others: OtherValues) -> int:
         """The own values that go with `others`: bit i for the i-th."""
         mask = self._masks.get(others)
         if mask is None:
@@ -161,7 +161,7 @@ class SharedConstraint:
         values = itertools.product(*columns)
         return len(holds), [holds[tuple([value[place] for place in places])] for value in values]
 
-    def conflict(self, others: Others) -> Conflict:
+    def conflict(self, others: OtherValues) -> Conflict:
         """`others` as a nogood's left side: one object for one combination, not to be changed."""
         conflict = self._conflicts.get(others)
         if conflict is None:
@@ -172,7 +172,7 @@ class SharedConstraint:
         return conflict
 
 
-def in_order_of_lowest(
+def sorted_by_lowest_agent(
     constraints: Iterable[SharedConstraint], rank: Mapping[str, int]
 ) -> tuple[SharedConstraint, ...]:
     """`constraints` in the order of their lowest other robot, the highest first."""

@@ -12,11 +12,11 @@ import msgspec
 
 from robochoc.journal.events import AnyEvent
 from robochoc.journal.journal import Header, Journal
-from robochoc.replay.inspection import Look, carefully
+from robochoc.replay.inspection import Inspector, safely
 from robochoc.replay.reasons import Reasons
-from robochoc.replay.rebuild import CannotReplayError, Cast, Means
-from robochoc.replay.replay import Difference, ReplayStopsError, Scene
-from robochoc.replay.steps import Step, runs_of, steps_of
+from robochoc.replay.rebuild import CannotReplayError, Rebuilder, ReplayOptions
+from robochoc.replay.replay import Difference, ReplayStopsError, RunReplay
+from robochoc.replay.steps import RecordedStep, runs_of, steps_of
 
 
 class Choice(msgspec.Struct, frozen=True):
@@ -26,7 +26,7 @@ class Choice(msgspec.Struct, frozen=True):
     ruled_out_by: str | None
 
 
-class State(msgspec.Struct, frozen=True, kw_only=True):
+class RobotState(msgspec.Struct, frozen=True, kw_only=True):
     """What a robot knows after its step number `step`, counted from 0 over the whole journal; all of it to be shown.
 
     `value` are its variables' values (empty: none), `view` says of others what it knows, as pairs (robot, words),
@@ -47,12 +47,12 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
 def states_of(
     journal: Journal | Iterable[AnyEvent],
     robot: str,
-    means: Means | None = None,
+    means: ReplayOptions | None = None,
     *,
     header: Header | None = None,
     since: int = 0,
     everything: Callable[[], Iterable[AnyEvent]] | None = None,
-) -> Iterator[State]:
+) -> Iterator[RobotState]:
     """The states of `robot` after its own steps, from step number `since` on; a step that is there in part has none.
 
     `journal` may be events alone, sorted as in one; then `header` is its header, if there is any. They may be those
@@ -67,7 +67,7 @@ def states_of(
     for alone in (True, False):
         if not alone and everything is not None:
             events = tuple(everything())
-        player = _Player(header, robot, means or Means(), alone=alone)
+        player = _Player(header, robot, means or ReplayOptions(), alone=alone)
         try:
             for state in player.states(events, since):
                 yield state
@@ -84,21 +84,21 @@ class _UnsaidError(Exception):
 class _Player:
     """Plays the robot's steps, and looks at it after each; `alone`, or with all others."""
 
-    def __init__(self, header: Header | None, robot: str, means: Means, *, alone: bool) -> None:
-        self._cast = Cast(header, means, {robot} if alone else None)
+    def __init__(self, header: Header | None, robot: str, means: ReplayOptions, *, alone: bool) -> None:
+        self._cast = Rebuilder(header, means, {robot} if alone else None)
         self._header = header
         self._robot = robot
         self._alone = alone
         self._step = 0
 
-    def states(self, events: Sequence[AnyEvent], since: int) -> Iterator[State]:
+    def states(self, events: Sequence[AnyEvent], since: int) -> Iterator[RobotState]:
         gone: set[str] = set()
         for run in runs_of(events):
             ensemble = self._cast.enter(run)
             if self._robot not in ensemble.hosts:
                 continue
-            scene = Scene(run, ensemble, self._header)
-            look = Look(ensemble.parts[self._robot])
+            scene = RunReplay(run, ensemble, self._header)
+            look = Inspector(ensemble.parts[self._robot])
             gone.intersection_update(ensemble.mindful)
             for step in steps_of(run.events):
                 if self._alone and step.robot != self._robot:
@@ -116,7 +116,7 @@ class _Player:
                 if state is not None:
                     yield state
 
-    def _played(self, scene: Scene, look: Look, step: Step, since: int) -> State | None:
+    def _played(self, scene: RunReplay, look: Inspector, step: RecordedStep, since: int) -> RobotState | None:
         """What the robot knows after `step`; None where the step is another's, is not whole, or is not asked for."""
         if step.robot != self._robot:
             scene.play(step, 0)
@@ -133,22 +133,22 @@ class _Player:
             look.hear(sent.sender, message)
         if reasons is None:
             return None
-        return State(
+        return RobotState(
             step=number,
             value=dict(protocol.assignment),
-            view=carefully(lambda: look.view(protocol), []),
-            domain=[Choice(*pair) for pair in carefully(lambda: look.domain(protocol), [])],
-            nogoods=carefully(lambda: look.nogoods(protocol), []),
+            view=safely(lambda: look.view(protocol), []),
+            domain=[Choice(*pair) for pair in safely(lambda: look.domain(protocol), [])],
+            nogoods=safely(lambda: look.nogoods(protocol), []),
             more=look.more(protocol),
-            why=carefully(lambda: reasons.told(heard, step), []),
+            why=safely(lambda: reasons.told(heard, step), []),
         )
 
-    def _last(self, step: Step, why: str, since: int) -> State | None:
+    def _last(self, step: RecordedStep, why: str, since: int) -> RobotState | None:
         """Instead of the state that nobody knows: that there is none, and why."""
         if step.robot != self._robot:
             return None
         self._step += 1
-        return State(step=self._step - 1, more={"replay": f"ends here: {why}"}) if self._step > since else None
+        return RobotState(step=self._step - 1, more={"replay": f"ends here: {why}"}) if self._step > since else None
 
 
 def in_short(difference: Difference) -> str:

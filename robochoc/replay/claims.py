@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 
 import msgspec
@@ -16,12 +17,14 @@ from robochoc.communication.run_result import RunResult
 from robochoc.journal.entries import STAMPED_LATE
 from robochoc.journal.events import AnyEvent, Lost, Received, Sent
 from robochoc.journal.journal import Header, Journal, metrics_of
-from robochoc.model.outcome import Epoch, Outcome, Verdict
-from robochoc.replay.rebuild import Ensemble
-from robochoc.replay.steps import Run
-from robochoc.run.evaluation import evaluate, evaluate_withdrawal
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.replay.rebuild import RebuiltRobots
+from robochoc.replay.steps import RecordedRun
+from robochoc.run.evaluation import Search, check_with_files, evaluate
 from robochoc.run.options import CENTRAL
 from robochoc.run.registry import protocol_by_class
+from robochoc.run.withdrawal import Phase
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.domain import TooManySolutionsError
 from robochoc.verification.checker import RefutedError
 
@@ -39,19 +42,19 @@ class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
 
 
 @dataclass(frozen=True)
-class Played:
+class ReplayedRun:
     """A run that was played to its end: who played it, and the answer that follows; None where nothing can be said."""
 
-    run: Run
-    answer: Epoch | Outcome | None
+    run: RecordedRun
+    answer: EpochOutcome | Outcome | None
 
 
-def played(run: Run, ensemble: Ensemble, outcome: Outcome | None) -> Played:
+def played(run: RecordedRun, ensemble: RebuiltRobots, outcome: Outcome | None) -> ReplayedRun:
     """Return `run`, which its robots have just played, with what it comes to."""
-    return Played(run, _answer(run, ensemble, outcome) if outcome else None)
+    return ReplayedRun(run, _answer(run, ensemble, outcome) if outcome else None)
 
 
-def contradictions(journal: Journal, runs: Sequence[Played], *, whole: bool) -> Iterator[Contradiction]:
+def contradictions(journal: Journal, runs: Sequence[ReplayedRun], *, whole: bool) -> Iterator[Contradiction]:
     """Yield what the journal claims and its steps, in `runs`, do not bear out.
 
     `whole`: all robots were followed to the end of all runs. If not, what a run has come to is not known.
@@ -76,7 +79,7 @@ def contradictions(journal: Journal, runs: Sequence[Played], *, whole: bool) -> 
     yield from _answers("the outcome's ", outcome, runs[-1].answer)
 
 
-def _beginning(header: Header, runs: Sequence[Run], placed_by: str | None) -> Iterator[Contradiction]:
+def _beginning(header: Header, runs: Sequence[RecordedRun], placed_by: str | None) -> Iterator[Contradiction]:
     """The header, against what the robots were given. Where one alone had no solution, the search is left out."""
     first = next((run.began.protocol for run in runs if run.began), "")
     found = protocol_by_class(first, [header.protocol])  # a class that is installed by no name may be played, too
@@ -92,7 +95,9 @@ def _beginning(header: Header, runs: Sequence[Run], placed_by: str | None) -> It
         yield Contradiction(what="the header's order", recorded=header.order, replayed=order)
 
 
-def _answers(whose: str, recorded: Epoch | Outcome, replayed: Epoch | Outcome | None) -> Iterator[Contradiction]:
+def _answers(
+    whose: str, recorded: EpochOutcome | Outcome, replayed: EpochOutcome | Outcome | None
+) -> Iterator[Contradiction]:
     if replayed is None or recorded.verdict is Verdict.UNKNOWN:  # limits are not in a journal
         return
     yield from _differing(whose, recorded, replayed, ("verdict", "assignment", "cost"))
@@ -109,7 +114,7 @@ def _differing(whose: str, recorded: object, replayed: object, names: Sequence[s
             yield Contradiction(what=whose + name, recorded=left, replayed=right)
 
 
-def _answer(run: Run, ensemble: Ensemble, outcome: Outcome) -> Epoch | Outcome | None:
+def _answer(run: RecordedRun, ensemble: RebuiltRobots, outcome: Outcome) -> EpochOutcome | Outcome | None:
     """What the robots of `run` have come to, as a run would tell it; None where the journal does not say enough."""
     given = run.given
     if given is None or given.why or len(ensemble.hosts) < len(ensemble.compiled.team.robots):
@@ -123,17 +128,21 @@ def _answer(run: Run, ensemble: Ensemble, outcome: Outcome) -> Epoch | Outcome |
         0.0,
     )
     result.findings.update({name: one.findings for name, one in protocols.items()})
-    traits, team = ensemble.protocol.traits, ensemble.compiled.team
+    team = ensemble.compiled.team
+    withdrawal = given.aside is not None or _places(run, outcome)
+    phase = Phase("", ensemble.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
+    check = partial(check_with_files, phase, result, team, ensemble.compiled)
     try:
-        if given.aside is not None or _places(run, outcome):
-            bare = Outcome(outcome.team, outcome.protocol, outcome.runtime, outcome.seed, Verdict.UNKNOWN)
-            return evaluate_withdrawal(bare, team, result, ensemble.compiled, given.aside)
-        return evaluate(Epoch(result.verdict, team.order), team, result, traits, ensemble.compiled)
+        answer = evaluate(phase, Search(result, check), team.kind)
     except (RefutedError, TooManySolutionsError):
-        return Epoch(Verdict.UNKNOWN, team.order)
+        return EpochOutcome(Verdict.UNKNOWN, team.order)
+    if not withdrawal:
+        return answer.as_epoch(team.order)
+    bare = Outcome(outcome.team, outcome.protocol, outcome.runtime, outcome.seed, Verdict.UNKNOWN)
+    return answer.as_outcome(bare, ())
 
 
-def _places(run: Run, outcome: Outcome) -> bool:
+def _places(run: RecordedRun, outcome: Outcome) -> bool:
     """Whether `run` is the one in which those step aside who find no place."""
     found = protocol_by_class(run.began.protocol, filter(None, [outcome.placed_by])) if run.began else None
     return found is not None and found[0] == outcome.placed_by

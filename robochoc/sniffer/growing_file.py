@@ -15,7 +15,7 @@ class NoFileError(OSError):
     """It is a pipe, a device, or a folder: what has been read of it could not be read again."""
 
 
-def opened(path: Path) -> int:
+def open_to_read(path: Path) -> int:
     """Return a descriptor of the file at `path`, for reading. A FIFO is not waited for. Raises `OSError`."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     try:
@@ -31,7 +31,7 @@ def _check_file(descriptor: int) -> None:
         raise NoFileError("it is no file that can be read twice")
 
 
-class Window(io.RawIOBase):
+class GrowingFile(io.RawIOBase):
     """Reads the file `descriptor` from its start up to `end`, which whoever reads moves on.
 
     The place is its own: who writes through the same open file, as a parent does, is not disturbed.
@@ -58,9 +58,9 @@ class Window(io.RawIOBase):
         before, self.end = self.end, min(self.size, self.end + most)
         return self.end > before
 
-    def again(self) -> Window:
+    def again(self) -> GrowingFile:
         """The same file from its start."""
-        return Window(self._descriptor)
+        return GrowingFile(self._descriptor)
 
     def readable(self) -> bool:
         """It is."""

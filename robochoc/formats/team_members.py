@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 
-from robochoc.formats.places import Place, Places
+from robochoc.formats.locations import Place, Places
 from robochoc.model.priorities import CycleError, priority_order
 from robochoc.model.problem import Child, Constraint, Parent, Robot
 

@@ -7,7 +7,7 @@ from collections import deque
 from robochoc.journal.events import Sent
 
 
-class Channel:
+class PendingChannel:
     """From one robot to another, in one run: what was said and not yet taken in; `owed` was taken in unseen."""
 
     __slots__ = ("owed", "under_way")
@@ -17,13 +17,13 @@ class Channel:
         self.owed = 0
 
 
-class OpenStep:
+class PendingStep:
     """A step that has not ended, or waits for what it took in."""
 
     __slots__ = ("checks", "clock", "decided", "notes", "packet", "received", "said", "t")
 
     def __init__(self) -> None:
-        self.received: deque[Channel] = deque()
+        self.received: deque[PendingChannel] = deque()
         self.packet: list[int] = []
         self.decided: dict[str, int] | None = None
         self.notes: list[tuple[float, str, str]] = []

@@ -13,7 +13,7 @@ from itertools import islice
 import msgspec
 
 from robochoc.protocols.order import PriorityOrder
-from robochoc.replay.phrases import cut
+from robochoc.replay.value_text import cut
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.compiled import LocalProblem
 
@@ -26,7 +26,7 @@ _SETTING = (LocalProblem, PriorityOrder, AgentProblem)
 """What many things hold, and what says nothing of them."""
 
 
-def glance(thing: object) -> str:
+def safe_repr(thing: object) -> str:
     """`thing` in at most `LONGEST` characters."""
     try:
         if isinstance(thing, PriorityOrder):

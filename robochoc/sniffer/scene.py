@@ -17,9 +17,9 @@ import msgspec
 from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts
 from robochoc.flight.layout import Layout, Point, layout_of
 from robochoc.formats import InvalidInputError, robot_in
-from robochoc.model.priorities import natural
+from robochoc.model.priorities import natural_key
 from robochoc.model.problem import Assignment, Robot
-from robochoc.sniffer.feed import BadRequestError
+from robochoc.sniffer.page_data import BadRequestError
 from robochoc.sniffer.trace import Trace
 from robochoc.view.drawing import path_of, still
 from robochoc.view.scene import DrawnDrone, Scene
@@ -35,7 +35,7 @@ Move = tuple[int, int, float, float, float]
 
 def whole_scene(trace: Trace) -> bytes:
     """The scene of a trace to which nothing will be added, by the robots' files that it holds; JSON."""
-    stage = Stage(trace, robots_given(trace))
+    stage = TraceScene(trace, robots_given(trace))
     return msgspec.json.encode(stage.answer() if stage else None)
 
 
@@ -48,7 +48,7 @@ def robots_given(trace: Trace) -> dict[str, Robot]:
     return robots
 
 
-class Stage:
+class TraceScene:
     """The drones of one trace. `robots` are those whose files are known; of others only what they decide is.
 
     The box holds all places that known robots might take, and those that others have taken by now.
@@ -56,10 +56,10 @@ class Stage:
 
     def __init__(self, trace: Trace, robots: Mapping[str, Robot]) -> None:
         self._trace = trace
-        self._robots = {name: robots.get(name) for name in sorted({*trace.robots, *robots}, key=natural)}
+        self._robots = {name: robots.get(name) for name in sorted({*trace.robots, *robots}, key=natural_key)}
         crew = [(name, craft) for name in self._robots for craft in self._crafts(name, {})]
         crew = crew if len(crew) <= _MOST_DRONES else []
-        order = sorted(range(len(crew)), key=lambda place: (natural(crew[place][1].name), crew[place][1].name))
+        order = sorted(range(len(crew)), key=lambda place: (natural_key(crew[place][1].name), crew[place][1].name))
         self._owners = [crew[place][0] for place in order]
         crafts = [crew[place][1] for place in order]
         self._field: Layout = layout_of(crafts, self._others())

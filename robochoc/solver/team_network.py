@@ -6,19 +6,19 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from robochoc.model.problem import Constraint, Kind, Team
-from robochoc.solver.cliques import strengthened
+from robochoc.model.problem import Constraint, ProblemKind, Team
+from robochoc.solver.cliques import with_cliques
 from robochoc.solver.encoding import Codes, Component, Network, Table, UnsupportedError, components, is_soft
-from robochoc.solver.propagation import propagated
-from robochoc.solver.weighted import HIGHEST, charged_anyway, charges_on
+from robochoc.solver.propagation import propagate
+from robochoc.solver.weighted import MAX_TOTAL_COST, constant_costs, costs_by_scope
 
-LEAST_VALUE, GREATEST_VALUE = -(2**31) + 10, 2**31 - 11
+MIN_VALUE, MAX_VALUE = -(2**31) + 10, 2**31 - 11
 """Values that ACE 2.6 reads: of 32 bits, but for a few that it keeps for itself (tried with ACE, one by one)."""
-WIDEST = 2**31 - 1
+MAX_SPREAD = 2**31 - 1
 """So far apart may the values of one domain be; ACE counts what is between them, too."""
 
 
-def merged(team: Team) -> tuple[Network, Codes]:
+def team_network(team: Team) -> tuple[Network, Codes]:
     """All variables of `team`, in its order, with all its constraints; codes are values.
 
     Unary constraints are folded into domains, cliques of `ne` are said outright. What soft constraints charge are
@@ -37,7 +37,7 @@ def merged(team: Team) -> tuple[Network, Codes]:
     impossible = False
     for part in components(team.variables.values(), team.constraints(), [one.variables for one in soft]):
         places = [place[name] for name in part.names]
-        said = strengthened(part.network, lambda _: None)
+        said = with_cliques(part.network, lambda _: None)
         for name, codes in zip(part.names, said.domains, strict=True):
             domains[name] = part.decoded(codes) or domains[name]  # no format has an empty domain
         impossible = impossible or part.network.impossible
@@ -47,12 +47,12 @@ def merged(team: Team) -> tuple[Network, Codes]:
             known = set(part.names)
             charges += _charges(part, places, [one for one in soft if one.variables[0] in known])
     paid = [tuple(sorted({row[-1] for row in table.rows})) for table in charges]
-    anyway = charged_anyway(team)
-    if anyway or (team.kind is Kind.DISWCSP and not paid):
+    anyway = constant_costs(team)
+    if anyway or (team.kind is ProblemKind.DISWCSP and not paid):
         paid.append((anyway,))
-    if sum(map(max, paid)) > HIGHEST:
+    if sum(map(max, paid)) > MAX_TOTAL_COST:
         raise UnsupportedError(
-            f"{team.name} has costs that add up to more than {HIGHEST:,}, too much for XCSP3's solvers"
+            f"{team.name} has costs that add up to more than {MAX_TOTAL_COST:,}, too much for XCSP3's solvers"
         )
     costs = tuple(range(len(domains), len(domains) + len(paid)))
     tables += [replace(table, scope=(*table.scope, cost)) for table, cost in zip(charges, costs, strict=False)]
@@ -68,7 +68,7 @@ def _readable(network: Network, *, impossible: bool) -> Network:
     value (see `solver/propagation.py`), refuses an instance without constraints, and leaves out variables that stand
     in none.
     """
-    if impossible or (safe := propagated(network)).impossible:
+    if impossible or (safe := propagate(network)).impossible:
         nothing = tuple([(value,) for value in network.domains[0]])
         network = Network(network.domains, (Table((0,), allowed=False, rows=nothing),))
     elif any(not table.allowed for table in network.tables):
@@ -82,19 +82,19 @@ def _readable(network: Network, *, impossible: bool) -> Network:
 def _refuse_far_values(team: Team, domains: Mapping[str, Codes]) -> None:
     """Raise `UnsupportedError` when values of `domains` are none that ACE reads."""
     for name, values in domains.items():
-        far = [f"{value:,}" for value in (values[0], values[-1]) if not LEAST_VALUE <= value <= GREATEST_VALUE]
-        if far or values[-1] - values[0] > WIDEST:
+        far = [f"{value:,}" for value in (values[0], values[-1]) if not MIN_VALUE <= value <= MAX_VALUE]
+        if far or values[-1] - values[0] > MAX_SPREAD:
             told = far[0] if far else f"{values[0]:,} and {values[-1]:,}"
             raise UnsupportedError(
                 f"{team.name} has a variable {name} with the value {told}; XCSP3's solvers compute with 32 bits: ACE"
-                f" takes values from {LEAST_VALUE:,} to {GREATEST_VALUE:,}, and in one domain no further apart than"
-                f" {WIDEST:,}; shift the problem's values, or scale them"
+                f" takes values from {MIN_VALUE:,} to {MAX_VALUE:,}, and in one domain no further apart than"
+                f" {MAX_SPREAD:,}; shift the problem's values, or scale them"
             )
 
 
 def _charges(part: Component, places: Sequence[int], soft: Sequence[Constraint]) -> Iterator[Table]:
     """Tables of values and what they are charged, in a column whose variable is still to come."""
-    for scope, prices in charges_on(part, part.network, soft).items():
+    for scope, prices in costs_by_scope(part, part.network, soft).items():
         if prices:
             rows = tuple((*part.decoded(codes), int(price)) for codes, price in prices.items())
             yield Table(tuple([places[member] for member in scope]), allowed=True, rows=rows)

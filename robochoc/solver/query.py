@@ -12,7 +12,7 @@ from typing import Self
 from robochoc.solver.encoding import Codes, Network
 
 
-class Means(StrEnum):
+class SolvedBy(StrEnum):
     """What an answer comes from: propagation alone, enumeration in this process, or ACE."""
 
     PROPAGATION = "propagation"
@@ -21,17 +21,17 @@ class Means(StrEnum):
 
 
 @dataclass(frozen=True)
-class Answer:
+class SolverAnswer:
     """The number of solutions, whether there are no others, and (unless only counted) the solutions."""
 
     found: int
     complete: bool
     solutions: tuple[Codes, ...]
-    means: Means = Means.PROPAGATION
+    means: SolvedBy = SolvedBy.PROPAGATION
 
 
 @dataclass(frozen=True)
-class Question:
+class Query:
     """What of a network has to be asked: `asked` is the network of the variables at `places`.
 
     These are the variables that a table looks at after propagation. The others are `free`: every combination of
@@ -71,12 +71,12 @@ class Question:
         width = len(self.asked.domains)
         return [tuple(numbers[start : start + width]) for start in range(0, len(numbers), width)]
 
-    def answered(self, found: int, *, complete: bool, solutions: Sequence[Codes], means: Means) -> Answer:
+    def answered(self, found: int, *, complete: bool, solutions: Sequence[Codes], means: SolvedBy) -> SolverAnswer:
         """Return the answer for the whole, from that for `asked`."""
         total = found * math.prod(len(domain) for domain in self.free.values())
         wanted = total if self.limit is None else min(total, self.limit)
         whole = () if self.count_only else tuple(itertools.islice(self._combined(solutions), wanted))
-        return Answer(wanted, complete and wanted == total, whole, means)
+        return SolverAnswer(wanted, complete and wanted == total, whole, means)
 
     def _combined(self, solutions: Sequence[Codes]) -> Iterator[Codes]:
         order = sorted(range(len(self.places) + len(self.free)), key=[*self.places, *self.free].__getitem__)

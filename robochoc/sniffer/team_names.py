@@ -37,7 +37,7 @@ class _Seen(Mapping[str, tuple[str, ...]]):
         return len(self._variables)
 
 
-class Names:
+class TeamNames:
     """What is known of the robots in each run of `trace`.
 
     It comes from the files that the robots were given. Where a journal has none, the variables that a robot was seen

@@ -10,7 +10,7 @@ import msgspec
 from robochoc.journal.events import AnyEvent, Given, Granted, Improved, Lost, Refused
 
 
-class Run(msgspec.Struct, frozen=True):
+class RunRecord(msgspec.Struct, frozen=True):
     """One run, or epoch: its first message and step, and what its robots were given; None: nothing says so.
 
     `files` are their XML files by name, also those that had been given before.

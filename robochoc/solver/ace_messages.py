@@ -28,7 +28,7 @@ def codes_of(said: bytes, width: int) -> array[int]:
     return numbers
 
 
-class TableForm(msgspec.Struct, frozen=True, array_like=True):
+class EncodedTable(msgspec.Struct, frozen=True, array_like=True):
     """A table, as in `encoding.Table`; its rows are those at the place `rows` of the task."""
 
     scope: tuple[int, ...]
@@ -44,7 +44,7 @@ class Task(msgspec.Struct, frozen=True, array_like=True, tag=True):
     """
 
     domains: list[list[int]]
-    tables: list[TableForm]
+    tables: list[EncodedTable]
     rows: list[list[list[int]]]
     different: list[list[int]]
     limit: int | None
@@ -77,7 +77,7 @@ class Exported(msgspec.Struct, frozen=True, array_like=True, tag=True):
     xml: bytes
 
 
-class Broken(msgspec.Struct, frozen=True, array_like=True, tag=True):
+class SolverFailed(msgspec.Struct, frozen=True, array_like=True, tag=True):
     """It went wrong; `java_missing`: because there is no Java to run ACE with."""
 
     why: str
@@ -85,4 +85,4 @@ class Broken(msgspec.Struct, frozen=True, array_like=True, tag=True):
 
 
 ToSolver = Task | Export
-FromSolver = Solved | Exported | Broken
+FromSolver = Solved | Exported | SolverFailed

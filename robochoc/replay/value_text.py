@@ -18,7 +18,7 @@ def cut(text: str, longest: int = LONGEST) -> str:
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
-class Phrases:
+class ValueText:
     """Speaks of robots' values. `interfaces` are the variables that each shows to its neighbours."""
 
     def __init__(self, interfaces: Interfaces) -> None:
@@ -64,7 +64,7 @@ def as_value(thing: object) -> Value | None:
     return thing if is_value(thing) else None  # type: ignore[return-value]  # it has been looked at
 
 
-class CountedPhrases(Phrases):
+class NumberedValueText(ValueText):
     """Speaks of robots that do not tell their values, but number what they have assigned (DisFC)."""
 
     def _pairs(self, robot: str, value: Sequence[int | None], sign: str, between: str) -> str:  # noqa: ARG002

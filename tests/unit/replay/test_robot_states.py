@@ -17,12 +17,12 @@ from robochoc.journal.events import Concluded, Sent, Settled, actor
 from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.findings import Best
-from robochoc.replay import CannotReplayError, Means, State, states_of
-from robochoc.replay.glance import LONGEST, glance
+from robochoc.replay import CannotReplayError, ReplayOptions, RobotState, states_of
 from robochoc.replay.inspection import MOST_VALUES
-from robochoc.replay.phrases import Phrases
 from robochoc.replay.reasons import MOST_BACKTRACKS, MOST_REASONS
-from robochoc.run.orchestrator import Options, Runtime
+from robochoc.replay.safe_repr import LONGEST, safe_repr
+from robochoc.replay.value_text import ValueText
+from robochoc.run import Options, Runtime
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.problems import random_team, team_of
 from tests.support.replays import in_text, random_run, recorded, with_events
@@ -40,7 +40,7 @@ def pair(values: int = 3) -> Team:
     return team_of({"A": range(1, values + 1), "B": range(1, values + 1)}, [differ("A", "B")])
 
 
-def states(team: Team, robot: str, protocol: str = "abt", means: Means | None = None) -> list[State]:
+def states(team: Team, robot: str, protocol: str = "abt", means: ReplayOptions | None = None) -> list[RobotState]:
     journal = recorded(team, replace(SIMULATED, protocol=protocol))
     return list(states_of(journal, robot, means))
 
@@ -209,7 +209,7 @@ class Backwards(ABT):
 def test_another_protocol_than_the_one_recorded_is_no_insight() -> None:
     journal = recorded(pair(), SIMULATED)
     with pytest.raises(CannotReplayError, match="RB does not do again what was recorded: in its step 0 of run 0"):
-        list(states_of(journal, "RB", Means(protocols={"ABT": Backwards})))
+        list(states_of(journal, "RB", ReplayOptions(protocols={"ABT": Backwards})))
 
 
 def test_nobody_of_that_name_has_no_states() -> None:
@@ -243,7 +243,7 @@ class Odd(ABT):
 
 
 def test_what_a_user_keeps_is_shown_as_far_as_it_can_be() -> None:
-    then = states(pair(), "RB", means=Means(protocols={"ABT": Odd}))[-1]
+    then = states(pair(), "RB", means=ReplayOptions(protocols={"ABT": Odd}))[-1]
     assert then.value == {"B": 2}
     assert then.more["table"] == "a table of 3 x 4"
     assert then.more["secret"].startswith("key: (0, 1, 2, ")
@@ -263,7 +263,7 @@ class Broken(ABT):
 
 
 def test_a_robot_that_breaks_what_is_looked_at_has_a_state_nevertheless() -> None:
-    then = states(pair(), "RB", means=Means(protocols={"ABT": Broken}))[-1]
+    then = states(pair(), "RB", means=ReplayOptions(protocols={"ABT": Broken}))[-1]
     assert (then.value, then.domain) == ({"B": 2}, [])
 
 
@@ -279,13 +279,13 @@ def test_a_robot_that_breaks_what_is_looked_at_has_a_state_nevertheless() -> Non
         ({}, "nothing"),
         ({"a": (1, 2)}, "a: (1, 2)"),
         ({3, 1, 2}, "1, 2, 3"),
-        (Phrases, "Phrases"),
+        (ValueText, "ValueText"),
     ],
 )
 def test_things_at_a_glance(thing: object, shown: str) -> None:
-    assert glance(thing) == shown
+    assert safe_repr(thing) == shown
 
 
 def test_a_glance_is_short() -> None:
     for thing in ("x" * 10**6, list(range(10**6)), {number: [number] * 100 for number in range(1000)}, 10**5000):
-        assert len(glance(thing)) <= LONGEST
+        assert len(safe_repr(thing)) <= LONGEST

@@ -28,7 +28,7 @@ PLATFORM = "localhost/robochoc"
 _FIELDS = tuple(field.name for field in msgspec.structs.fields(ACLMessage) if field.name != "user")
 
 
-class Speech:
+class AclMessages:
     """The ACL messages of `trace`."""
 
     def __init__(self, trace: Trace, protocols: RunProtocols) -> None:

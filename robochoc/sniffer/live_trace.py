@@ -23,8 +23,8 @@ from robochoc.journal.blocks import MAGIC
 from robochoc.journal.events import AnyEvent, Began
 from robochoc.journal.journal import Ended, Follower, Header, JournalError, Line, is_journal
 from robochoc.model.outcome import Outcome
+from robochoc.sniffer.growing_file import GrowingFile
 from robochoc.sniffer.trace import Trace
-from robochoc.sniffer.window import Window
 
 PIECE_BYTES = 1 << 16
 """Of a journal, read in one go: a fraction of a second's work."""
@@ -37,26 +37,26 @@ _FORSAKEN_S = 30.0
 """Without an end, and not written to for so long: whoever wrote it is gone."""
 
 
-class Following:
-    """Follows the journal in `window`, in pieces: whoever calls `advance` decides when.
+class LiveTrace:
+    """Follows the journal in `file`, in pieces: whoever calls `advance` decides when.
 
     `trace` is what there is by now: None before the first block. `loaded` is the part of the file that has been
     taken in, 0 to 1.
     """
 
-    def __init__(self, window: Window, age_s: Callable[[], float] = lambda: 0.0) -> None:
+    def __init__(self, file: GrowingFile, age_s: Callable[[], float] = lambda: 0.0) -> None:
         self._age_s = age_s
         self.trace: Trace | None = None
         self._generation = -1
         self._worked_s = 0.0
         self._waits = False
-        self.restart(window)
+        self.restart(file)
 
-    def restart(self, window: Window) -> None:
-        """Begin anew, with the journal in `window`: the next generation."""
-        self._window = window
-        self._follower = Follower(BufferedReader(window))
-        self._head = window.head
+    def restart(self, file: GrowingFile) -> None:
+        """Begin anew, with the journal in `file`: the next generation."""
+        self._file = file
+        self._follower = Follower(BufferedReader(file))
+        self._head = file.head
         self._generation += 1
         self.trace = None
         self._last = float("-inf")
@@ -68,7 +68,7 @@ class Following:
     @property
     def loaded(self) -> float:
         """How much of what is in the file has been taken in, 0 to 1."""
-        return self._window.end / max(1, self._window.size)
+        return self._file.end / max(1, self._file.size)
 
     @property
     def settled(self) -> bool:
@@ -93,18 +93,18 @@ class Following:
         return done
 
     def _advance(self) -> bool:
-        if self._window.size < self._window.end or not self._window.head.startswith(self._head):
-            self.restart(self._window.again())  # another journal has been written into the same file
+        if self._file.size < self._file.end or not self._file.head.startswith(self._head):
+            self.restart(self._file.again())  # another journal has been written into the same file
         if self._ordering is not None:
             if next(self._ordering, self) is self:
                 self._ordering, self._done = None, True
             return True
         if self._done:
-            goes_on = self._outcome is None and self._follower.damage is None and self._window.size > self._window.end
+            goes_on = self._outcome is None and self._follower.damage is None and self._file.size > self._file.end
             if goes_on:  # whoever had stopped writing
-                self.restart(self._window.again())
+                self.restart(self._file.again())
             return goes_on
-        if self._read() or self._window.widen(PIECE_BYTES):
+        if self._read() or self._file.widen(PIECE_BYTES):
             return True
         if self._age_s() > _FORSAKEN_S:
             rest, _ = self._follower.finish()
@@ -116,7 +116,7 @@ class Following:
 
     def _read(self) -> bool:
         """Take in a few entries, which may be few bytes; whether there was anything to do."""
-        if self.trace is None and not _may_begin(self._window.head):
+        if self.trace is None and not _may_begin(self._file.head):
             raise JournalError("it does not begin as a journal does")
         lines = self._follower.read(_EVENTS_AT_ONCE)
         self._take(lines)
@@ -156,7 +156,7 @@ class Following:
     def _in_order(self, header: Header) -> Iterator[None]:
         """Make the trace anew, of events in the order of their times; in pieces."""
         trace = Trace(header, self._generation + 1)
-        for events in by_time(self._window):
+        for events in events_by_time(self._file):
             trace.add(events)
             yield
         trace.end(self._outcome, self._follower.damage)
@@ -169,25 +169,25 @@ def _may_begin(head: bytes) -> bool:
     return is_journal(head) or any(form.startswith(head) for form in (MAGIC, TEXT))
 
 
-def entries_of(follower: Follower, window: Window, end: int) -> list[Line]:
-    """The next few entries before `end`, by the `follower` that reads `window`; none: there are no more."""
+def next_entries(follower: Follower, file: GrowingFile, end: int) -> list[Line]:
+    """The next few entries before `end`, by the `follower` that reads `file`; none: there are no more."""
     lines = follower.read(_EVENTS_AT_ONCE)
-    while not lines and window.end < end and window.widen(min(PIECE_BYTES, end - window.end)):
+    while not lines and file.end < end and file.widen(min(PIECE_BYTES, end - file.end)):
         lines = follower.read(_EVENTS_AT_ONCE)
     return lines
 
 
-def by_time(window: Window) -> Iterator[list[AnyEvent]]:
-    """The events in the file of `window`, up to its present end: each run's in the order of their times, in pieces.
+def events_by_time(file: GrowingFile) -> Iterator[list[AnyEvent]]:
+    """The events in the file of `file`, up to its present end: each run's in the order of their times, in pieces.
 
     Some pieces are empty: there was work to do. Events of equal times stay in their order. A run's are put aside in a
     file without a name until the run is over, and only their times and places are kept.
     """
-    here = window.again()
+    here = file.again()
     follower = Follower(BufferedReader(here))
     aside = _Aside()
     try:
-        while lines := entries_of(follower, here, window.end):
+        while lines := next_entries(follower, here, file.end):
             for line in lines:
                 if isinstance(line, Header | Ended):
                     continue

@@ -8,7 +8,7 @@ EXACT = 1 << 53
 """Below it, floats hold all integers."""
 
 
-def refuse_inexact(most: float) -> None:
+def check_exact(most: float) -> None:
     """Raise `TooLargeError` where costs could add up to `most`, and floats do not hold all integers up to there."""
     if most >= EXACT:
         raise TooLargeError("costs could add up to 2^53 or more, which tables do not hold exactly")

@@ -12,14 +12,22 @@ import pytest
 
 from robochoc.journal.events import AnyEvent, Began, Concluded, Given, Improved, Lost, Refused, Sent, Settled
 from robochoc.journal.journal import Header, Journal
-from robochoc.model.outcome import Epoch, Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.sniffer.acl import parse
+from robochoc.sniffer.acl_messages import PLATFORM
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.conversation import Conversation
-from robochoc.sniffer.feed import DETAILS, MOST_EPOCHS, MOST_NOTES, MOST_ROWS, BadRequestError, Feed, verdict_of
-from robochoc.sniffer.packed import packed_feed
-from robochoc.sniffer.speech import PLATFORM
+from robochoc.sniffer.embedded import embedded_answers
+from robochoc.sniffer.page_data import (
+    DETAILS,
+    MOST_EPOCHS,
+    MOST_NOTES,
+    MOST_ROWS,
+    BadRequestError,
+    PageData,
+    verdict_of,
+)
 from robochoc.sniffer.trace import Trace
 from tests.support.recorded_journals import feed_of, recorded
 
@@ -31,14 +39,16 @@ def told(answer: bytes) -> Any:  # noqa: ANN401 - JSON
     return json.loads(answer)
 
 
-def of_strangers(*contents: dict[str, Any], protocol: str = "a-protocol-that-is-not-there", kind: str = "Bid") -> Feed:
+def of_strangers(
+    *contents: dict[str, Any], protocol: str = "a-protocol-that-is-not-there", kind: str = "Bid"
+) -> PageData:
     events: list[AnyEvent] = [
         Began(t=0, protocol=protocol),
         *(Sent(t=0, sender="a", receiver=HOSTILE, type=kind, content=one, bytes=1, clock=7) for one in contents),
         Settled(t=1, robot="a", clock=7, checks=7),
     ]
     header = Header(team=HOSTILE, protocol=protocol, runtime="simulator", seed=0)
-    return Feed(Trace.of(Journal(header, tuple(events), None)))
+    return PageData(Trace.of(Journal(header, tuple(events), None)))
 
 
 def test_about_says_what_was_run_and_how_it_ended() -> None:
@@ -77,7 +87,7 @@ def test_rows_that_are_not_there_or_too_many_are_refused(name: str) -> None:
         with pytest.raises(BadRequestError, match="there are no rows"):
             getattr(feed, name)(first, end)
     events = (Settled(t=0, robot="a", clock=0, checks=0) for _ in range(MOST_ROWS + 1))
-    large = Feed(Trace.of(Journal(Header(team="", protocol="", runtime="", seed=0), tuple(events), None)))
+    large = PageData(Trace.of(Journal(Header(team="", protocol="", runtime="", seed=0), tuple(events), None)))
     large.steps(1, MOST_ROWS + 1)
     with pytest.raises(BadRequestError, match="too many at once"):
         large.steps(0, MOST_ROWS + 1)
@@ -95,7 +105,7 @@ def test_details_come_in_chunks() -> None:
 def test_notes_are_bounded_and_losses_are_not_crowded_out() -> None:
     events: list[AnyEvent] = [Lost(t=0, robot="a", why=f"{number}") for number in range(MOST_NOTES + 5)]
     events += [Improved(t=0, cost=number, assignment={}) for number in range(MOST_NOTES + 5)]
-    feed = Feed(Trace.of(Journal(Header(team="", protocol="", runtime="", seed=0), tuple(events), None)))
+    feed = PageData(Trace.of(Journal(Header(team="", protocol="", runtime="", seed=0), tuple(events), None)))
     notes = told(feed.about())["notes"]
     assert len(notes) == 2 * MOST_NOTES
     assert notes[MOST_NOTES - 1]["text"] == f"a was lost: {MOST_NOTES + 4}"
@@ -155,7 +165,7 @@ def test_a_protocol_that_is_not_installed_has_details_all_the_same() -> None:
 
 def test_without_files_robots_are_known_by_what_they_decide() -> None:
     events = tuple(event for event in recorded("abt").events if not isinstance(event, Given))
-    feed = Feed(Trace.of(Journal(recorded("abt").header, events, None)))
+    feed = PageData(Trace.of(Journal(recorded("abt").header, events, None)))
     assert feed.words(0) == "Robot1.1 says: V1.1 = 1 from now on"
     about = told(feed.about())
     assert about["robots"][0] == {"name": "Robot1.1", "variables": ["V1.1"]}
@@ -178,14 +188,14 @@ def test_what_the_protocol_does_not_know_is_told_as_it_stands() -> None:
 def test_a_nameless_robot_breaks_nothing() -> None:
     events = (Sent(t=0, sender="", receiver="", type="Ok", content={"value": [1]}, bytes=1, clock=-3),)
     header = Header(team="", protocol="abt", runtime="", seed=0)
-    feed = Feed(Trace.of(Journal(header, events, None)))
+    feed = PageData(Trace.of(Journal(header, events, None)))
     assert parse(told(feed.details(0))[0]["acl"]).sender is not None
     assert feed.trace.messages.taken[0] == NOT_YET
 
 
 def test_a_page_without_a_server_gets_all_answers_at_once() -> None:
     feed, journal = feed_of("abt"), recorded("abt")
-    answers = {name: zlib.decompress(content) for name, content in packed_feed(feed, journal).items()}
+    answers = {name: zlib.decompress(content) for name, content in embedded_answers(feed, journal).items()}
     count, steps = len(feed.trace.messages.t), len(feed.trace.steps.t)
     assert answers["columns"] == feed.columns(0, count)
     assert answers["steps"] == feed.steps(0, steps)
@@ -194,7 +204,7 @@ def test_a_page_without_a_server_gets_all_answers_at_once() -> None:
     states = [name for name in answers if name.startswith("states:")]
     robots = list(feed.trace.steps.robot)
     assert len(states) == sum(-(-robots.count(robot) // 64) for robot in set(robots))
-    assert not [name for name in packed_feed(feed) if name.startswith("states:")]
+    assert not [name for name in embedded_answers(feed) if name.startswith("states:")]
     assert msgspec.json.decode(answers["states:0:0"])
 
 
@@ -217,8 +227,8 @@ def test_the_end_is_told_as_the_report_tells_it() -> None:
     assert gave_up == "No verdict: R1 gave up, as its protocol has it."
     best = ended(verdict=Verdict.OPTIMAL, withdrawn=("R1", "R2"), lost=("R1",))
     assert best == "No solution for all. 1 fly, no better team could; aside: R2; lost: R1."
-    epochs = [Epoch(verdict, ("R1",)) for verdict in (Verdict.SOLUTION, Verdict.NO_SOLUTION)]
-    epochs += [Epoch(Verdict.UNKNOWN, ("R1",), lost=("R2",))]
+    epochs = [EpochOutcome(verdict, ("R1",)) for verdict in (Verdict.SOLUTION, Verdict.NO_SOLUTION)]
+    epochs += [EpochOutcome(Verdict.UNKNOWN, ("R1",), lost=("R2",))]
     assert ended(epochs=(epochs[0],)) == "A solution."
     assert ended(epochs=tuple(epochs)) == "3 epochs: a solution, no solution, R2 lost. The last: A solution."
     many = ended(epochs=(epochs[0],) * 1000)
@@ -230,7 +240,7 @@ def test_notes_stand_at_the_steps_that_they_belong_to() -> None:
     concluded = [event.robot for event in journal.events if isinstance(event, Concluded)]
     assert concluded
     trace = Trace.of(journal)
-    notes = [note for note in json.loads(Feed(trace).about())["notes"] if note["kind"] == "concluded"]
+    notes = [note for note in json.loads(PageData(trace).about())["notes"] if note["kind"] == "concluded"]
     assert [(note["robot"], note["text"]) for note in notes] == [(who, "concluded: no solution") for who in concluded]
     for note in notes:
         assert trace.robots[trace.steps.robot[note["step"]]] == note["robot"]
@@ -239,6 +249,6 @@ def test_notes_stand_at_the_steps_that_they_belong_to() -> None:
     lost = Lost(t=journal.events[half].t, robot="Robot1.1", why="hit")
     refused = Refused(t=lost.t, who="X", what="joining", why="unknown")
     trace = Trace.of(replace(journal, events=(*journal.events[:half], lost, refused, *journal.events[half:])))
-    notes = [note for note in json.loads(Feed(trace).about())["notes"] if note["kind"] in {"lost", "refused"}]
+    notes = [note for note in json.loads(PageData(trace).about())["notes"] if note["kind"] in {"lost", "refused"}]
     assert [note["kind"] for note in notes] == ["lost", "refused"]
     assert all(0 < note["step"] < len(trace.steps.t) for note in notes)

@@ -16,11 +16,11 @@ import msgspec
 from robochoc.journal.events import AnyEvent, Began, Concluded, Decided, Given, Heard, Received, Sent, Settled
 from robochoc.journal.journal import Ended, Follower, Header
 from robochoc.replay import CannotReplayError
-from robochoc.replay.insight import State, states_of
+from robochoc.replay.robot_states import RobotState, states_of
 from robochoc.sniffer.cache import Cache
-from robochoc.sniffer.feed import STATES, BadRequestError
-from robochoc.sniffer.following import entries_of
-from robochoc.sniffer.window import Window
+from robochoc.sniffer.growing_file import GrowingFile
+from robochoc.sniffer.live_trace import next_entries
+from robochoc.sniffer.page_data import STATES, BadRequestError
 
 MOST_EVENTS = 1_000_000
 """Of one robot: some hundred MB."""
@@ -31,10 +31,10 @@ class _Playing(NamedTuple):
     robot: str
     size: int
     """How long the file was."""
-    states: Iterator[State]
+    states: Iterator[RobotState]
 
 
-class Insight:
+class RobotStates:
     """Plays the robot again that was asked about last, and keeps what it has shown."""
 
     def __init__(self) -> None:
@@ -43,18 +43,18 @@ class Insight:
         self._next = 0
         self.stopped = False
 
-    def chunk(self, window: Window, robot: str, number: int, *, final: bool) -> bytes:
+    def chunk(self, file: GrowingFile, robot: str, number: int, *, final: bool) -> bytes:
         """The states after the steps of chunk `number`, as JSON; `[]` past the last one. Raises `BadRequestError`.
 
-        `window` is not touched; the file is read up to its present end. What is kept is what is `final`: in mid-run
+        `file` is not touched; the file is read up to its present end. What is kept is what is `final`: in mid-run
         something may be missing yet of what a robot was told.
         """
         kept = self._cache.get((robot, number))
         if kept is not None:
             return kept
         playing = self._playing
-        if playing is None or playing.robot != robot or number < self._next or playing.size != window.end:
-            playing = _Playing(robot, window.end, self._states(window, robot))
+        if playing is None or playing.robot != robot or number < self._next or playing.size != file.end:
+            playing = _Playing(robot, file.end, self._states(file, robot))
             self._playing, self._next = playing, 0
         answer = b"[]"
         while self._next <= number and not self.stopped:
@@ -75,22 +75,22 @@ class Insight:
             self._next += 1
         return answer
 
-    def _states(self, window: Window, robot: str) -> Iterator[State]:
+    def _states(self, file: GrowingFile, robot: str) -> Iterator[RobotState]:
         return states_of(
-            self._events(window, robot),
+            self._events(file, robot),
             robot,
-            header=_header(window),
-            everything=lambda: self._events(window),
+            header=_header(file),
+            everything=lambda: self._events(file),
         )
 
-    def _events(self, window: Window, robot: str | None = None) -> Iterator[AnyEvent]:
+    def _events(self, file: GrowingFile, robot: str | None = None) -> Iterator[AnyEvent]:
         """What concerns `robot`, or all that robots do, each run's in the order of their times."""
         whose = robot or "all robots together"
-        here = window.again()
+        here = file.again()
         follower = Follower(BufferedReader(here))
         run: list[AnyEvent] = []
         count = 0
-        while not self.stopped and (lines := entries_of(follower, here, window.end)):
+        while not self.stopped and (lines := next_entries(follower, here, file.end)):
             for line in lines:
                 if isinstance(line, Header | Ended) or not _concerns(line, robot):
                     continue
@@ -108,9 +108,9 @@ def _time(event: AnyEvent) -> float:
     return event.t
 
 
-def _header(window: Window) -> Header | None:
-    here = window.again()
-    lines = entries_of(Follower(BufferedReader(here)), here, window.end)
+def _header(file: GrowingFile) -> Header | None:
+    here = file.again()
+    lines = next_entries(Follower(BufferedReader(here)), here, file.end)
     return lines[0] if lines and isinstance(lines[0], Header) else None
 
 

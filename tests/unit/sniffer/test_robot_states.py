@@ -16,11 +16,11 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Sent, Settled
 from robochoc.journal.journal import Journal, Recorder, lines_of
 from robochoc.protocols.sfb import SFB
-from robochoc.replay.channels import Words
+from robochoc.replay.channels import MessageDecoder
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_named, protocol_names
-from robochoc.sniffer.feed import STATES, Feed
-from robochoc.sniffer.packed import packed_feed
+from robochoc.sniffer.embedded import embedded_answers
+from robochoc.sniffer.page_data import STATES, PageData
 from robochoc.sniffer.session import Session
 from robochoc.sniffer.trace import Trace
 from robochoc.solver.ace import AceProcess
@@ -78,7 +78,7 @@ def served(path: Path) -> dict[str, list[dict[str, Any]]]:
 def embedded(journal: Journal) -> dict[str, list[dict[str, Any]]]:
     """What an exported page holds about every robot."""
     trace = Trace.of(journal)
-    answers = packed_feed(Feed(trace), journal)
+    answers = embedded_answers(PageData(trace), journal)
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in trace.robots}
     for name, answer in answers.items():
         what, _, rest = name.partition(":")
@@ -129,7 +129,7 @@ def test_integers_where_a_message_says_float_travel_as_integers(three: Journal) 
     """Made again by its type, 0 would be 0.0, which is nine bytes rather than one."""
     said = [event for event in three.events if isinstance(event, Sent) and event.type == "Below"]
     assert said
-    words = Words(SFB)
+    words = MessageDecoder(SFB)
     for sent in said:
         content = words.content(sent)
         assert content is not None

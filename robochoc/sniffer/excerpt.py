@@ -11,7 +11,7 @@ from robochoc.journal.journal import Journal
 from robochoc.sniffer.trace import Trace
 
 
-def part_of(journal: Journal, trace: Trace, messages: Sequence[int]) -> Journal:
+def excerpt_of(journal: Journal, trace: Trace, messages: Sequence[int]) -> Journal:
     """`journal`, whose trace is `trace`, with no other messages than `messages`, sent and taken in.
 
     All that is no message is there.

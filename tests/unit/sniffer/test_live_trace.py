@@ -11,20 +11,20 @@ from hypothesis import strategies as st
 
 from robochoc.journal.events import AnyEvent, Began, Event
 from robochoc.journal.journal import JournalError, read_journal
-from robochoc.sniffer import following
+from robochoc.sniffer import live_trace
 from robochoc.sniffer.cache import Cache
-from robochoc.sniffer.following import Following, by_time
+from robochoc.sniffer.growing_file import GrowingFile, NoFileError
+from robochoc.sniffer.live_trace import LiveTrace, events_by_time
 from robochoc.sniffer.trace import Trace
-from robochoc.sniffer.window import NoFileError, Window
 from tests.support.sniffer_server import header, journal_of, run_events
 
 EVENTS, OUTCOME = run_events()
 QUICK = settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
-def opened(path: Path, content: bytes) -> Window:
+def opened(path: Path, content: bytes) -> GrowingFile:
     path.write_bytes(content)
-    return Window(os.open(path, os.O_RDONLY))
+    return GrowingFile(os.open(path, os.O_RDONLY))
 
 
 def numbers(trace: Trace) -> object:
@@ -52,12 +52,12 @@ def _who(event: Event) -> set[str]:
 def test_in_pieces_as_in_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, robot: str, piece: int, at_once: int
 ) -> None:
-    monkeypatch.setattr(following, "PIECE_BYTES", piece)
-    monkeypatch.setattr(following, "_EVENTS_AT_ONCE", at_once)
+    monkeypatch.setattr(live_trace, "PIECE_BYTES", piece)
+    monkeypatch.setattr(live_trace, "_EVENTS_AT_ONCE", at_once)
     content = journal_of(late(EVENTS, robot), OUTCOME, header("processes"))
     whole = Trace.of(read_journal(content))
     window = opened(tmp_path / "run.journal", content)
-    follows = Following(window)
+    follows = LiveTrace(window)
     before = 0
     while follows.advance():
         assert follows.trace is None or follows.trace.generation == before or follows.settled
@@ -70,7 +70,7 @@ def test_events_by_time_are_the_journals(tmp_path: Path) -> None:
     content = journal_of(late(EVENTS, "Robot2.2"), OUTCOME, header("processes"))
     window = opened(tmp_path / "run.journal", content)
     window.widen(len(content))
-    events = [event for some in by_time(window) for event in some]
+    events = [event for some in events_by_time(window) for event in some]
     assert tuple(events) == read_journal(content).events
 
 
@@ -81,7 +81,7 @@ def test_whoever_writes_is_not_disturbed(tmp_path: Path) -> None:
     with path.open("w+b") as file:
         file.write(content)
         file.flush()
-        follows = Following(Window(file.fileno()))
+        follows = LiveTrace(GrowingFile(file.fileno()))
         while follows.advance():
             pass
         assert file.tell() == os.lseek(file.fileno(), 0, os.SEEK_CUR) == len(content)
@@ -93,7 +93,7 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
     try:
         for descriptor in (reading, folder):
             with pytest.raises(NoFileError):
-                Window(descriptor)
+                GrowingFile(descriptor)
     finally:
         for descriptor in (reading, writing, folder):
             os.close(descriptor)
@@ -102,7 +102,7 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
 @given(content=st.binary(min_size=1, max_size=300))
 @QUICK
 def test_no_bytes_do_harm(tmp_path: Path, content: bytes) -> None:
-    follows = Following(opened(tmp_path / "any", content), lambda: 1e9)
+    follows = LiveTrace(opened(tmp_path / "any", content), lambda: 1e9)
     try:
         while follows.advance():
             pass

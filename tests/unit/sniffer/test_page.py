@@ -19,8 +19,8 @@ from robochoc.journal.journal import Journal, read_journal
 from robochoc.model.expression import Name
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Topic, Variable
-from robochoc.sniffer.moves import Stage, whole_scene
 from robochoc.sniffer.page import page
+from robochoc.sniffer.scene import TraceScene, whole_scene
 from robochoc.sniffer.trace import Trace
 from tests.support.program import ROOT
 from tests.support.sniffer_server import header, journal_of, run_events
@@ -105,7 +105,7 @@ def deciding(robot: str, *assignments: dict[str, int]) -> list[AnyEvent]:
 
 def test_drones_stand_hover_and_land() -> None:
     trace = trace_of([Began(t=0, protocol="ABT"), *deciding("Robot2.3", {"V2.3": 4}, {"V2.3": 1}, {})])
-    scene = Stage(trace, {}).answer()
+    scene = TraceScene(trace, {}).answer()
     (drone,) = scene["drones"]
     x, y, ground = drone["ground"]
     assert scene["moves"] == [(0, 0, x, y, ground + 4), (1, 0, x, y, ground + 1), (2, 0, x, y, ground)]
@@ -115,14 +115,14 @@ def test_a_topic_says_where_a_drone_is() -> None:
     domain = Domain("D", (range(1, 5),))
     robot = Robot("Scout", (Variable("p", domain),), topics=(Topic("/p", x=Name("p"), y=Name("p"), z=Name("p")),))
     trace = trace_of([Began(t=0, protocol="ABT"), *deciding("Scout", {"p": 2}, {"p": 4})])
-    stage = Stage(trace, {"Scout": robot})
+    stage = TraceScene(trace, {"Scout": robot})
     first, second = stage.answer()["moves"]
     assert [b - a for a, b in zip(first[2:], second[2:], strict=True)] == [2, 2, 2]
 
 
 def test_all_land_when_another_run_begins() -> None:
     runs = [*deciding("R1.1", {"V1.1": 2}), Began(t=0, protocol="SFB"), *deciding("R1.1", {"V1.1": 3})]
-    scene = Stage(trace_of([Began(t=0, protocol="ABT"), *runs]), {}).answer()
+    scene = TraceScene(trace_of([Began(t=0, protocol="ABT"), *runs]), {}).answer()
     heights = [(move[0], move[4] - scene["drones"][0]["ground"][2]) for move in scene["moves"]]
     assert [step for step, _ in heights] == [0, 1, 1]
     assert heights[1][1] == 0 < heights[0][1] < heights[2][1]

@@ -1,0 +1,106 @@
+"""A run without robots: one model of all files, decided by the central solver, epoch by epoch."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import NamedTuple
+
+from robochoc.model.change import describe_change, team_after_events
+from robochoc.model.outcome import Metrics, Outcome, Verdict
+from robochoc.model.problem import ProblemKind, Team
+from robochoc.run.context import RunContext
+from robochoc.run.evaluation import Answer, check
+from robochoc.run.incumbent import absent
+from robochoc.run.options import CENTRAL, Options, Withdrawal
+from robochoc.solver.central import CentralAnswer, CentralSolver
+from robochoc.solver.failures import SolverLostError
+from robochoc.verification.checker import assignment_cost
+from robochoc.verification.objective import withdrawal_cost
+from robochoc.verification.second_opinion import total_cost
+
+
+class _Decision(NamedTuple):
+    """What the central solver has decided for one epoch, and the number of solutions, if that was asked for."""
+
+    answer: Answer
+    solutions: int | None = None
+
+
+def solve_centrally(team: Team, context: RunContext, header: Outcome) -> Outcome:
+    """Return the outcome of a run in which the central solver decides the problem of every epoch.
+
+    Args:
+        team: the team with its scenario.
+        context: the options, the time and the solver of the run.
+        header: an outcome that says what is run, and nothing else yet.
+
+    Raises:
+        RefutedError: when the checker refutes an answer.
+        SolverLostError: when an answer does not cost what the solver says.
+    """
+    from robochoc.solver.ace import AceProcess  # noqa: PLC0415 - start-up: robots need it seldom
+
+    options = context.options
+    last = len(team.scenario)
+    with AceProcess(always=options.local.always_ace) as warm:
+        solver = context.central_solver(warm)
+        decisions = [_decide(solver, team_after_events(team, number), options) for number in range(last + 1)]
+    answer, solutions = decisions[-1]
+    epochs = tuple(
+        decision.answer.as_epoch(team_after_events(team, number).order, _opened_by(team, number))
+        for number, decision in enumerate(decisions)
+    )
+    spent = sum((epoch.metrics for epoch in epochs), Metrics())
+    answer = replace(answer, metrics=spent, epochs=epochs if team.dynamic else ())
+    return replace(answer.as_outcome(header, ()), runtime=CENTRAL, count=solutions)
+
+
+def _opened_by(team: Team, number: int) -> str:
+    """Return in a few words what has opened the epoch of this `number`."""
+    if not number:
+        return "the start"
+    return ", ".join(map(describe_change, team.scenario[number - 1].changes)) or "nothing"
+
+
+def _decide(solver: CentralSolver, team: Team, options: Options) -> _Decision:
+    """Decide one epoch, and check what was found."""
+    began = time.monotonic()
+    solutions = None
+    if options.count:
+        judgement = solver.judge(team, count=True)
+        answer, solutions = Answer(judgement.verdict), judgement.count
+    else:
+        answer = _answer(solver, team, options)
+    if answer.verified:
+        check(team, answer.assignment, answer.withdrawn, maximal=answer.verdict is not Verdict.UNKNOWN)
+    return _Decision(replace(answer, metrics=Metrics(wall_s=time.monotonic() - began)), solutions)
+
+
+def _answer(solver: CentralSolver, team: Team, options: Options) -> Answer:
+    """Return the solver's answer; as few robots as possible withdraw, if that is asked for and necessary."""
+    price = None
+    judgement = None
+    if options.withdraw is not Withdrawal.FEWEST or team.kind is ProblemKind.DISCSP:
+        judgement = solver.judge(team)
+    if judgement is None or (options.withdraw is not None and judgement.verdict is Verdict.NO_SOLUTION):
+        price = int(withdrawal_cost(team))
+        judgement = solver.judge(team, aside=price)
+    return _answer_of(judgement, team, price, options)
+
+
+def _answer_of(judgement: CentralAnswer, team: Team, price: int | None, options: Options) -> Answer:
+    """Return the answer for a `judgement`; `price` is the withdrawal cost (None: no robot may withdraw)."""
+    verdict, assignment, bound = judgement.verdict, judgement.assignment, None
+    if judgement.cost is not None:
+        total = total_cost(team, assignment, price)
+        if total != judgement.cost:
+            raise SolverLostError(f"the constraint solver's answer costs {total:,}, and it says {judgement.cost:,}")
+    if verdict is Verdict.UNKNOWN and judgement.bound is not None:
+        bound = judgement.bound // (price or 1)
+    if verdict is Verdict.OPTIMAL and team.kind is ProblemKind.DISCSP and not absent(team, assignment):
+        verdict = Verdict.SOLUTION
+    found = judgement.cost is not None or verdict is Verdict.SOLUTION
+    withdrawn = absent(team, assignment) if found and options.withdraw else ()
+    paid = assignment_cost(team, assignment) if found else None
+    return Answer(verdict, assignment=assignment, cost=paid, withdrawn=withdrawn, bound=bound, verified=found)

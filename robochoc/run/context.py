@@ -1,0 +1,62 @@
+"""What everything in one run on this machine shares: its time, its cache, its constraint solver, its observers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+from robochoc.communication.run_result import Progress
+from robochoc.journal.events import Observer
+from robochoc.run.options import Options
+from robochoc.solver.cache import SolutionCache
+from robochoc.solver.team_compiler import TeamCompiler
+
+if TYPE_CHECKING:
+    from robochoc.solver.ace import AceProcess
+    from robochoc.solver.central import CentralSolver
+
+
+class RunContext:
+    """The context of one run. Its time starts when it is made.
+
+    `observer` gets all events, `progress` the number of messages, and what else goes on. `solver` is a constraint
+    solver that is running already (None: one is started when it is needed).
+    """
+
+    def __init__(
+        self,
+        options: Options,
+        observer: Observer | None = None,
+        progress: Callable[[Progress], None] | None = None,
+        solver: AceProcess | None = None,
+    ) -> None:
+        self.options = options
+        self.observer = observer
+        self.progress = progress
+        self.solver = solver
+        self.cache = SolutionCache() if options.cache else None
+        self._began = time.monotonic()
+        self.deadline = None if options.timeout is None else self._began + options.timeout
+
+    def left_s(self) -> float | None:
+        """Return how many seconds are left; None without a limit."""
+        return None if self.deadline is None else max(0.0, self.deadline - time.monotonic())
+
+    def show_stage(self, stage: str) -> None:
+        """Report what is done besides searching."""
+        if self.progress:
+            self.progress(Progress(0, time.monotonic() - self._began, stage))
+
+    def team_compiler(self) -> TeamCompiler:
+        """Return a compiler of the robots' domains."""
+        return TeamCompiler(self.options.local, self.cache, self.deadline, self.solver, self.show_stage)
+
+    def central_solver(self, warm: AceProcess | None = None) -> CentralSolver:
+        """Return a central solver of this run; it uses the constraint solver `warm` unless the run has one."""
+        from robochoc.solver.central import CentralSolver  # noqa: PLC0415 - start-up: seldom asked for
+
+        show = partial(self.show_stage, "ACE decides the whole team")
+        always_ace = self.options.local.always_ace
+        return CentralSolver(self.cache, self.deadline, show, self.solver or warm, always_ace=always_ace)

@@ -1,0 +1,150 @@
+"""A distributed run, wherever the robots are: one or two phases, losses, and the reason where there is no verdict.
+
+A `Deployment` is a team of robots that can be told to search. There are two: `run/this_machine.py`, where the files are
+at hand, and `run/networked/machines.py`, where the robots keep them.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import replace
+
+from robochoc.communication.processes.robot_link import RobotsLostError
+from robochoc.communication.run_result import RunResult
+from robochoc.model.outcome import Metrics, Outcome, Verdict
+from robochoc.model.problem import ProblemKind
+from robochoc.protocols.protocol import Protocol
+from robochoc.run.evaluation import Answer, Search, evaluate
+from robochoc.run.options import Options
+from robochoc.run.withdrawal import Phase, first_phase, second_phase
+
+
+class Deployment(ABC):
+    """A team of robots that can be told to search, on this machine or on several.
+
+    `options` say how to run.
+    """
+
+    options: Options
+
+    @property
+    def compile_s(self) -> float:
+        """How many seconds were spent here on compiling the robots' domains."""
+        return 0.0
+
+    @property
+    @abstractmethod
+    def kind(self) -> ProblemKind:
+        """Whether the team's problem has costs."""
+
+    @property
+    @abstractmethod
+    def lost(self) -> tuple[str, ...]:
+        """The robots that were lost, and did not come back."""
+
+    @property
+    @abstractmethod
+    def is_empty(self) -> bool:
+        """Whether no robot is left."""
+
+    @abstractmethod
+    def withdrawal_cost(self) -> float:
+        """Return the withdrawal cost of a robot of weight 1: more than all constraints can charge together."""
+
+    @abstractmethod
+    def left_s(self) -> float | None:
+        """Return how many seconds are left; None without a limit."""
+
+    @abstractmethod
+    def search(self, phase: Phase) -> Search:
+        """Search once, from the beginning, with all robots that are there."""
+
+    @abstractmethod
+    def remove(self, lost: Mapping[str, str]) -> None:
+        """Go on without robots that were lost; `lost` maps their names to the reasons."""
+
+    def confirm(self, phase: Phase, answer: Answer) -> bool:  # noqa: ARG002 - an implementation needs them
+        """Return whether the central solver agrees. Raises `RefutedError` where it found something else."""
+        return False
+
+    @property
+    def unsettled(self) -> str:
+        """What kept the robots from an end when a limit was reached, as far as anybody can say."""
+        return ""
+
+    def solve(self, phase: Phase) -> Answer:
+        """Return the answer of `phase`: search until no robot gets lost, and check what was found.
+
+        Raises:
+            RobotsLostError: when all robots were lost.
+            RefutedError: when the answer does not hold.
+        """
+        search = self._search_without_losses(phase)
+        answer = self.evaluated(phase, search)
+        return replace(answer, reason=answer.reason or self.why_unknown(phase, answer))
+
+    def evaluated(self, phase: Phase, search: Search) -> Answer:
+        """Return the answer of `search`, confirmed by the central solver if that is asked for."""
+        answer = evaluate(phase, search, self.kind)
+        if answer.verdict is Verdict.NO_SOLUTION:
+            sure = self.confirm(phase, answer)
+            return replace(answer, verified=sure, confirmed=sure)
+        if answer.verdict is Verdict.OPTIMAL:
+            return replace(answer, confirmed=self.confirm(phase, answer))
+        return answer
+
+    def why_unknown(self, phase: Phase, answer: Answer) -> str | None:
+        """Return why `answer` has no verdict; None if it has one."""
+        if answer.verdict is not Verdict.UNKNOWN:
+            return None
+        if answer.witness is not None:
+            return f"{answer.witness} gave up, as its protocol has it"
+        if answer.ended:
+            return f"{phase.name} has come to its end, and all that it came by breaks a hard constraint"
+        timeout, messages = self.options.timeout, self.options.messages
+        if messages is not None and self.left_s() != 0 and sum(answer.metrics.messages.values()) >= messages:
+            limit = f"so many messages have been sent (--messages {messages})"
+        else:
+            limit = "the time was over" if timeout is None else f"the time was over (--timeout {timeout:g})"
+        return "; ".join(filter(None, [limit, self.unsettled]))
+
+    def outcome(self, header: Outcome, answer: Answer) -> Outcome:
+        """Return `header`, which says what was run, with its `answer`."""
+        metrics = replace(answer.metrics, compile_s=self.compile_s)
+        return replace(answer, metrics=metrics).as_outcome(header, self.lost)
+
+    def _search_without_losses(self, phase: Phase) -> Search:
+        """Search until a search ends without a loss. Its metrics are those of all searches together."""
+        spent = Metrics()
+        while True:
+            search = self.search(phase)
+            result: RunResult = search.result
+            spent += result.metrics
+            if not result.lost:
+                return search._replace(result=replace(result, metrics=spent))
+            self.remove(result.lost)
+            if self.is_empty:
+                raise RobotsLostError(result.lost)
+
+
+def solve_distributed(deployment: Deployment, protocol: type[Protocol], header: Outcome) -> Outcome:
+    """Return the outcome of a run in which robots solve their problem together.
+
+    Args:
+        deployment: the robots, and how to run.
+        protocol: the protocol that was asked for.
+        header: an outcome that says what is run, and nothing else yet.
+
+    Raises:
+        RobotsLostError: when robots were lost, and the run is not to go on without them.
+        RefutedError: when the answer does not hold.
+    """
+    options = deployment.options
+    phase = first_phase(options, protocol, deployment.withdrawal_cost)
+    answer = deployment.solve(phase)
+    if answer.verdict is Verdict.NO_SOLUTION and options.withdraw is not None and not phase.withdrawal:
+        phase = second_phase(options, deployment.withdrawal_cost)
+        answer = answer.then(deployment.solve(phase))
+        header = replace(header, placed_by=phase.name)
+    return deployment.outcome(header, answer)

@@ -1,0 +1,184 @@
+"""A team whose robots run on this machine, and whose files are at hand: every answer is checked with the files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+
+from robochoc.communication.processes.robot_link import RobotsLostError
+from robochoc.communication.session import Epoch, Session
+from robochoc.model.orders import Order, compute_order, with_dom_deg_order
+from robochoc.model.outcome import EpochOutcome, Metrics, Verdict
+from robochoc.model.problem import INFINITE, ProblemKind, Team
+from robochoc.run.context import RunContext
+from robochoc.run.distributed import Deployment
+from robochoc.run.evaluation import Answer, Search, check_with_files
+from robochoc.run.runtimes import open_session
+from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
+from robochoc.run.start_events import StartEvents
+from robochoc.run.withdrawal import Phase
+from robochoc.solver.agent_problem import RunParameters
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.team_compiler import NoLocalSolutionError
+from robochoc.verification.objective import withdrawal_cost
+
+
+class ThisMachine(Deployment):
+    """A team on this machine, in the runtime that the options name. See `Deployment`.
+
+    `epochs` are those that are over; the list grows while the run goes on.
+    """
+
+    def __init__(self, team: Team, context: RunContext, environment: Environment | None) -> None:
+        """Prepare the run of `team`. Raises `OrderError`."""
+        options = context.options
+        self.options = options
+        self.epochs: list[EpochOutcome] = []
+        self._team = team
+        self._context = context
+        self._environment = environment
+        self._dynamic = team.dynamic or environment is not None
+        self._compiler = context.team_compiler()
+        self._start_events = StartEvents(context.observer)
+        order = compute_order(team, options.order, options.seed) if isinstance(options.order, Order) else options.order
+        self._scenario = ScenarioRun(
+            team,
+            order,
+            self._compile,
+            context.left_s,
+            messages=options.messages,
+            spares=options.spares,
+            parameters=RunParameters(options.seed, options.settings),
+        )
+
+    @property
+    def kind(self) -> ProblemKind:
+        """See `Deployment.kind`."""
+        return self._scenario.team.kind
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """See `Deployment.lost`."""
+        return tuple(self._scenario.withdrawn)
+
+    @property
+    def is_empty(self) -> bool:
+        """See `Deployment.is_empty`."""
+        return not self._scenario.team.robots
+
+    @property
+    def compile_s(self) -> float:
+        """See `Deployment.compile_s`."""
+        return self._compiler.seconds
+
+    def withdrawal_cost(self) -> float:
+        """See `Deployment.withdrawal_cost`."""
+        return withdrawal_cost(self._team)
+
+    def left_s(self) -> float | None:
+        """See `Deployment.left_s`."""
+        return self._context.left_s()
+
+    def remove(self, lost: Mapping[str, str]) -> None:
+        """See `Deployment.remove`."""
+        self._scenario.remove(lost.keys())
+
+    def solve(self, phase: Phase) -> Answer:
+        """See `Deployment.solve`. The problem may change, but not while it is decided which robots withdraw."""
+        if not phase.withdrawal:
+            return self._solve_epochs(phase)
+        return replace(super().solve(phase), witness=None)  # the witness is that of a team without a solution
+
+    def search(self, phase: Phase) -> Search:
+        """See `Deployment.search`."""
+        team = self._scenario.ordered_team()
+        if phase.takes_over and phase.traits.costs and self.options.order is None:
+            team = with_dom_deg_order(team)  # to be fast: nobody has asked for another order
+        epoch = Epoch(self._compiler.compile(team, every=True), brief=phase.parameters)
+        self._start_events.report(phase.protocol, EpochStart(epoch))
+        with self._session(phase, epoch.compiled) as session:
+            result = session.search(self.left_s(), self.options.messages)
+        return Search(result, partial(check_with_files, phase, result, self._scenario.team, epoch.compiled))
+
+    def confirm(self, phase: Phase, answer: Answer) -> bool:
+        """See `Deployment.confirm`."""
+        if not self.options.verify:
+            return False
+        from robochoc.verification.second_opinion import total_cost  # noqa: PLC0415 - start-up: seldom asked for
+
+        cost = phase.parameters.withdrawal_cost
+        if answer.verdict is Verdict.NO_SOLUTION:
+            return self._confirmed(aside=cost)
+        total = total_cost(self._scenario.team, answer.assignment, cost)
+        return self._confirmed(total=total, aside=cost)
+
+    def limit_reached(self, why: str) -> Answer:
+        """Return the answer of a run that a limit has ended before the robots could search."""
+        reason = "; ".join([why, *self._scenario.failed_returns])
+        return self._with_epochs(Answer(Verdict.UNKNOWN, reason=reason))
+
+    # Epochs
+
+    def _solve_epochs(self, phase: Phase) -> Answer:
+        """Return the answer of the last epoch, with what all of them have cost."""
+        scenario = self._scenario
+        answer, lost = Answer(Verdict.UNKNOWN), dict[str, str]()
+        try:
+            compiled = scenario.compiled()
+        except NoLocalSolutionError as alone:
+            sure = self._confirmed(alone.robot)
+            return Answer(Verdict.NO_SOLUTION, witness=alone.robot, verified=sure, confirmed=sure, reason=str(alone))
+        with self._session(phase, compiled) as session:
+            for epoch in scenario.epochs(session, partial(self._start_events.report, phase.protocol, session=session)):
+                answer, lost = self._answer_of(phase, epoch), epoch.result.lost
+                self.epochs.append(answer.as_epoch(epoch.team.order, epoch.opened_by, tuple(lost)))
+                self._ask_environment()
+        if lost:
+            raise RobotsLostError(lost)
+        answer = self._with_epochs(answer)
+        reasons = filter(None, [self.why_unknown(phase, answer), *scenario.failed_returns])
+        return replace(answer, reason="; ".join(reasons) or None)
+
+    def _answer_of(self, phase: Phase, epoch: FinishedEpoch) -> Answer:
+        """Return the answer of an epoch, checked with the files."""
+        check = partial(check_with_files, phase, epoch.result, epoch.team, epoch.epoch.compiled)
+        return self.evaluated(phase, Search(epoch.result, check))
+
+    def _ask_environment(self) -> None:
+        """Give the environment, if there is one, the last epoch's answer; it may add an event."""
+        if self._environment is None:
+            return
+        left_s = 0 if self._scenario.is_over else self.left_s()
+        event = self._environment(self._scenario.team, self.epochs[-1], left_s)
+        if event:
+            self._scenario.add_event(event)
+
+    def _with_epochs(self, answer: Answer) -> Answer:
+        """Return the last epoch's `answer`, with what all epochs have cost."""
+        spent = sum((epoch.metrics for epoch in self.epochs), Metrics())
+        several = len(self.epochs) > 1 or self._dynamic
+        return replace(answer, metrics=spent, epochs=tuple(self.epochs) if several else ())
+
+    # What an epoch needs
+
+    def _compile(self, team: Team) -> CompiledTeam:
+        """Compile `team` for its next epoch; in a static problem one robot without a local solution decides."""
+        return self._compiler.compile(team, every=self._dynamic or bool(self.epochs))
+
+    def _session(self, phase: Phase, compiled: CompiledTeam) -> Session:
+        """Open a session of the phase's protocol."""
+        context = self._context
+        return open_session(
+            phase.protocol, compiled, phase.parameters, self.options, context.observer, context.progress
+        )
+
+    def _confirmed(self, alone: str | None = None, *, total: float = INFINITE, aside: float | None = None) -> bool:
+        """Return whether the central solver agrees, if it is asked. For the arguments see `confirmed`."""
+        if not self.options.verify:
+            return False
+        from robochoc.verification.second_opinion import confirmed  # noqa: PLC0415 - start-up: seldom asked for
+
+        cost = None if aside is None else int(aside)
+        solver = self._context.central_solver()
+        return confirmed(solver, self._scenario.team, self.options.protocol, alone, total=total, aside=cost)

@@ -1,0 +1,67 @@
+"""The second opinion: the central solver checks what robots have proven, that there is no solution or none cheaper."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Team
+from robochoc.solver.central import CentralAnswer, CentralSolver
+from robochoc.verification.checker import RefutedError, assignment_cost, has_local_solution
+
+
+def confirmed(
+    solver: CentralSolver,
+    team: Team,
+    protocol: str,
+    alone: str | None = None,
+    *,
+    total: float = INFINITE,
+    aside: int | None = None,
+) -> bool:
+    """Return whether the central solver agrees with a protocol.
+
+    Args:
+        solver: the central solver.
+        team: the team as its files have it.
+        protocol: the protocol's name.
+        alone: a robot that has no local solution. The checker looks at it as well, as the central solver and the
+            compiler of domains share their encoding.
+        total: the minimum cost that is claimed, withdrawal costs included; infinite: that there is no solution.
+        aside: the withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
+
+    Returns:
+        Whether it agrees; false if it has not come to an end.
+
+    Raises:
+        RefutedError: when it has found something else.
+    """
+    opinion = solver.judge(team, aside=aside)
+    against = contradiction(opinion, total)
+    if against or (alone is not None and has_local_solution(team[alone])):
+        claim = "no solution" if total == INFINITE else f"a solution of the least cost, {total:,}"
+        found = f"{team.name} has {claim}, and a judge has found {against or 'one'}"
+        raise RefutedError(f"{protocol} says that {found}")
+    return opinion.verdict is not Verdict.UNKNOWN
+
+
+def contradiction(opinion: CentralAnswer, total: float) -> str | None:
+    """Return what the central solver has found against a claim; None where it agrees, or has not come to an end.
+
+    `total` is the minimum cost that is claimed, withdrawal costs included; infinite: that there is no solution.
+    """
+    if opinion.verdict is Verdict.NO_SOLUTION:
+        return None if total == INFINITE else "none"
+    if total == INFINITE:
+        return "one" if opinion.verdict is not Verdict.UNKNOWN or opinion.assignment else None
+    if opinion.bound is not None and opinion.bound > total:
+        return f"that nothing costs less than {opinion.bound:,}"
+    if opinion.cost is not None and opinion.cost < total:
+        return f"one that costs {opinion.cost:,}"
+    return None
+
+
+def total_cost(team: Team, assignment: Mapping[str, int], withdrawal_cost: float | None) -> float:
+    """Return what `assignment` costs, and the robots without values, at a withdrawal cost for one of weight 1."""
+    withdrawn = (robot for robot in team.robots if robot.variables[0].name not in assignment)
+    return assignment_cost(team, assignment) + (withdrawal_cost or 0) * sum(robot.weight for robot in withdrawn)
