@@ -121,7 +121,9 @@ def master(
     if given["number"] and team:
         raise click.UsageError("--robots and --team both say who is expected; drop one")
     if team and (team / "scenario.xml").exists():
-        raise click.UsageError(f"{team} has a scenario.xml; across machines problems do not change")
+        from robochoc.run.compatibility import scenario_refusal
+
+        raise click.UsageError(scenario_refusal(team, "robochoc master"))
     for option in ("gather_s", "timeout"):
         if given[option] is not None and not given[option] > 0:
             raise click.UsageError(f"--{option.removesuffix('_s')} takes a number of seconds, more than 0")
