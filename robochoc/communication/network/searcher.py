@@ -44,7 +44,6 @@ from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.explanation import KeyedConstraint, held_above
 
 
-
 @dataclass(frozen=True)
 class RobotContext:
     """What a searcher gets from the robot's connection to the run.

@@ -10,8 +10,7 @@ import pytest
 
 from robochoc.communication.simulator.channel import CHANNELS
 from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind, Relation, Semantics, Team
-from robochoc.run import alternatives
-from robochoc.run import solve
+from robochoc.run import alternatives, solve
 from robochoc.run.compatibility import refuse_options
 from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.run.registry import Offer, offers
