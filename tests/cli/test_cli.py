@@ -266,7 +266,9 @@ def test_the_example_of_the_documentation_is_solved(tmp_path: Path) -> None:
     done = robochoc("solve", ROOT / "docs" / "examples" / "scouts", "--html", tmp_path / "page.html")
     assert done.returncode == 0
     assert "Relay: V2 = 3" in done.stdout
-    assert (ROOT / "docs" / "examples" / "scouts" / "Relay.xml").read_text() in (ROOT / "README.md").read_text()
+    assert (ROOT / "docs" / "examples" / "scouts" / "Relay.xml").read_text() in (
+        ROOT / "docs" / "reference" / "format.md"
+    ).read_text()
 
 
 def test_the_jchoc_originals_get_a_verdict_distributed_and_central() -> None:

@@ -227,7 +227,7 @@ def test_a_team_without_topics_has_nothing_to_publish(tmp_path: Path) -> None:
         (("--battery", "nan", "--situation", "mcap:a"), "--battery"),
         (("--patience", "nan"), "--patience"),
         (("--report-timeout", "nan", "--situation", "mcap:a"), "--report-timeout"),
-        (("--report-timeout", "1"), "--report-timeout is for robots that are listened to"),
+        (("--report-timeout", "1"), "--report-timeout is for robots that report"),
         ((str(SCOUTS), "--ros", "mcap:a"), "--ros and --situation are for one team; 2 were found"),
     ],
 )
