@@ -1,29 +1,29 @@
-"""Runtimes by name, as installed packages offer them under the entry point group `robochoc.runtimes`.
+"""Runtimes by name: each is a function that opens a session.
 
-What is offered is a function that opens a session (`OpenSession`). It is imported when it is asked for: a run needs one
-runtime.
+It is found by its name and imported when it is asked for. A run needs one runtime, and the network is an extra that the
+core does not depend on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypedDict, assert_never, cast
+from pkgutil import resolve_name
+from types import MappingProxyType
+from typing import TYPE_CHECKING, TypedDict, assert_never
 
+from robochoc.communication.kill_schedule import KillSchedule
 from robochoc.communication.run_result import Progress
 from robochoc.communication.session import Session
 from robochoc.journal.events import Observer
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.options import Options, ScheduleName
+from robochoc.run.options import Options, Runtime, ScheduleName
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.system.installed import missing, named
 
 if TYPE_CHECKING:
     from robochoc.communication.simulator.schedule import Schedule
-
-GROUP = "robochoc.runtimes"
 
 
 class CommonArguments(TypedDict):
@@ -45,6 +45,7 @@ class SessionRequest:
         options: How to run.
         observer: Gets all events.
         progress: Gets the number of messages so far, now and then.
+        kills: The robots whose processes are to be killed.
     """
 
     protocol: type[Protocol]
@@ -53,6 +54,7 @@ class SessionRequest:
     options: Options
     observer: Observer | None = None
     progress: Callable[[Progress], None] | None = None
+    kills: KillSchedule | None = None
 
     @property
     def common(self) -> CommonArguments:
@@ -62,15 +64,21 @@ class SessionRequest:
 
 OpenSession = Callable[[SessionRequest], Session]
 
+OPENERS = MappingProxyType(
+    {
+        Runtime.PROCESSES: "robochoc.run.runtimes:open_processes",
+        Runtime.SIMULATOR: "robochoc.run.runtimes:open_simulator",
+        Runtime.NETWORK: "robochoc.run.networked.local_runtime:open_network",
+    }
+)
+"""Module and name of each runtime's `OpenSession`."""
+
 
 def open_session(request: SessionRequest) -> Session:
     """Return a session in the runtime that the options name. Raises `UnsupportedError` when it is not installed."""
-    name = str(request.options.runtime)
-    entries = named(GROUP, name)
-    if not entries:
-        raise UnsupportedError(missing(GROUP, "runtime", name))
+    name = request.options.runtime
     try:
-        opener = cast("OpenSession", entries[0].load())
+        opener: OpenSession = resolve_name(OPENERS[name])
     except ModuleNotFoundError as absent:
         raise UnsupportedError(f"--runtime {name} needs {absent.name}; say: pip install 'robochoc[{name}]'") from None
     return opener(request)
@@ -81,13 +89,16 @@ def open_processes(request: SessionRequest) -> Session:
     from robochoc.communication.processes.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
 
     options = request.options
-    return ProcessesRun(
+    session = ProcessesRun(
         request.team,
         request.protocol,
         survive=options.survives_losses,
         patience_s=options.patience,
         **request.common,
     )
+    if request.kills:
+        session.schedule_kills(request.kills, session.kill)
+    return session
 
 
 def open_simulator(request: SessionRequest) -> Session:

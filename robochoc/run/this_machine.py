@@ -169,9 +169,10 @@ class ThisMachine(Deployment):
     def _session(self, phase: Phase, compiled: CompiledTeam) -> Session:
         """Open a session of the phase's protocol."""
         context = self._context
-        return open_session(
-            SessionRequest(phase.protocol, compiled, phase.parameters, self.options, context.observer, context.progress)
+        request = SessionRequest(
+            phase.protocol, compiled, phase.parameters, self.options, context.observer, context.progress, context.kills
         )
+        return open_session(request)
 
     def _confirmed(self, alone: str | None = None, *, total: float = INFINITE, aside: float | None = None) -> bool:
         """Return whether the central solver agrees, if it is asked. For the arguments see `confirmed`."""

@@ -14,4 +14,7 @@ def open_network(request: SessionRequest) -> Session:
     settings = NetworkSettings(
         filters=options.filters, survive=options.survives_losses, patience_s=options.patience or PATIENCE_S
     )
-    return LocalNetwork(request.team, request.protocol, settings=settings, **request.common)
+    session = LocalNetwork(request.team, request.protocol, settings=settings, **request.common)
+    if request.kills:
+        session.master.schedule_kills(request.kills, session.kill)
+    return session
