@@ -180,7 +180,7 @@ def _search(how: Robots, protocol: type[Rally]) -> tuple[float, int]:
 
 def _session(how: Robots, protocol: type[Rally]) -> Session:
     if how.network:
-        return LocalNetwork(pair(), protocol, conditions=NetworkSettings(filters=how.filters))
+        return LocalNetwork(pair(), protocol, settings=NetworkSettings(filters=how.filters))
     return ProcessesRun(pair(), protocol)
 
 

@@ -8,10 +8,10 @@ from robochoc.cli.main import main
 from robochoc.communication.processes import robot_process
 
 
-def _take_no_place(name: str, order: Sequence[str]) -> None:
+def _set_no_niceness(name: str, order: Sequence[str]) -> None:
     """Stay as you are."""
 
 
 if __name__ == "__main__":
-    robot_process._take_place = _take_no_place  # noqa: SLF001 - what is being switched off
+    robot_process._set_niceness = _set_no_niceness  # noqa: SLF001 - what is being switched off
     main()

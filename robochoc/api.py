@@ -174,7 +174,7 @@ class AgentsContainer:
             return {name: robot.result() for name, robot in running.items()}
 
     def _robot(self, name: str, main: Address) -> Ending:
-        from robochoc.communication.network.manner import Manner  # noqa: PLC0415 - an extra
+        from robochoc.communication.network.robot_settings import RobotSettings  # noqa: PLC0415 - an extra
         from robochoc.run.networked.join import PATIENCE_S, identity_of, join  # noqa: PLC0415 - the same
         from robochoc.solver.compile import Compiler  # noqa: PLC0415 - the same
 
@@ -184,7 +184,7 @@ class AgentsContainer:
         robot = read_robot(file)
         identity = identity_of(name, main, *self._identities.get(name, (None, None)))
         with Compiler() as compiler:
-            return join(robot, main, identity, Manner(PATIENCE_S, sniffed=sniff), compiler)
+            return join(robot, main, identity, RobotSettings(PATIENCE_S, sniffed=sniff), compiler)
 
 
 def protocol_called(word: str) -> str:

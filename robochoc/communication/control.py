@@ -143,5 +143,7 @@ def unsealed(change: bytes) -> tuple[AgentProblem, Invalidated]:
     return part, void
 
 
-FromRobot = Ready | OpenQueues | Counters | Conclusion | Events | Report | Failed
+RobotMessage = Ready | Counters | Conclusion | Events
+"""What robots say during a search, in every runtime. How they report its end differs."""
+FromRobot = RobotMessage | OpenQueues | Report | Failed
 FromParent = Begin | Pause | Change | QueuesTo | QueueFrom | Wave

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import reduce
@@ -10,6 +11,19 @@ from typing import NamedTuple, Self
 
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.findings import Findings
+
+_MOST_NAMED = 5
+
+
+class RobotsLostError(Exception):
+    """Robots were lost whose loss ends the run. `robots` says why, by name."""
+
+    def __init__(self, robots: Mapping[str, str]) -> None:
+        losses = [f"{name} was lost: {why}" for name, why in itertools.islice(robots.items(), _MOST_NAMED)]
+        if len(robots) > _MOST_NAMED:
+            losses.append(f"and {len(robots) - _MOST_NAMED} others were lost")
+        super().__init__("; ".join(losses))
+        self.robots = dict(robots)
 
 
 class Progress(NamedTuple):

@@ -222,6 +222,10 @@ class AFC(Protocol):
             self.view, self.consistent = inconsistent, False
         self.sc = max(self.sc, sc)
 
+    def tried(self, index: int) -> bool:
+        """Return whether the value at `index` has been tried: values are taken in their order."""
+        return self.value is not None and index < self.value
+
 
 class FilteredDomain:
     """The own values and what is known of them under a partial assignment, without a check done twice.

@@ -27,6 +27,7 @@ matter. Messages are read by packets. That nobody speaks any more, and so a solu
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple, assert_never, cast
 
 from robochoc.model.message import Message, Value
@@ -101,6 +102,9 @@ class NogoodList:
         self._known: set[frozenset[tuple[str, Value]]] = set()
         self._waiting: dict[str, dict[Value, list[Kept]]] = {}
         self._awake: list[Kept] = []
+
+    def __iter__(self) -> Iterator[Mapping[str, Value]]:
+        return map(dict, self._known)
 
     def add(self, agent: str, nogood: dict[str, Value]) -> None:
         """Keep `nogood`, which names `agent`, whose list this is."""
@@ -252,6 +256,18 @@ class AWC(Protocol):
         if index not in self._conflicts:
             self._conflicts[index] = self.problem.conflict(index, self._higher)
         return self._conflicts[index]
+
+    # For replays
+
+    @property
+    def checked_against(self) -> Mapping[str, Value]:
+        """The values of robots of higher priority."""
+        return self._higher
+
+    @property
+    def kept_nogoods(self) -> Iterable[Mapping[str, Value]]:
+        """All nogoods received."""
+        return self.nogoods
 
     # The view
 

@@ -229,3 +229,7 @@ class BoundingProtocol(TreeProtocol):
         if self._last.get((receiver, type(said))) != said:
             self._last[receiver, type(said)] = said
             self.send(receiver, said)
+
+    def value_notes(self, index: int) -> Mapping[str, float]:
+        """Return LB(d) and UB(d) of the value at `index`."""
+        return {"LB": self.lower[index], "UB": self.upper[index]}

@@ -96,6 +96,7 @@ class DisFC(Protocol):
     """
 
     messages = Ok | Nogood | AddLink
+    numbered_values = True
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Brito and Meseguer 2003; PKC: Brito et al. 2009",

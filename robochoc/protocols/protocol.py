@@ -16,6 +16,7 @@ import msgspec
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.findings import NOTHING, Best, Findings
+from robochoc.protocols.inspectable import Inspectable
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
@@ -43,7 +44,7 @@ class Said(tuple[str, Message]):  # noqa: SLOT001 - no subclass of tuple can hav
     checks: int = 0
 
 
-class Protocol(ABC):
+class Protocol(Inspectable, ABC):
     """One robot's side of a protocol.
 
     Subclasses declare `messages`, the union of the message types that they receive, and their `traits`: what they
@@ -75,7 +76,7 @@ class Protocol(ABC):
     def receive(self, sender: str, message: Message) -> None:
         """Take in one message."""
 
-    def settle(self) -> None:  # noqa: B027 - a protocol that answers each message at once needs no settling
+    def settle(self) -> None:
         """The inbox has been drained: the time to look at the whole view and to decide."""
 
     def send(self, receiver: str, message: Message) -> None:

@@ -107,3 +107,7 @@ class SBT(Protocol):
             self.conclude(Verdict.NO_SOLUTION)
         else:
             self.send(self.order.names[self.rank - 1], Backtrack())
+
+    def tried(self, index: int) -> bool:
+        """Return whether the value at `index` has been tried: values are taken in their order."""
+        return self.value is not None and index < self.value

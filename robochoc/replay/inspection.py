@@ -1,26 +1,23 @@
-"""A look at what a robot knows at one moment, in words. Looking changes nothing, and no check is counted for it.
+"""What a robot knows at one moment, in words. Inspecting changes nothing, and no check is counted for it.
 
-Protocols that are known are understood: agent views, nogood stores, partial assignments, contexts and bounds. Of any
-other, attributes of these names and shapes are, and the rest is shown by what it is made of (`glance.py`).
+Agent views, nogood stores, partial assignments and contexts are found by the names and types of the protocol's
+attributes. A protocol says itself what else is special about its state (`protocols/inspectable.py`). All other
+attributes are shown by `safe_repr`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from itertools import islice
 from typing import Any
 
 from robochoc.model.message import Message, Value
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.afc import AFC
-from robochoc.protocols.awc import AWC, NogoodList
-from robochoc.protocols.bounding import BoundingProtocol
-from robochoc.protocols.disfc import DisFC
 from robochoc.protocols.nogood import NogoodStore
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.sbt import SBT
 from robochoc.replay.safe_repr import safe_repr
 from robochoc.replay.value_text import NumberedValueText, ValueText, as_value, cut
 from robochoc.solver.agent_problem import AgentProblem
@@ -37,8 +34,6 @@ VIEWS = ("view", "cpa", "path", "assignments", "context")
 """Attributes in which protocols keep what they know of others' values."""
 _KNOWN = {"problem", "order", "outbox", "value", "verdict", "chance", "settings", "store", "nogoods", "allowed"}
 """Attributes that are shown elsewhere, or say nothing."""
-
-_EMPTY = {"nothing", "none"}
 
 
 class Inspector:
@@ -65,8 +60,8 @@ class Inspector:
         """Who is known to have which value, or has said what last."""
         others = self._others(protocol)
         known = self._known(protocol)
-        if isinstance(protocol, DisFC):
-            pairs = {name: others.value(name, (number,)) for name, number in protocol.view.items()}
+        if protocol.numbered_values:
+            pairs = {name: others.value(name, (number,)) for name, number in vars(protocol)["view"].items()}
         elif known is not None:
             pairs = {name: others.told(name, value) for name, value in known.items()}
         else:
@@ -112,8 +107,9 @@ class Inspector:
     def own_value(self, protocol: Protocol, index: int) -> str:
         """The value at `index`, with what it costs where anything does."""
         text = self._own.told(self.agent, protocol.problem.values[index])
-        if isinstance(protocol, BoundingProtocol):
-            return f"{text} (LB {safe_repr(protocol.lower[index])}, UB {safe_repr(protocol.upper[index])})"
+        notes = protocol.value_notes(index)
+        if notes:
+            return f"{text} ({', '.join(f'{name} {safe_repr(number)}' for name, number in notes.items())})"
         if protocol.traits.costs:
             cost = self._problem.cost(index, self._seen(protocol))
             return f"{text} (costs {safe_repr(cost)})" if cost < INFINITE else text
@@ -134,8 +130,7 @@ class Inspector:
         if broken is not None:
             lhs, key = broken
             return f"{self._own.all(lhs) or 'its own constraints'}, by {cut(key.partition(':')[2])}", lhs
-        tried = isinstance(protocol, AFC | SBT) and protocol.value is not None and index < protocol.value
-        return ("a try: nobody below could go on with it", ()) if tried else None
+        return ("a try: nobody below could go on with it", ()) if protocol.tried(index) else None
 
     def nogoods(self, protocol: Protocol) -> list[str]:
         """The nogoods that are kept: while V1.1 = 2: V2.1 != 3."""
@@ -157,16 +152,15 @@ class Inspector:
         for name, thing in vars(protocol).items():
             if name in skipped or (ours and name.startswith("_")) or len(told) == MOST_ELSE:
                 continue
-            shown = safe_repr(thing)
-            if not (ours and shown in _EMPTY):
-                told.setdefault(name.lstrip("_"), shown)
+            if not (ours and _is_empty(thing)):
+                told.setdefault(name.lstrip("_"), safe_repr(thing))
         return told
 
     # What is known of others
 
     def _others(self, protocol: Protocol) -> ValueText:
         """How others' values are said: some protocols never tell them, but number them."""
-        return NumberedValueText(self._part.interfaces) if isinstance(protocol, DisFC) else self._own
+        return NumberedValueText(self._part.interfaces) if protocol.numbered_values else self._own
 
     def _view_in(self, protocol: Protocol) -> str:
         """The attribute that holds what is known of others' values; empty where there is none."""
@@ -186,19 +180,17 @@ class Inspector:
         return {who: value for who, value in found.items() if who in self._part.interfaces}
 
     def _seen(self, protocol: Protocol) -> dict[str, Value]:
-        """What of that rules values out, as constraints can be asked about it; what others have said will do.
-
-        In AWC it is only what robots of higher priority have taken.
-        """
-        known = vars(protocol)["_higher"] if isinstance(protocol, AWC) else self._known(protocol)
+        """Return the values that own values are checked against; where none are kept, what others have said."""
+        known = protocol.checked_against
+        if known is None:
+            known = self._known(protocol)
         if known is None:
             known = self._told
         widths = self._part.interfaces
         return {name: value for name, value in known.items() if len(value) == len(widths.get(name, ()))}
 
     def _nogoods(self, protocol: Protocol) -> list[tuple[str, str]]:
-        kept = vars(protocol)
-        store, known = kept.get("store"), kept.get("nogoods")
+        store = vars(protocol).get("store")
         values = protocol.problem.values
         if isinstance(store, NogoodStore):
             others = self._others(protocol)
@@ -207,11 +199,9 @@ class Inspector:
                 for index in range(len(values))
                 if (lhs := store[index]) is not None
             ]
-        if isinstance(known, NogoodList):
-            return [self._awc(dict(nogood)) for nogood in vars(known)["_known"]]
-        return []
+        return [self._both_sides(dict(nogood)) for nogood in protocol.kept_nogoods]
 
-    def _awc(self, nogood: dict[str, Value]) -> tuple[str, str]:
+    def _both_sides(self, nogood: dict[str, Value]) -> tuple[str, str]:
         own = nogood.pop(self.agent, ())
         lhs = sorted(nogood.items(), key=lambda pair: self._part.order.index(pair[0]))
         return self._own.all(lhs), self._own.against(self.agent, own)
@@ -231,3 +221,7 @@ def _value_in(thing: object) -> Value | None:
     if value is None and isinstance(thing, Sequence) and thing and not isinstance(thing, str | bytes):
         value = as_value(thing[0])
     return value
+
+
+def _is_empty(thing: object) -> bool:
+    return thing is None or (isinstance(thing, Mapping | Sequence | AbstractSet) and not thing)

@@ -19,8 +19,6 @@ MOST_BACKTRACKS = 3
 """In one step: after each, a robot may find that no value is left again."""
 MOST_TOGETHER = 3
 """Values that are named where one reason rules out several."""
-BACKTRACKS = {"Nogood", "Backtrack", "BacktrackCPA"}
-"""Types of messages by which robots say that they have no value left."""
 
 _CONCLUDED = {
     Verdict.NO_SOLUTION: "that there is no solution",
@@ -57,7 +55,7 @@ class Reasons:
     def listen(self, receiver: str, message: Message) -> None:
         """The robot says `message`: where that is because no value is left, what rules each out is known now only."""
         kind = type(message).__name__
-        if kind not in BACKTRACKS:
+        if not message.backtracks:
             return
         if self._store() is not None and self._protocol.value is not None:
             return  # it has a value, and rules out another robot's

@@ -1,103 +1,96 @@
-"""Whatever a protocol keeps, in a few words: bounded in length, depth and size, and never raising.
-
-Protocols, ours and others', may keep anything: what is not known here is shown by what it is made of.
-"""
+"""A `repr` of anything that a protocol keeps: bounded in length, depth and size, and it never raises."""
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import reprlib
+from collections.abc import Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from itertools import islice
-
-import msgspec
 
 from robochoc.protocols.order import PriorityOrder
 from robochoc.replay.value_text import cut
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.compiled import LocalProblem
 
-DEEPEST = 3
-"""So many levels of what things are made of are shown."""
-MOST = 12
-"""Of a collection, so many entries."""
-LONGEST = 200
-_SETTING = (LocalProblem, PriorityOrder, AgentProblem)
-"""What many things hold, and what says nothing of them."""
+MAX_DEPTH = 3
+MAX_ENTRIES = 12
+"""Of a collection."""
+MAX_LENGTH = 200
+"""Characters."""
+_CONTEXT = (LocalProblem, PriorityOrder, AgentProblem)
+"""What many objects refer to, and what is no state of theirs."""
 
 
 def safe_repr(thing: object) -> str:
-    """`thing` in at most `LONGEST` characters."""
+    """Return `thing` in at most `MAX_LENGTH` characters."""
     try:
         if isinstance(thing, PriorityOrder):
-            return cut(" > ".join(thing.names), LONGEST)
-        return cut(_shown(thing, DEEPEST), LONGEST)
-    except Exception as error:  # noqa: BLE001 - somebody else's object may do anything when it is looked at
-        return f"a {type(thing).__name__} that cannot be shown ({type(error).__name__})"
+            return cut(" > ".join(thing.names), MAX_LENGTH)
+        return cut(_repr.repr(thing), MAX_LENGTH)
+    except Exception as error:  # noqa: BLE001 - another package's object may do anything when it is shown
+        return f"<{type(thing).__name__} cannot be shown: {type(error).__name__}>"
 
 
-def _shown(thing: object, depth: int) -> str:
-    plain = _plain(thing)
-    if plain is not None or not depth:
-        return plain or "..."
+class _Repr(reprlib.Repr):
+    """Shows objects by their fields, subclasses of collections as collections, and large bytes by their size."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel = MAX_DEPTH
+        self.maxdict = self.maxlist = self.maxtuple = self.maxset = self.maxfrozenset = self.maxdeque = MAX_ENTRIES
+        self.maxstring = self.maxother = MAX_LENGTH
+
+    def repr_int(self, number: int, level: int) -> str:
+        return repr(number) if number.bit_length() < MAX_LENGTH else self.repr_float(float(number), level)
+
+    def repr_float(self, number: float, _: int) -> str:
+        return f"{number:g}"
+
+    def repr_bytes(self, content: bytes, _: int) -> str:
+        return f"<{len(content):,} bytes>"
+
+    def repr_bool(self, flag: bool, _: int) -> str:  # noqa: FBT001 - as the others
+        return str(flag)
+
+    def repr_NoneType(self, nothing: None, _: int) -> str:  # noqa: N802 - the type's name
+        return str(nothing)
+
+    def repr_instance(self, thing: object, level: int) -> str:
+        collection = _as_builtin(thing)
+        if collection is not None:
+            return self.repr1(collection, level)
+        shape = getattr(thing, "shape", None)
+        if isinstance(shape, tuple):  # of numpy, which need not be imported for it
+            return f"<array of {' x '.join(map(str, shape))}>"
+        if callable(thing):
+            return getattr(thing, "__name__", type(thing).__name__)
+        return self._fields_of(type(thing).__name__, _fields(thing), level)
+
+    def _fields_of(self, name: str, fields: Iterable[tuple[str, object]], level: int) -> str:
+        if level <= 0:
+            return f"{name}(...)"
+        own = ((field, value) for field, value in fields if not isinstance(value, _CONTEXT))
+        shown = [f"{field.lstrip('_')}={self.repr1(value, level - 1)}" for field, value in islice(own, MAX_ENTRIES)]
+        return f"{name}({', '.join(shown)})"
+
+
+def _as_builtin(thing: object) -> dict[object, object] | list[object] | set[object] | None:
+    """Return a collection of a type of its own as one of Python's; None if it is no collection."""
     if isinstance(thing, Mapping):
-        return _listed((f"{_shown(k, depth - 1)}: {_shown(v, depth - 1)}" for k, v in thing.items()), len(thing))
-    fields = getattr(type(thing), "_fields", None)
-    if isinstance(thing, tuple) and isinstance(fields, tuple):  # a named one
-        return _named(type(thing).__name__, zip(fields, thing, strict=False), depth)
-    if isinstance(thing, Sequence | AbstractSet | deque):
-        parts: Iterator[str] = (_shown(part, depth - 1) for part in thing)
-        if isinstance(thing, AbstractSet) and len(thing) <= MOST:
-            parts = iter(sorted(parts))
-        listed = _listed(parts, len(thing))
-        return f"({listed})" if thing and depth < DEEPEST else listed
-    return _object(thing, depth)
+        return dict(islice(thing.items(), MAX_ENTRIES + 1))
+    if isinstance(thing, AbstractSet):
+        return set(thing)
+    if isinstance(thing, Sequence) and not hasattr(type(thing), "_fields"):
+        return list(islice(thing, MAX_ENTRIES + 1))
+    return None
 
 
-def _plain(thing: object) -> str | None:
-    """What is not made of anything else; None where `thing` is."""
-    match thing:
-        case None:
-            return "none"
-        case bool():
-            return "yes" if thing else "no"
-        case int() | float():
-            return _number(thing)
-        case str():
-            return cut(thing)
-        case bytes() | bytearray() | memoryview():
-            return f"{len(thing):,} bytes"
-        case _:
-            return None
+def _fields(thing: object) -> Iterable[tuple[str, object]]:
+    """Return the fields of a named tuple, a struct, or an object with a `__dict__`."""
+    names = getattr(type(thing), "_fields", getattr(type(thing), "__struct_fields__", None))
+    if isinstance(names, tuple):
+        return ((name, getattr(thing, name)) for name in names)
+    return getattr(thing, "__dict__", {}).items()
 
 
-def _number(number: float) -> str:
-    return f"{number:,}" if isinstance(number, int) and number.bit_length() < LONGEST else f"{number:g}"
-
-
-def _object(thing: object, depth: int) -> str:
-    name = type(thing).__name__
-    if isinstance(thing, msgspec.Struct):
-        return _named(name, ((field, getattr(thing, field)) for field in thing.__struct_fields__), depth)
-    shape = getattr(thing, "shape", None)
-    if isinstance(shape, tuple):  # numpy's, which is not imported for the sake of one question
-        return f"a table of {' x '.join(map(str, shape))}"
-    if callable(thing):
-        return getattr(thing, "__name__", name)
-    own = getattr(thing, "__dict__", None)
-    return _named(name, own.items(), depth) if isinstance(own, dict) else f"a {name}"
-
-
-def _named(name: str, fields: Iterable[tuple[str, object]], depth: int) -> str:
-    own = ((field, value) for field, value in fields if not isinstance(value, _SETTING))
-    told = [f"{field.lstrip('_')} {_shown(value, depth - 1)}" for field, value in islice(own, MOST)]
-    return f"{name}({', '.join(told)})" if told else name
-
-
-def _listed(parts: Iterator[str], count: int) -> str:
-    """The first entries, and how many more there are."""
-    shown = list(islice(parts, MOST))
-    if not shown:
-        return "nothing"
-    more = f", {count - len(shown):,} more" if count > len(shown) else ""
-    return f"{', '.join(shown)}{more}"
+_repr = _Repr()

@@ -10,8 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
 
-from robochoc.communication.processes.robot_link import RobotsLostError
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.run_result import RobotsLostError, RunResult
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.protocol import Protocol

@@ -66,7 +66,7 @@ def _network(protocol: type[Protocol], team: CompiledTeam, options: Options, res
         ) from None
     survive, patience_s = options.on_loss is OnLoss.WITHDRAW, options.patience or PATIENCE_S
     conditions = NetworkSettings(filters=options.filters, survive=survive, patience_s=patience_s)
-    return LocalNetwork(team, protocol, conditions=conditions, **rest)
+    return LocalNetwork(team, protocol, settings=conditions, **rest)
 
 
 def schedule_of(options: Options) -> Schedule:

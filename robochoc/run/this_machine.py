@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
-from robochoc.communication.processes.robot_link import RobotsLostError
+from robochoc.communication.run_result import RobotsLostError
 from robochoc.communication.session import Epoch, Session
 from robochoc.model.orders import Order, compute_order, with_dom_deg_order
 from robochoc.model.outcome import EpochOutcome, Metrics, Verdict

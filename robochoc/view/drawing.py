@@ -151,7 +151,7 @@ def _draw_ground(meshcat: MeshcatCommands, scene: Scene, extent: _Corners) -> No
     meshcat.mesh("ground/plane", plane, _GROUND, opacity=0.3)
     meshcat.place("ground/plane", (0, 0, scene.ground - 0.02))
     if scene.drones:
-        paint = paints(scene.drones)
+        paint = row_colours(scene.drones)
         pads = [disc(drone.home, 0.36, colour) for drone, colour in zip(scene.drones, paint, strict=True)]
         meshcat.mesh("ground/pads", joined(pads), _WHITE, opacity=0.45)
         meshcat.place("ground/pads", (0, 0, -0.01))
@@ -212,7 +212,7 @@ def _draw_drones(
     meshcat: MeshcatCommands, drones: Sequence[DrawnDrone], points: Sequence[Point], radius: float
 ) -> None:
     texts = _texts([drone.name for drone in drones], _READABLE * radius)
-    drawn = zip(drones, points, texts, paints(drones), strict=True)
+    drawn = zip(drones, points, texts, row_colours(drones), strict=True)
     for number, (drone, point, text, colour) in enumerate(drawn):
         path = path_of(number, drone.name)
         meshcat.mesh(f"{path}/body", quadrotor(), colour)
@@ -230,7 +230,7 @@ def _draw_obstacles(meshcat: MeshcatCommands, obstacles: Sequence[Point]) -> Non
 
 
 def _animate(meshcat: MeshcatCommands, drones: Sequence[DrawnDrone], playback: Playback) -> None:
-    paint = paints(drones)
+    paint = row_colours(drones)
     tracks: list[Track] = []
     for number, (drone, colour) in enumerate(zip(drones, paint, strict=True)):
         path = path_of(number, drone.name)
@@ -267,7 +267,7 @@ def _painting(path: str, states: Sequence[tuple[float, DroneState]], colour: Col
     keys: list[tuple[float, Colour]] = [(0, colour)]
     for at_s, look in states:
         begin, now = max(FPS * at_s, keys[-1][0]), keys[-1][1]
-        keys += [(begin, now), (begin + _FADE, tint(look, colour))]
+        keys += [(begin, now), (begin + _FADE, colour_of(look, colour))]
     return Track(path, "material.color", "color", keys)
 
 
@@ -293,14 +293,14 @@ def _write(meshcat: MeshcatCommands, path: str, text: str, at: npt.NDArray[np.fl
     meshcat.place(path, (x, y, z), (height * picture.aspect, height, 1))
 
 
-def paints(drones: Sequence[DrawnDrone]) -> list[Colour]:
+def row_colours(drones: Sequence[DrawnDrone]) -> list[Colour]:
     """The colour of each drone: that of its row."""
     groups = sorted({drone.group for drone in drones})
     shades = dict(zip(groups, colours(len(groups)), strict=True))
     return [shades[drone.group] for drone in drones]
 
 
-def tint(look: DroneState, colour: Colour) -> Colour:
+def colour_of(look: DroneState, colour: Colour) -> Colour:
     """What a drone states like, if it is of that `colour` by itself."""
     match look:
         case DroneState.FLIES:

@@ -73,7 +73,7 @@ class MeshcatCommands:
         self._keep(self._drawing(path, three.LineSegments(three.PointsGeometry(points.T), material)))
 
     def sprite(self, path: str, svg: str) -> None:
-        """A picture at `path`, one unit wide and high before it is placed, that always faces the viewer."""
+        """Put a picture at `path`, one unit wide and high. It faces the viewer, and nothing covers it."""
         # meshcat's Python side has no sprites, but its viewer draws them: this is three.js's own format.
         picture = f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"
         material = {"uuid": "material", "type": "SpriteMaterial", "map": "texture", "transparent": True}
@@ -82,7 +82,7 @@ class MeshcatCommands:
             "geometries": [],
             "images": [{"uuid": "image", "url": picture}],
             "textures": [{"uuid": "texture", "image": "image"}],
-            "materials": [{**material, "depthWrite": False}],
+            "materials": [{**material, "depthWrite": False, "depthTest": False}],
             "object": {"uuid": f"{path} object", "type": "Sprite", "material": "material"},
         }
         self._keep({"type": "set_object", "path": self._at(path).path.lower(), "object": sprite})

@@ -1,18 +1,22 @@
-// Whose name is written beside it: of names that would cover each other, that of the drone nearest to the viewer.
+// Labels that can be read: none is too small, and of those that would cover each other one is shown. Names of axes come
+// first, then the drone that is followed, then the drones nearest to the viewer, then the numbers of axes.
 class Names {
   static EVERY = 200; // milliseconds
-  static STAYS = 0.9; // so much nearer counts whose name is there already: names do not flicker
-  static ROOM = 0.85; // in which a name stands alone, in sizes of its picture
+  static STAYS = 0.9; // the depth of a label that is shown already counts less, so that labels do not flicker
+  static ROOM = 0.85; // in which a label stands alone, in sizes of its picture
+  static HEIGHT_MIN = 16; // pixels of a label's picture: its text is then 11 pixels high
+  static LARGER_MAX = 2.5;
 
-  // `names` are the scene's objects, in the order of the drones.
-  constructor(viewer, names) {
+  // `names` are the scene's objects in the order of the drones; `axes` is the object that holds the labels of axes.
+  constructor(viewer, names, axes) {
     this.viewer = viewer;
     this.names = names;
+    this.axes = axes;
     this.due = 0;
     this.followed = -1;
   }
 
-  // Once a frame. What moves slowly needs no more than a few states a second.
+  // Once a frame. What moves slowly needs no more than a few looks a second.
   step(now) {
     if (now < this.due) return;
     this.due = now + Names.EVERY;
@@ -20,31 +24,49 @@ class Names {
   }
 
   choose() {
-    const boxes = this.names.map((name, number) => this.box(name, number)).filter((box) => box);
+    const boxes = [
+      ...this.axes.children.map((label) => this.box(label, label.name.includes(" ") ? 1e9 : -1)),
+      ...this.names.map((label, number) => this.box(label, number === this.followed ? 0 : null)),
+    ].filter((box) => box);
     boxes.sort((one, other) => one.rank - other.rank);
     const shown = [];
     for (const box of boxes)
       if (!shown.some((other) => Math.abs(box.x - other.x) < box.width + other.width && Math.abs(box.y - other.y) < box.height + other.height))
         shown.push(box);
-    const wanted = new Set(shown.map((box) => box.name));
-    for (const { name } of boxes) {
-      if (name.visible !== wanted.has(name)) this.viewer.set_dirty();
-      name.visible = wanted.has(name);
+    const wanted = new Set(shown.map((box) => box.label));
+    for (const { label } of boxes) {
+      if (label.visible !== wanted.has(label)) this.viewer.set_dirty();
+      label.visible = wanted.has(label);
     }
   }
 
-  // Where a name is in the window, half as wide and as high as its text; nothing behind the viewer.
-  box(name, number) {
+  // Where a label is in the window, half as wide and as high as its text; nothing behind the viewer.
+  box(label, rank) {
     const THREE = MeshCat.THREE;
     const lens = this.viewer.camera;
-    const spot = name.getWorldPosition(new THREE.Vector3());
-    const size = name.getWorldScale(new THREE.Vector3());
+    const spot = label.getWorldPosition(new THREE.Vector3());
+    const size = label.getWorldScale(new THREE.Vector3());
     const depth = -spot.clone().applyMatrix4(lens.matrixWorldInverse).z;
     if (depth <= lens.near) return null;
     const { x, y } = spot.project(lens);
-    const half = Names.ROOM / 2 / depth / Math.tan(lens.fov * Math.PI / 360);
-    const rank = number === this.followed ? 0 : depth * (name.visible ? Names.STAYS : 1);
-    // In halves of the window's height.
-    return { name, rank, x: x * innerWidth / innerHeight, y, width: half * size.x, height: half * size.y };
+    const half = 1 / 2 / depth / Math.tan(lens.fov * Math.PI / 360); // of a unit of length, in halves of the window's height
+    const larger = this.enlarge(label, Math.min(Math.max(Names.HEIGHT_MIN / (half * size.y * innerHeight), 1), Names.LARGER_MAX));
+    const height = half * size.y;
+    return {
+      label, x: x * innerWidth / innerHeight, y: y + height * (larger - 1),
+      rank: rank ?? depth * (label.visible ? Names.STAYS : 1),
+      width: Names.ROOM * half * size.x * larger, height: Names.ROOM * height * larger,
+    };
+  }
+
+  // The label's picture grows upwards: it does not cover what it names.
+  enlarge(label, larger) {
+    const picture = label.children.find((child) => child.isSprite);
+    if (picture && Math.abs(picture.scale.y - larger) > 0.02) {
+      picture.scale.set(larger, larger, 1);
+      picture.center.set(0.5, 0.5 / larger);
+      this.viewer.set_dirty();
+    }
+    return larger;
   }
 }

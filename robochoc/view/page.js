@@ -28,7 +28,7 @@ try {
   const camera = new Camera(viewer, playback.corners, playback.cell, free, still);
   const fit = () => { trails.resize(); camera.fit(); timeline?.spread(); };
   const drones = playback.drones.map((drone) => object(drone.path));
-  const names = new Names(viewer, playback.drones.map((drone) => object(`${drone.path}/name`)));
+  const names = new Names(viewer, playback.drones.map((drone) => object(`${drone.path}/name`)), object("axes"));
 
   const frame = (now) => {
     player.step(now);

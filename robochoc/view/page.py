@@ -14,6 +14,7 @@ from string import Template
 from robochoc.view.content_security import content_security_policy
 from robochoc.view.drawing import commands
 from robochoc.view.label import printable
+from robochoc.view.legend import legend
 from robochoc.view.playback_json import playback_json
 from robochoc.view.scene import Scene
 from robochoc.view.script import viewer_script
@@ -41,6 +42,7 @@ def _filled(scene: Scene, embedded: str, connections: str) -> bytes:
             policy=content_security_policy((viewer, player), connections),
             title=_text(scene.title),
             facts="".join(f"<dt>{_text(name)}</dt><dd>{_text(fact)}</dd>" for name, fact in scene.facts),
+            legend=legend(scene),
             commands=embedded,
             playback=playback_json(scene),
             viewer=viewer,

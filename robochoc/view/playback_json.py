@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from robochoc.view.drawing import cell_of, corners, paints, path_of, tint
+from robochoc.view.drawing import cell_of, colour_of, corners, path_of, row_colours
 from robochoc.view.label import printable
 from robochoc.view.palette import web
 from robochoc.view.playback import Playback
@@ -30,13 +30,13 @@ def playback_json(scene: Scene) -> str:
 
 def _drones(scene: Scene) -> Iterator[dict[str, Any]]:
     states = scene.playback.states if scene.playback else ((),) * len(scene.drones)
-    drawn = zip(scene.drones, paints(scene.drones), states, strict=True)
+    drawn = zip(scene.drones, row_colours(scene.drones), states, strict=True)
     for number, (drone, colour, changes) in enumerate(drawn):
         yield {
             "name": printable(drone.name),
             "path": path_of(number, drone.name),
             "colour": web(colour),
-            "states": [[round(at_s, 3), look.value, web(tint(look, colour))] for at_s, look in changes],
+            "states": [[round(at_s, 3), look.value, web(colour_of(look, colour))] for at_s, look in changes],
         }
 
 

@@ -118,11 +118,11 @@ def _flight_facts(flown: FlightLog | None, why_not: str, *, is_to_scale: bool) -
         return
     yield "flown", f"{flown.times[-1]:.1f} s{'' if is_to_scale else ', not to scale'}"
     if flown.nearest and is_to_scale:
-        yield "nearest", f"{flown.nearest.distance_m:.2f} m (set: {flown.distance:.2g} m)"
+        yield "separation", f"{flown.nearest.distance_m:.2f} m (required: {flown.distance:.2g} m)"
     for number, event in fell(flown).items():
         yield "fallen", f"{flown.names[number]} ({event.what})"
     if flown.nearest_fallen and is_to_scale:
-        yield "to others", f"{flown.nearest_fallen.distance_m:.2f} m at the nearest"
+        yield "from fallen", f"{flown.nearest_fallen.distance_m:.2f} m"
 
 
 def _facts(outcome: Outcome, mission: Mission) -> tuple[tuple[str, str], ...]:

@@ -82,7 +82,7 @@ def test_robots_are_chosen_grouped_and_reordered(page: Page) -> None:
     until(lambda: heads(page) == ["Robot2.*", "others"], "the group has no lifeline")
     page.locator(".head").first.click()
     until(lambda: len(heads(page)) == 5, "the group does not open")
-    page.get_by_role("button", name="As at first").click()
+    page.get_by_role("button", name="Reset").click()
     until(lambda: heads(page) == TRACE.robots, "not as at first")
 
 
@@ -234,6 +234,7 @@ def test_a_reload_shows_the_same(loaded: Page) -> None:
     page.click("#tab-filters")
     page.get_by_role("checkbox", name=re.compile("^Nogood")).uncheck()
     choose(page, 20)
+    page.click("#display summary")
     page.select_option("#colour", "sender")
     page.click("#zoom-in")
     written = ("rowHeight=30", "selected=20", "colourBy=sender")

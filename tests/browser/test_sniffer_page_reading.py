@@ -93,7 +93,7 @@ def test_what_is_chosen_stays_in_sight(page: Page) -> None:
     page.get_by_role("button", name="Only these").click()
     until(lambda: page.evaluate("Sniffer.page.filter.length") < COUNT, "no choice")
     assert page.evaluate(IN_SIGHT, 300)
-    page.get_by_role("button", name="As at first").click()
+    page.get_by_role("button", name="Reset").click()
     text_is(page, "#counts", ALL)
     assert page.input_value("#robots input[type=search]") == ""
     for layout in ("chart", "table", "both"):
@@ -117,6 +117,7 @@ def test_all_lifelines_are_in_the_window_and_no_column_is_beyond_it(page: Page) 
     assert said != FEED.words(100)
     for width in (1400, 1000):
         page.set_viewport_size({"width": width, "height": 800})
+        page.locator("#display").evaluate("menu => { menu.open = true; }")
         page.click("#fit")
         until(
             lambda: page.evaluate("Sniffer.page.chart.shape.breadth <= Sniffer.page.chart.shape.width + 1"),

@@ -168,7 +168,7 @@ FEED = """
 import json, sys
 from pathlib import Path
 from robochoc.journal.journal import read_journal
-from robochoc.sniffer.page_data import Feed
+from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.trace import Trace
 feed = PageData(Trace.of(read_journal(Path(sys.argv[1]).read_bytes())))
 about, details = json.loads(feed.about()), json.loads(feed.details(0))

@@ -143,7 +143,7 @@ def letters(receiver: str) -> Sequence[bytes]:
             words.Sniffable(2, "run", ""),
             words.Leave("solved", failed=False),
         ]
-        said += [words.Said(epoch, 5, b"\x92\xa2Ok\x91\x01"), words.Copies(epoch, records()[0])]
+        said += [words.ProtocolMessage(epoch, 5, b"\x92\xa2Ok\x91\x01"), words.Copies(epoch, records()[0])]
     return [_packed(["run", place + 1, word]) for place, word in enumerate(said)]
 
 

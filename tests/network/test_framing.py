@@ -22,8 +22,8 @@ from robochoc.communication.network.control_messages import (
     Joined,
     Judge,
     Leave,
+    ProtocolMessage,
     Register,
-    Said,
     Sniff,
     Sniffable,
     Task,
@@ -58,8 +58,8 @@ def pair(sender: str = "R1", receiver: str = "R2", run: str = "run") -> tuple[Fr
     return Framing(sender, run), Framing(receiver, run)
 
 
-def said(number: int) -> Said:
-    return Said(1, number, b"%d" % number)
+def said(number: int) -> ProtocolMessage:
+    return ProtocolMessage(1, number, b"%d" % number)
 
 
 TEXTS = st.text(max_size=5)
@@ -70,19 +70,19 @@ SPECIAL: dict[type[Word], st.SearchStrategy[Word]] = {
     Account: st.builds(
         Account,
         NUMBERS,
-        st.booleans(),
         st.dictionaries(TEXTS, NUMBERS, max_size=2),
         st.builds(Metrics, st.dictionaries(TEXTS, NUMBERS, max_size=2), NUMBERS, NUMBERS, NUMBERS),
         st.just(
             Findings(best=Best(3, {"R1": (1, None)}), place=PseudoTreeNode("R0", ("R2",)), trail=Trail([(0, 1)], 4))
         ),
+        st.booleans(),
         st.dictionaries(TEXTS, st.builds(Exchanged, NUMBERS, NUMBERS, NUMBERS), max_size=2),
     ),
     Gap: st.builds(Gap, TEXTS, st.integers(1, 2**53)),
     Register: st.builds(Register, st.just(PROFILE), TEXTS),
     Events: st.just(Events([Received(t=1.5, sender="R1", receiver="R2", type="Ok", clock=3)])),
     Judge: st.builds(Judge, NUMBERS, st.dictionaries(TEXTS, NUMBERS)),
-    Said: st.builds(Said, NUMBERS, st.integers(0, LATEST), st.binary(max_size=5)),
+    ProtocolMessage: st.builds(ProtocolMessage, NUMBERS, st.integers(0, LATEST), st.binary(max_size=5)),
     Task: st.builds(
         Task,
         epoch=NUMBERS,
@@ -230,20 +230,20 @@ def test_words_before_a_run_have_no_number() -> None:
 def test_a_letter_that_is_too_large_is_not_written_and_uses_no_number() -> None:
     writer, reader = pair()
     with pytest.raises(MessageTooLargeError, match=r"R1 to R2 has 8,\d\d\d,\d\d\d bytes, more than 8,388,608"):
-        writer.write("R2", Said(1, 0, bytes(LARGEST_LETTER)))
+        writer.write("R2", ProtocolMessage(1, 0, bytes(LARGEST_LETTER)))
     assert reader.read("R1", writer.write("R2", said(1))).number == 1
 
 
 def test_a_letter_that_is_too_large_is_not_read() -> None:
-    content = msgspec.msgpack.encode(Letter("run", 1, Said(1, 0, bytes(LARGEST_LETTER))))
+    content = msgspec.msgpack.encode(Letter("run", 1, ProtocolMessage(1, 0, bytes(LARGEST_LETTER))))
     with pytest.raises(FrameRefusedError, match="more than 8,388,608"):
         pair()[1].read("R1", content)
 
 
 def test_the_largest_letter_passes() -> None:
     writer, reader = pair()
-    spare = len(msgspec.msgpack.encode(Letter("run", 1, Said(1, 0, bytes(70_000))))) - 70_000
-    content = writer.write("R2", Said(1, 0, bytes(LARGEST_LETTER - spare)))
+    spare = len(msgspec.msgpack.encode(Letter("run", 1, ProtocolMessage(1, 0, bytes(70_000))))) - 70_000
+    content = writer.write("R2", ProtocolMessage(1, 0, bytes(LARGEST_LETTER - spare)))
     assert len(content) == LARGEST_LETTER
     assert reader.read("R1", content).number == 1
 
@@ -291,7 +291,7 @@ LETTERS = [
         ("R1", MASTER, Failed("why", unsupported=True)),
         ("R1", MASTER, Counters(1, 2, 3, 4)),
         (MASTER, "R1", Leave("over", failed=False)),
-        ("R1", "R2", Said(1, 3, b"content")),
+        ("R1", "R2", ProtocolMessage(1, 3, b"content")),
         ("R1", "R2", Copies(1, b"")),
     )
 ]

@@ -36,7 +36,7 @@ def test_robots_tell_of_themselves_only() -> None:
     told: list[AnyEvent] = []
     chronicle = MasterEvents(told.append)
     own, others = (Decided(t=3.0, robot=name, assignment={"V": 1}, clock=1) for name in "AB")
-    chronicle.told("A", [own, others, own])
+    chronicle.relay_from("A", [own, others, own])
     assert [event for event in told if isinstance(event, Decided)] == [own, own]
     assert [(event.who, event.what) for event in told if isinstance(event, Refused)] == [("A", "tell of Decided")]
 
@@ -53,8 +53,8 @@ def test_who_tells_more_than_robots_have_to_tell_is_refused(monkeypatch: pytest.
     chronicle = MasterEvents(told.append)
     flood = [Decided(t=3.0, robot="A", assignment={}, clock=1)] * EVENTS_A_SECOND
     for _ in range(int(BURST_S) + 3):
-        chronicle.told("A", flood)
-    chronicle.told("B", [Decided(t=3.0, robot="B", assignment={}, clock=1)])
+        chronicle.relay_from("A", flood)
+    chronicle.relay_from("B", [Decided(t=3.0, robot="B", assignment={}, clock=1)])
     decided = [event.robot for event in told if isinstance(event, Decided)]
     assert (decided.count("A"), decided.count("B")) == (BURST_S * EVENTS_A_SECOND, 1)
     refused = [event for event in told if isinstance(event, Refused)]

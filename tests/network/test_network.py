@@ -8,8 +8,7 @@ import pytest
 
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.settings import NetworkSettings
-from robochoc.communication.processes.robot_link import RobotsLostError
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.run_result import RobotsLostError, RunResult
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Decided, Lost, Received, Refused, Registered, Sent
 from robochoc.model.outcome import Verdict
@@ -36,15 +35,15 @@ MANY = ("abt", "afc-ng", "awc", "dynabt", "sbt", "agile-abt", "afc-tree", "sfb",
 def run_over_network(
     team: Team | CompiledTeam,
     protocol: str,
-    conditions: NetworkSettings = NetworkSettings(),
+    settings: NetworkSettings = NetworkSettings(),
     events: list[AnyEvent] | None = None,
 ) -> tuple[RunResult, tuple[bool, float] | None]:
     """The result, and what the robots themselves say of the values that were decided."""
     observer = None if events is None else events.append
-    with LocalNetwork(team, protocol_named(protocol), conditions=conditions, observer=observer) as network:
+    with LocalNetwork(team, protocol_named(protocol), settings=settings, observer=observer) as network:
         result = network.search(TIMEOUT_S)
         found = result.verdict is Verdict.SOLUTION
-        return result, network.master.checked(result.assignments) if found and not conditions.private else None
+        return result, network.master.checked(result.assignments) if found and not settings.private else None
 
 
 def agrees(

@@ -18,7 +18,7 @@ from robochoc.authority.certificates import leaf_certificate, moment, new_key
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Conclusion
 from robochoc.communication.network.access import letter_key
-from robochoc.communication.network.control_messages import Ask, Register, Said
+from robochoc.communication.network.control_messages import Ask, ProtocolMessage, Register
 from robochoc.communication.network.framing import LARGEST_LETTER, MASTER
 from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.profile import profile_of
@@ -143,7 +143,7 @@ def test_a_robot_that_poses_as_the_master(run: NetworkRun) -> None:
 
 def test_a_forged_sender(run: NetworkRun) -> None:
     with run.post("RX3") as post:
-        put(post, letter_key("RX2", "RX1"), letter(run, "RX1", "RX2", Said(1, 0, encode(Ok((0,))))))
+        put(post, letter_key("RX2", "RX1"), letter(run, "RX1", "RX2", ProtocolMessage(1, 0, encode(Ok((0,))))))
         put(post, letter_key(MASTER, "RX1"), letter(run, "RX1", MASTER, Conclusion(1, "no-solution")))
         put(post, letter_key("RX2", MASTER))
         run.wait_for_refusal("RX3", "put rc/msg/RX2/RX1", "no rule")
@@ -170,7 +170,7 @@ def test_a_robot_that_writes_to_one_it_has_nothing_to_do_with(run: NetworkRun) -
     """RX0 and RX3 share no constraint, and the protocol says that it goes `beyond` none."""
     assert not PausedABT.traits.writes_to_non_neighbours
     with run.post("RX3") as post:
-        put(post, letter_key("RX0", "RX3"), letter(run, "RX3", "RX0", Said(1, 0, encode(Ok((0,))))))
+        put(post, letter_key("RX0", "RX3"), letter(run, "RX3", "RX0", ProtocolMessage(1, 0, encode(Ok((0,))))))
         run.wait_for_refusal("RX3", "put rc/msg/RX0/RX3", "no rule")
         run.wait_for_progress()
 
@@ -198,7 +198,7 @@ def test_thousands_of_forbidden_letters(run: NetworkRun) -> None:
 
 def test_a_letter_of_an_earlier_run(run: NetworkRun) -> None:
     with run.post("RX1") as post:
-        post.send("RX2", letter(run, "RX1", "RX2", Said(1, 0, encode(Ok((0,)))), of_run="0123456789abcdef"))
+        post.send("RX2", letter(run, "RX1", "RX2", ProtocolMessage(1, 0, encode(Ok((0,)))), of_run="0123456789abcdef"))
         post.send(MASTER, letter(run, "RX1", MASTER, Conclusion(1, "no-solution"), of_run="0123456789abcdef"))
         run.wait_for_refusal("RX1", "letter to RX2", "replay: it was written in another run")
         run.wait_for_refusal("RX1", "letter to the master", "replay: it was written in another run")
@@ -220,9 +220,9 @@ def test_a_letter_that_comes_twice(run: NetworkRun) -> None:
 
 def test_a_letter_from_the_future(run: NetworkRun) -> None:
     with run.post("RX1") as post:
-        post.send("RX2", letter(run, "RX1", "RX2", Said(1, 0, encode(Ok((0,)))), number=10**6))
+        post.send("RX2", letter(run, "RX1", "RX2", ProtocolMessage(1, 0, encode(Ok((0,)))), number=10**6))
         run.wait_for_refusal("RX1", "letter to RX2", "is missing before letter 1000000")
-        post.send("RX2", letter(run, "RX1", "RX2", Said(10**6, 0, encode(Ok((0,))))))
+        post.send("RX2", letter(run, "RX1", "RX2", ProtocolMessage(10**6, 0, encode(Ok((0,))))))
         run.wait_for_refusal("RX1", "letter to RX2", "it is of epoch 1000000")
 
 
@@ -246,7 +246,7 @@ def test_malformed_letters(run: NetworkRun, content: bytes, receiver: str) -> No
 def test_a_peer_that_speaks_no_protocol(run: NetworkRun, content: bytes) -> None:
     """Such a letter does not take the place of the right one."""
     with run.post("RX2") as post:
-        post.send("RX1", letter(run, "RX2", "RX1", Said(1, 0, content)))
+        post.send("RX1", letter(run, "RX2", "RX1", ProtocolMessage(1, 0, content)))
         run.wait_for_refusal("RX2", "letter to RX1", "no message of the protocol")
     run.wait_for_progress()
 

@@ -19,12 +19,11 @@ import pytest
 
 from robochoc.authority.authority import Authority
 from robochoc.communication.network.local import LocalNetwork
-from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.robot import Ending, NetworkRobot
+from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.network.transport import Transport
-from robochoc.communication.processes.robot_link import RobotsLostError
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.run_result import RobotsLostError, RunResult
 from robochoc.journal.events import AnyEvent, Lost, Received, Sent
 from robochoc.model.outcome import Verdict
 from robochoc.solver.agent_problem import RunParameters
@@ -93,10 +92,10 @@ class Team:
 
 
 @contextmanager
-def held_team(folder: Path, conditions: NetworkSettings = NetworkSettings()) -> Iterator[Team]:
+def held_team(folder: Path, settings: NetworkSettings = NetworkSettings()) -> Iterator[Team]:
     events: list[AnyEvent] = []
     brief = RunParameters(settings={"file": str(folder / "go")})
-    with LocalNetwork(CHAIN, PausedABT, observer=events.append, conditions=conditions, brief=brief) as network:
+    with LocalNetwork(CHAIN, PausedABT, observer=events.append, settings=settings, brief=brief) as network:
         team = Team(network, events, folder / "go")
         try:
             yield team
@@ -190,7 +189,7 @@ def test_a_link_that_is_down(
 ) -> None:
     """All robots are behind it. Afterwards all goes on, and nothing is lost."""
     with (
-        NetworkRun(tmp_path, conditions=NetworkSettings(filters, patience_s=20), absent=CHAIN.order) as run,
+        NetworkRun(tmp_path, settings=NetworkSettings(filters, patience_s=20), absent=CHAIN.order) as run,
         Relay(run.endpoint) as relay,
     ):
         for name in CHAIN.order:
@@ -210,7 +209,7 @@ def test_a_link_that_is_down(
 @pytest.mark.slow
 def test_a_link_of_one_robot_that_does_not_come_back(tmp_path: Path) -> None:
     with (
-        NetworkRun(tmp_path, conditions=NetworkSettings(patience_s=3), absent=["RX3"]) as run,
+        NetworkRun(tmp_path, settings=NetworkSettings(patience_s=3), absent=["RX3"]) as run,
         Relay(run.endpoint) as relay,
     ):
         run.start("RX3", relay.endpoint)
@@ -224,7 +223,7 @@ def test_a_link_of_one_robot_that_does_not_come_back(tmp_path: Path) -> None:
 
 def test_a_router_that_is_opened_anew(tmp_path: Path) -> None:
     """Somebody else is enrolled in mid-run: that needs other rules, and so another router."""
-    with NetworkRun(tmp_path, conditions=NetworkSettings(patience_s=20)) as run:
+    with NetworkRun(tmp_path, settings=NetworkSettings(patience_s=20)) as run:
         run.wait_for_progress()
         for number in range(2):
             before = run.router
@@ -238,7 +237,7 @@ def test_a_router_that_is_opened_anew(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_router_that_dies(tmp_path: Path) -> None:
-    with NetworkRun(tmp_path, conditions=NetworkSettings(patience_s=3)) as run:
+    with NetworkRun(tmp_path, settings=NetworkSettings(patience_s=3)) as run:
         run.wait_for_progress()
         os.kill(run.router, signal.SIGKILL)
         with pytest.raises(RobotsLostError, match="the router's process has ended"):
@@ -305,7 +304,9 @@ class Elsewhere:
     def _take_part(self, name: str, patience_s: float) -> None:
         identity = self.identities[name]
         with Transport(self.endpoint, identity, watch=(), patience_s=30) as post:
-            robot = NetworkRobot(CompiledRobot(CHAIN[name]), identity, post, lambda _: PausedABT, Manner(patience_s))
+            robot = NetworkRobot(
+                CompiledRobot(CHAIN[name]), identity, post, lambda _: PausedABT, RobotSettings(patience_s)
+            )
             self.endings[name] = robot.run()
 
 

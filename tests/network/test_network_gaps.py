@@ -14,14 +14,14 @@ from robochoc.authority.admission import Household
 from robochoc.authority.registry import Right, Role
 from robochoc.communication.control import Failed
 from robochoc.communication.network.access import ALL, letter_key
-from robochoc.communication.network.control_messages import Ask, Register, Said
+from robochoc.communication.network.control_messages import Ask, ProtocolMessage, Register
 from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.inbox import Arrived, Missed
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.router import Router
 from robochoc.communication.network.settings import LEASE_MS, NetworkSettings
 from robochoc.communication.network.transport import Transport
-from robochoc.communication.processes.robot_link import RobotsLostError
+from robochoc.communication.run_result import RobotsLostError
 from robochoc.model.outcome import Verdict
 from tests.support.faults import wait_until
 from tests.support.network_runs import NetworkRun, free_endpoint, letter
@@ -98,7 +98,7 @@ def test_a_gap_between_robots_that_is_one_names_the_sender(tmp_path: Path) -> No
     """With the key of RX3 somebody has taken the number of a letter of RX3, and there is a gap."""
     with watched(tmp_path, NetworkSettings(patience_s=3)) as run:
         with run.post("RX3") as post:
-            put_with_a_gap(post, "RX2", letter(run, "RX3", "RX2", Said(0, 0, b"")))
+            put_with_a_gap(post, "RX2", letter(run, "RX3", "RX2", ProtocolMessage(0, 0, b"")))
             run.wait_for_refusal("RX3", "a letter to RX2", "lost for good")
         with pytest.raises(RobotsLostError, match=r"RX3 was lost: .*RX2 says so"):
             run.let_go()

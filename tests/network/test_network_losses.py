@@ -49,7 +49,7 @@ def test_those_who_are_left_go_on_with_the_values_that_they_had(tmp_path: Path) 
     journey = ScenarioRun(TEAM, None, CompiledTeam, lambda: None, parameters=brief)
     played: list[FinishedEpoch] = []
     with LocalNetwork(
-        journey.compiled(), PausedABT, observer=observe, conditions=NetworkSettings(survive=True), brief=brief
+        journey.compiled(), PausedABT, observer=observe, settings=NetworkSettings(survive=True), brief=brief
     ) as network:
         for one in journey.epochs(network, lambda _: None):
             played.append(one)

@@ -5,52 +5,52 @@ from __future__ import annotations
 import threading
 
 from robochoc.communication.control import Conclusion, Counters, Ready
+from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.refusals import KINDS, LONGEST, WHO, Refusals
 from robochoc.communication.network.router import Log, Refusal
-from robochoc.communication.network.search_state import SearchState, is_of
-from robochoc.journal.events import Decided, Received, Refused
+from robochoc.journal.events import Decided, Received, Refused, actor
 from robochoc.model.outcome import Verdict
 from tests.support.clocks import working
 
 
 def test_what_a_robot_tells_of_others() -> None:
     """Also somebody who is of the team may only tell of itself."""
-    assert is_of(Decided(t=0, robot="A", assignment={}, clock=0), "A")
-    assert not is_of(Decided(t=0, robot="A", assignment={}, clock=0), "B")
-    assert is_of(Received(t=0, sender="A", receiver="B", type="Ok", clock=0), "B")
-    assert not is_of(Received(t=0, sender="A", receiver="B", type="Ok", clock=0), "A")
-    assert not is_of(Refused(t=0, who="A", what="", why=""), "A")
+    assert actor(Decided(t=0, robot="A", assignment={}, clock=0)) == "A"
+    assert actor(Decided(t=0, robot="A", assignment={}, clock=0)) != "B"
+    assert actor(Received(t=0, sender="A", receiver="B", type="Ok", clock=0)) == "B"
+    assert actor(Received(t=0, sender="A", receiver="B", type="Ok", clock=0)) != "A"
+    assert actor(Refused(t=0, who="A", what="", why="")) != "A"
 
 
 def test_what_a_tally_does_not_take() -> None:
-    tally = SearchState(2, ["A", "B"])
+    state = AuditedSearchState(2, ["A", "B"])
     for word in (Conclusion(2, "maybe"), Conclusion(1, "no-solution"), Counters(1, 0, 5, 5), Ready(1)):
-        tally.hear("A", word)
-    tally.hear("C", Conclusion(2, "no-solution"))
-    assert tally.verdict is None
-    assert tally.counters.sent == 0
-    assert not tally.ready
-    tally.ordered = True
-    tally.hear("A", Conclusion(2, "no-solution"))
-    assert tally.verdict is Verdict.NO_SOLUTION
+        state.handle("A", word)
+    state.handle("C", Conclusion(2, "no-solution"))
+    assert state.verdict is None
+    assert state.counters.sent == 0
+    assert not state.ready
+    state.ordered = True
+    state.handle("A", Conclusion(2, "no-solution"))
+    assert state.verdict is Verdict.NO_SOLUTION
 
 
 def test_messages_that_are_missing_are_told_only_when_nothing_moves_any_more() -> None:
-    tally = SearchState(1, ["A", "B"])
-    tally.hear("A", Counters(1, 0, 3, 0))
-    assert tally.missing(0, 10) == 0
-    tally.hear("B", Counters(1, 0, 0, 2))
-    assert [tally.missing(now, 10) for now in (1, 5, 10.9)] == [0, 0, 0]
+    state = AuditedSearchState(1, ["A", "B"])
+    state.handle("A", Counters(1, 0, 3, 0))
+    assert state.missing(0, 10) == 0
+    state.handle("B", Counters(1, 0, 0, 2))
+    assert [state.missing(now, 10) for now in (1, 5, 10.9)] == [0, 0, 0]
     for now in (12, 13):
-        assert tally.missing(now, 10) == 0
-        assert tally.wave_due
-        wave = tally.counters.begin_wave()
-        tally.hear("A", Counters(1, wave, 3, 0))
-        assert tally.missing(now + 50, 10) == 0, "B has not answered"
-        tally.hear("B", Counters(1, wave, 0, 2))
-    assert tally.missing(14, 10) == 1
-    tally.hear("B", Counters(1, 0, 0, 3))
-    assert tally.missing(15, 10) == 0
+        assert state.missing(now, 10) == 0
+        assert state.wave_due
+        wave = state.counters.begin_wave()
+        state.handle("A", Counters(1, wave, 3, 0))
+        assert state.missing(now + 50, 10) == 0, "B has not answered"
+        state.handle("B", Counters(1, wave, 0, 2))
+    assert state.missing(14, 10) == 1
+    state.handle("B", Counters(1, 0, 0, 3))
+    assert state.missing(15, 10) == 0
 
 
 # What is refused is counted

@@ -12,17 +12,17 @@ from robochoc.communication.control import Counters, Failed, Pause, Ready, Wave
 from robochoc.communication.network.control_messages import (
     Account,
     Bye,
+    Charge,
     Checked,
     Copies,
     Denied,
     Exchanged,
     Joined,
     Judge,
-    Judged,
     Leave,
     Objection,
+    ProtocolMessage,
     Register,
-    Said,
     Search,
     Show,
     Shown,
@@ -31,8 +31,8 @@ from robochoc.communication.network.control_messages import (
 )
 from robochoc.communication.network.framing import MASTER, Framing, Letter
 from robochoc.communication.network.inbox import Arrived, Item, Presence, Woken
-from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.robot import Ending, NetworkRobot
+from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.transport import Transport
 from robochoc.protocols.abt import ABT
 from robochoc.solver.compiled_team import CompiledRobot
@@ -47,7 +47,7 @@ def test_a_run_from_beginning_to_end() -> None:
                 yield from (Presence("RA", there=True), Woken(), Show(("B", "Z")), task())
             case Ready():
                 yield Search(1)
-                yield post.letter(Said(1, 5, ok(1)), "RA")
+                yield post.letter(ProtocolMessage(1, 5, ok(1)), "RA")
             case Counters(_, 0, _, 1):
                 yield Wave(7)
             case Counters(_, 7):
@@ -65,7 +65,7 @@ def test_a_run_from_beginning_to_end() -> None:
     (account,) = post.heard_of(Account)
     assert isinstance(account, Account)
     assert (account.assigned, account.assignment) == (True, {"B": 2})
-    shared = (Judged("RB", ("A", "B"), 1, 0),)
+    shared = (Charge("RB", ("A", "B"), 1, 0),)
     assert post.heard_of(Checked) == [Checked(1, allowed=True, cost=0, held=1, shared=shared)]
     assert account.exchanged == {"RA": Exchanged(0, 1, 5), "RC": Exchanged(2, 0, 0)}
     assert isinstance(post.heard[-1], Bye)
@@ -76,11 +76,11 @@ def test_what_others_say_before_the_task_and_the_start_waits() -> None:
     def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         match word:
             case Joined():
-                yield post.letter(Said(1, 0, ok(1)), "RA")
+                yield post.letter(ProtocolMessage(1, 0, ok(1)), "RA")
                 yield task()
-                yield post.letter(Said(1, 0, ok(2)), "RA")
+                yield post.letter(ProtocolMessage(1, 0, ok(2)), "RA")
             case Ready():
-                yield post.letter(Said(1, 0, ok(1)), "RA")
+                yield post.letter(ProtocolMessage(1, 0, ok(1)), "RA")
                 yield Search(1)
             case Counters(_, _, _, 3):
                 yield LEAVE
@@ -100,14 +100,14 @@ def test_what_was_said_in_another_search_is_passed_over() -> None:
             case Ready(1):
                 yield Pause()
             case Account(1):
-                yield post.letter(Said(1, 0, ok(3)), "RA")
+                yield post.letter(ProtocolMessage(1, 0, ok(3)), "RA")
                 yield post.letter(Copies(1, b"\x90"), "RA")
                 yield task(epoch=2)
             case Ready(2):
                 yield Search(2)
-                yield post.letter(Said(2, 0, ok(1)), "RA")
-                yield post.letter(Said(1, 0, b"late, and no message"), "RA")
-                yield post.letter(Said(3, 0, b"early, and no message"), "RA")
+                yield post.letter(ProtocolMessage(2, 0, ok(1)), "RA")
+                yield post.letter(ProtocolMessage(1, 0, b"late, and no message"), "RA")
+                yield post.letter(ProtocolMessage(3, 0, b"early, and no message"), "RA")
             case Counters(2, _, _, 1):
                 yield LEAVE
             case _:
@@ -126,7 +126,7 @@ def test_what_comes_with_the_end_of_a_search_changes_nothing_any_more() -> None:
             case Ready():
                 yield Search(1)
             case Counters(_, 0, _, 0):
-                yield post.letter(Said(1, 0, ok(1)), "RA")
+                yield post.letter(ProtocolMessage(1, 0, ok(1)), "RA")
                 yield Pause()
             case Account():
                 yield LEAVE
@@ -181,15 +181,15 @@ def test_orders_of_another_search_are_objected_to(word: Word) -> None:
     ("content", "why"),
     [
         (b"", "malformed"),
-        (msgspec.msgpack.encode(Letter(RUN, 1, Said(1, 2**64 - 1, ok(1)))), "malformed"),
-        (msgspec.msgpack.encode(Letter(RUN, 1, Said(1, -1, ok(1)))), "malformed"),
+        (msgspec.msgpack.encode(Letter(RUN, 1, ProtocolMessage(1, 2**64 - 1, ok(1)))), "malformed"),
+        (msgspec.msgpack.encode(Letter(RUN, 1, ProtocolMessage(1, -1, ok(1)))), "malformed"),
         (b"\x93\xa3run\x01", "malformed"),
         (msgspec.msgpack.encode(Letter(RUN, 1, Pause())), "malformed"),
         (msgspec.msgpack.encode(Letter(RUN, 1, Leave("now", failed=False))), "malformed"),
         (msgspec.msgpack.encode(Letter(RUN, 1, Welcome("v", RUN, (), observed=False, private=False))), "malformed"),
-        (Framing("RA", "another").write("RB", Said(1, 0, ok(1))), "another run"),
-        (msgspec.msgpack.encode(Letter(RUN, 2, Said(1, 0, ok(1)))), "letter 1 is missing"),
-        (msgspec.msgpack.encode(Letter(RUN, 0, Said(1, 0, ok(1)))), "replay"),
+        (Framing("RA", "another").write("RB", ProtocolMessage(1, 0, ok(1))), "another run"),
+        (msgspec.msgpack.encode(Letter(RUN, 2, ProtocolMessage(1, 0, ok(1)))), "letter 1 is missing"),
+        (msgspec.msgpack.encode(Letter(RUN, 0, ProtocolMessage(1, 0, ok(1)))), "replay"),
     ],
 )
 def test_letters_that_are_refused_are_objected_to_and_change_nothing(content: bytes, why: str) -> None:
@@ -200,7 +200,7 @@ def test_letters_that_are_refused_are_objected_to_and_change_nothing(content: by
             case Ready():
                 yield Search(1)
                 yield Arrived("RA", content)
-                yield post.letter(Said(1, 0, ok(1)), "RA")
+                yield post.letter(ProtocolMessage(1, 0, ok(1)), "RA")
             case Counters(_, _, _, 1):
                 yield LEAVE
             case _:
@@ -221,7 +221,7 @@ def test_replays_are_objected_to() -> None:
                 yield task()
             case Ready():
                 yield Search(1)
-                yield from [post.letter(Said(1, 0, ok(1)), "RA")] * 3
+                yield from [post.letter(ProtocolMessage(1, 0, ok(1)), "RA")] * 3
             case Counters(_, 0, _, 1):
                 yield LEAVE
             case _:
@@ -240,7 +240,7 @@ def test_what_is_no_message_is_refused_and_takes_no_place() -> None:
             case Ready():
                 yield Search(1)
                 for content in (b"no message", ok(1)):
-                    yield Arrived("RA", Framing("RA", RUN).write("RB", Said(1, 0, content)))
+                    yield Arrived("RA", Framing("RA", RUN).write("RB", ProtocolMessage(1, 0, content)))
             case Counters(_, 0, _, 1):
                 yield LEAVE
             case _:
@@ -260,8 +260,8 @@ def test_who_takes_no_part_is_not_heard() -> None:
                 yield task()
             case Ready():
                 yield Search(1)
-                yield post.letter(Said(1, 0, ok(1)), "R9")
-                yield post.letter(Said(1, 0, ok(1)), "RA")
+                yield post.letter(ProtocolMessage(1, 0, ok(1)), "R9")
+                yield post.letter(ProtocolMessage(1, 0, ok(1)), "RA")
             case Counters(_, 0, _, 1):
                 yield LEAVE
             case _:
@@ -294,7 +294,7 @@ def test_noise_before_the_welcome_is_nothing_to_tell() -> None:
     post.inbox.put(Arrived(MASTER, msgspec.msgpack.encode(Letter("", 0, Denied("another's", "no")))))
     post.router = ""
     robot = NetworkRobot(
-        CompiledRobot(chain_of_three()["RB"]), UNPROVEN, cast("Transport", post), lambda _name: ABT, Manner(0.01)
+        CompiledRobot(chain_of_three()["RB"]), UNPROVEN, cast("Transport", post), lambda _name: ABT, RobotSettings(0.01)
     )
     assert robot.run().why == "the master is gone: no link to it for 0.01 s"
     assert [type(word) for word in post.heard] == [Register]

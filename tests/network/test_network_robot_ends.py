@@ -20,8 +20,8 @@ from robochoc.communication.network.control_messages import (
     Judge,
     Leave,
     Objection,
+    ProtocolMessage,
     Register,
-    Said,
     Search,
     Welcome,
     Word,
@@ -74,7 +74,7 @@ def test_who_says_too_much_ahead_of_the_task_takes_nobodys_place(monkeypatch: py
 
     def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         if isinstance(word, Joined):
-            yield from (post.letter(Said(1, 0, ok(1)), name) for name in ("RA", "RA", "RA", "RA", "RC"))
+            yield from (post.letter(ProtocolMessage(1, 0, ok(1)), name) for name in ("RA", "RA", "RA", "RA", "RC"))
             yield task()
         elif isinstance(word, Ready):
             yield Leave("that was it", failed=False)
@@ -205,7 +205,7 @@ def test_another_master_ends_the_run_the_same_one_does_not() -> None:
 
 def test_behind_another_router_a_robot_registers_until_it_is_welcomed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever it says at first may get lost there, and so may the answer."""
-    monkeypatch.setattr("robochoc.communication.network.robot.REGISTER_AGAIN_S", 0.01)
+    monkeypatch.setattr("robochoc.communication.network.registration.REGISTER_AGAIN_S", 0.01)
 
     def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
         match word, len(post.heard_of(Register)):

@@ -49,13 +49,13 @@ def test_nobody_is_doubted_who_is_honest(name: str) -> None:
     office = InMemoryNetwork(known_to_both(team), protocol, brief=brief)
     result = office.search()
     assert not office.failures
-    assert not office.tally.doubts_about_counts
+    assert not office.state.doubts_about_counts
     assert result.verdict is not Verdict.UNKNOWN
     if result.verdict is Verdict.SOLUTION:
         office.judge(result.assignments)
         private = sum(len(robot.private) for robot in team.robots)
-        assert office.tally.thoroughness == (len(list(team.constraints())) - private, private)
-    assert not office.tally.doubts_about_verdict
+        assert office.state.thoroughness == (len(list(team.constraints())) - private, private)
+    assert not office.state.doubts_about_verdict
 
 
 @pytest.mark.parametrize("protocol", ["dpop", "sfb"])

@@ -9,13 +9,13 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from robochoc.communication.network.control_messages import Copies, Denied, Register, Said, Word
+from robochoc.communication.network.control_messages import Copies, Denied, ProtocolMessage, Register, Word
 from robochoc.communication.network.framing import MASTER, Framing
 from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.profile import Profile, profile_of
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.network.transport import Transport
-from robochoc.communication.processes.robot_link import RobotsLostError
+from robochoc.communication.run_result import RobotsLostError
 from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind
@@ -28,7 +28,7 @@ from tests.support.paused_abt import CHAIN, TRIANGLE, PausedABT
 
 @pytest.mark.parametrize("filters", [("signed", "sealed"), pytest.param((), marks=pytest.mark.slow)])
 def test_a_robot_is_revoked_and_the_others_are_told_of_it(tmp_path: Path, filters: tuple[str, ...]) -> None:
-    with NetworkRun(tmp_path, conditions=NetworkSettings(filters, survive=True, patience_s=2)) as run:
+    with NetworkRun(tmp_path, settings=NetworkSettings(filters, survive=True, patience_s=2)) as run:
         run.wait_for_progress()
         run.household.revoke("RX2")
         result = run.wait_for_result()
@@ -43,7 +43,7 @@ def test_a_robot_is_revoked_and_the_others_are_told_of_it(tmp_path: Path, filter
 
 @pytest.mark.slow
 def test_a_robot_is_revoked_and_the_run_ends(tmp_path: Path) -> None:
-    with NetworkRun(tmp_path, conditions=NetworkSettings(patience_s=3)) as run:
+    with NetworkRun(tmp_path, settings=NetworkSettings(patience_s=3)) as run:
         run.wait_for_progress()
         run.household.revoke("RX2")
         with pytest.raises(RobotsLostError, match="RX2 was lost: its certificate was revoked"):
@@ -117,7 +117,7 @@ def test_a_router_that_changes_letters(tmp_path: Path, filters: tuple[str, ...])
             made_up = encode(Ok((0,)))
             altered = true.content[:-1] + bytes([true.content[-1] ^ 1])
             for content in (made_up, altered, true.content, b""):
-                carrier.send("RX2", letter(run, "RX1", "RX2", Said(1, 0, content)))
+                carrier.send("RX2", letter(run, "RX1", "RX2", ProtocolMessage(1, 0, content)))
             for why in {"signed": ["signature is wrong"], "sealed": ["was changed", "too short"]}[filters[-1]]:
                 run.wait_for_refusal("RX1", "letter to RX2", why)
         run.wait_for_progress()
@@ -145,11 +145,11 @@ def test_constraints_that_others_have_to_know_are_sealed_too(
     assert any(b"ne(X" in content for content in sent) is not bool(filters)
 
 
-def recorded_said(reader: Transport) -> Said:
+def recorded_said(reader: Transport) -> ProtocolMessage:
     letters = Framing(reader.name)
     while isinstance(item := reader.inbox.get(timeout=10), Arrived):
         word = letters._of_robot.decode(item.content).word if item.sender != MASTER else None  # noqa: SLF001
-        if isinstance(word, Said):
+        if isinstance(word, ProtocolMessage):
             return word
     raise AssertionError
 
@@ -157,11 +157,11 @@ def recorded_said(reader: Transport) -> Said:
 @pytest.mark.slow
 def test_a_message_that_is_lost_for_good_ends_the_run(tmp_path: Path) -> None:
     """With the key of RX2 somebody has said nothing, in a letter that bears the number of RX2's first one."""
-    with NetworkRun(tmp_path, conditions=NetworkSettings(patience_s=3)) as run:
+    with NetworkRun(tmp_path, settings=NetworkSettings(patience_s=3)) as run:
         run.wait_for_progress()
         with run.post("RX2") as post:
-            post.send("RX3", letter(run, "RX2", "RX3", Said(0, 0, b"")))
-            post.send("RX3", letter(run, "RX2", "RX3", Said(0, 0, b"")))
+            post.send("RX3", letter(run, "RX2", "RX3", ProtocolMessage(0, 0, b"")))
+            post.send("RX3", letter(run, "RX2", "RX3", ProtocolMessage(0, 0, b"")))
             run.wait_for_refusal("RX2", "letter to RX3", "letter 1 has come before")
         with pytest.raises(RobotsLostError, match="MASTER was lost: 1 messages between robots were lost for good"):
             run.let_go()

@@ -11,11 +11,11 @@ import pytest
 
 from robochoc.cli.reports.outcome import report
 from robochoc.communication.control import Conclusion, Counters, Ready
-from robochoc.communication.network.control_messages import Account, Exchanged, Judged
+from robochoc.communication.network.audited_state import AuditedSearchState
+from robochoc.communication.network.control_messages import Account, Charge, Exchanged
 from robochoc.communication.network.plausibility import Declared
-from robochoc.communication.network.search_state import SearchState
 from robochoc.communication.processes.processes import ProcessesRun
-from robochoc.communication.processes.robot_link import RobotsLostError
+from robochoc.communication.run_result import RobotsLostError
 from robochoc.formats.result import read_result, result_json
 from robochoc.model.outcome import ALL_ROBOTS, CheckCounts, Metrics, Outcome, PseudoTreeNode, Verdict
 from robochoc.model.problem import Constraint, Team
@@ -85,10 +85,10 @@ def test_every_protocol_declares_what_its_robots_conclude() -> None:
 def test_a_verdict_that_its_protocol_does_not_have(
     lied: Callable[..., InMemoryNetwork], protocol: type[Protocol], verdict: str
 ) -> None:
-    tally = lied(traitors.concluding(verdict), protocol).tally
+    state = lied(traitors.concluding(verdict), protocol).state
     said = "what is no verdict" if verdict == "maybe" else verdict
-    assert tally.lost["RB"].startswith(f"it has concluded {said}, and a robot of this protocol concludes ")
-    assert tally.result(0).verdict is Verdict.UNKNOWN
+    assert state.lost["RB"].startswith(f"it has concluded {said}, and a robot of this protocol concludes ")
+    assert state.result(0).verdict is Verdict.UNKNOWN
 
 
 def test_a_protocol_of_ones_own_is_held_to_the_same() -> None:
@@ -116,38 +116,38 @@ def test_processes_are_held_to_the_same() -> None:
 
 def test_a_verdict_before_the_search(lied: Callable[..., InMemoryNetwork]) -> None:
     office = lied(traitors.LIES["too early"])
-    assert office.tally.lost == {"RB": "it has concluded something before the search began"}
+    assert office.state.lost == {"RB": "it has concluded something before the search began"}
 
 
 def test_no_solution_rests_on_its_word(lied: Callable[..., InMemoryNetwork]) -> None:
     """Nobody can tell it from a proof; that the witness is told is all that there is."""
     office = lied(traitors.LIES["no-solution"])
-    result = office.tally.result(0)
+    result = office.state.result(0)
     assert (result.verdict, result.witness, result.lost) == (Verdict.NO_SOLUTION, "RB", {})
 
 
-def begun(traits: Traits = AFC.traits) -> SearchState:
-    tally = SearchState(1, ("RA", "RB", "RC"), None, Declared(traits))
-    tally.ordered = True
-    return tally
+def begun(traits: Traits = AFC.traits) -> AuditedSearchState:
+    state = AuditedSearchState(1, ("RA", "RB", "RC"), None, Declared(traits))
+    state.ordered = True
+    return state
 
 
 def test_a_second_verdict_that_contradicts_the_first() -> None:
-    tally = begun()
-    assert not tally.hear("RA", Conclusion(1, "no-solution"))
-    assert not tally.hear("RC", Conclusion(1, "no-solution"))
-    assert not tally.hear("RB", Conclusion(1, "solution"))
-    (doubt,) = tally.doubts_about_verdict
+    state = begun()
+    assert not state.handle("RA", Conclusion(1, "no-solution"))
+    assert not state.handle("RC", Conclusion(1, "no-solution"))
+    assert not state.handle("RB", Conclusion(1, "solution"))
+    (doubt,) = state.doubts_about_verdict
     assert doubt == (("RA", "RB"), "RA has concluded no-solution, and RB solution")
-    assert tally.hear("RA", Conclusion(1, "solution")) == "it has concluded solution, and no-solution before"
+    assert state.handle("RA", Conclusion(1, "solution")) == "it has concluded solution, and no-solution before"
 
 
 def test_a_verdict_after_all_were_quiet_blames_nobody_and_changes_nothing() -> None:
     """Whoever concludes it may have been stirred by another: RA speaks once all are quiet."""
-    tally = begun()
-    tally.verdict = Verdict.SOLUTION
-    assert not tally.hear("RB", Conclusion(1, "no-solution"))
-    assert (tally.verdict, tally.doubts_about_verdict) == (Verdict.SOLUTION, ())
+    state = begun()
+    state.verdict = Verdict.SOLUTION
+    assert not state.handle("RB", Conclusion(1, "no-solution"))
+    assert (state.verdict, state.doubts_about_verdict) == (Verdict.SOLUTION, ())
 
 
 # What is said of that
@@ -225,18 +225,18 @@ def test_on_this_machine_a_witness_is_no_more_than_that() -> None:
 )
 def test_values_that_it_cannot_have(lied: Callable[..., InMemoryNetwork], lie: Lie, why: str) -> None:
     office = lied(lie)
-    assert office.tally.lost == {"RB": why}
-    assert "RB" not in office.tally.result(0).assignments
+    assert office.state.lost == {"RB": why}
+    assert "RB" not in office.state.result(0).assignments
 
 
 def test_a_private_variable_of_another(lied: Callable[..., InMemoryNetwork]) -> None:
     """Only the two know of it: both are named."""
     office = lied(traitors.valued(Secret=1))
-    assert not office.tally.lost, "a name of its own is no lie"
-    assert not office.tally.doubts_about_verdict
-    account = office.tally._accounts["RC"]  # noqa: SLF001
-    assert not office.tally.hear("RC", changed(account, assignment={**account.assignment, "Secret": 2}))
-    (doubt,) = office.tally.doubts_about_verdict
+    assert not office.state.lost, "a name of its own is no lie"
+    assert not office.state.doubts_about_verdict
+    account = office.state._accounts["RC"]  # noqa: SLF001
+    assert not office.state.handle("RC", changed(account, assignment={**account.assignment, "Secret": 2}))
+    (doubt,) = office.state.doubts_about_verdict
     assert (set(doubt.between), "Secret" in doubt.why) == ({"RB", "RC"}, True)
 
 
@@ -244,24 +244,24 @@ def test_a_private_variable_of_another(lied: Callable[..., InMemoryNetwork]) -> 
 
 
 def judged(office: InMemoryNetwork) -> tuple[bool, float]:
-    return office.judge({name: dict(values) for name, values in office.tally.result(0).assignments.items()})
+    return office.judge({name: dict(values) for name, values in office.state.result(0).assignments.items()})
 
 
 def test_it_judges_its_own_constraint_alone(lied: Callable[..., InMemoryNetwork]) -> None:
     """Nobody else knows the constraint: that is what is said of it."""
     office = lied(traitors.LIES["a wrong value"])
     assert judged(office)[0] is False, "RC's constraint with RB is broken as well, and RC says so"
-    assert office.tally.objections == ("RC finds its constraint over B C broken",)
+    assert office.state.objections == ("RC finds its constraint over B C broken",)
     office = lied(traitors.LIES["a wrong value"], team=team_of(dict.fromkeys("AB", (1, 2)), _DIFFERENT[:1]))
     assert judged(office) == (True, 0)
-    assert office.tally.thoroughness == (0, 1), "on its owner's word alone"
+    assert office.state.thoroughness == (0, 1), "on its owner's word alone"
 
 
 def test_its_parent_knows_the_constraint_from_its_own_file(lied: Callable[..., InMemoryNetwork]) -> None:
     team = known_to_both(team_of(dict.fromkeys("AB", (1, 2)), _DIFFERENT[:1]))
     office = lied(traitors.LIES["a wrong value"], team=team)
     judged(office)
-    (doubt,) = office.tally.doubts_about_verdict
+    (doubt,) = office.state.doubts_about_verdict
     assert set(doubt.between) == {"RA", "RB"}
     assert doubt.why == ("RA says that the constraint over A B is broken, and RB, which holds it, says that it holds")
 
@@ -269,15 +269,15 @@ def test_its_parent_knows_the_constraint_from_its_own_file(lied: Callable[..., I
 def test_its_parent_was_told_the_constraint_before_the_search(lied: Callable[..., InMemoryNetwork]) -> None:
     office = lied(traitors.LIES["a wrong value"], AWC)
     judged(office)
-    assert {"RA", "RB"} in [set(doubt.between) for doubt in office.tally.doubts_about_verdict]
+    assert {"RA", "RB"} in [set(doubt.between) for doubt in office.state.doubts_about_verdict]
 
 
 def test_what_both_ends_check_is_said_to_be_checked(lied: Callable[..., InMemoryNetwork]) -> None:
     for protocol, team in ((ABT, known_to_both(CHAIN)), (AWC, CHAIN), (AWC, known_to_both(CHAIN))):
         office = lied(lambda _me, word: iter([word]), protocol, team)
         assert judged(office) == (True, 0)
-        assert office.tally.thoroughness == (2, 0)
-        assert not office.tally.doubts_about_verdict
+        assert office.state.thoroughness == (2, 0)
+        assert not office.state.doubts_about_verdict
 
 
 def test_how_many_are_checked_by_both_is_what_both_say(lied: Callable[..., InMemoryNetwork]) -> None:
@@ -289,14 +289,14 @@ def test_how_many_are_checked_by_both_is_what_both_say(lied: Callable[..., InMem
     for change in many:
         office = lied(traitors.judging(change), team=known_to_both(CHAIN))
         judged(office)
-        assert office.tally.thoroughness.by_both == 2
+        assert office.state.thoroughness.by_both == 2
 
 
 def test_a_copy_of_what_nobody_holds(lied: Callable[..., InMemoryNetwork]) -> None:
-    made_up = Judged("RC", ("A", "C"), 1, 0)
+    made_up = Charge("RC", ("A", "C"), 1, 0)
     office = lied(traitors.judging(lambda one: changed(one, copies=(made_up,))))
     judged(office)
-    (doubt,) = office.tally.doubts_about_verdict
+    (doubt,) = office.state.doubts_about_verdict
     assert doubt.between == ("RC", "RB")
     assert doubt.why.endswith("and RC, which holds it, has no such constraint")
 
@@ -310,18 +310,18 @@ def test_a_copy_of_what_nobody_holds(lied: Callable[..., InMemoryNetwork]) -> No
         {"held": -1},
         {"held": 0},
         {"held": 2**60},
-        {"shared": (Judged("RA", ("A", "B"), 1, 0),)},
-        {"shared": (Judged("RB", ("A", "B"), 1, float("inf")),)},
-        {"shared": (Judged("RB", ("\x1b[2J", "B"), 1, 0),)},
-        {"copies": (Judged("RB", ("A", "B"), 1, 0),)},
-        {"copies": (Judged("R9", ("A", "B"), 1, 0),)},
-        {"copies": (Judged("RA", ("A", "B"), 0, 0),)},
+        {"shared": (Charge("RA", ("A", "B"), 1, 0),)},
+        {"shared": (Charge("RB", ("A", "B"), 1, float("inf")),)},
+        {"shared": (Charge("RB", ("\x1b[2J", "B"), 1, 0),)},
+        {"copies": (Charge("RB", ("A", "B"), 1, 0),)},
+        {"copies": (Charge("R9", ("A", "B"), 1, 0),)},
+        {"copies": (Charge("RA", ("A", "B"), 0, 0),)},
     ],
 )
 def test_it_has_checked_what_cannot_be(lied: Callable[..., InMemoryNetwork], change: dict[str, Any]) -> None:
     office = lied(traitors.judging(lambda one: changed(one, **change)))
     judged(office)
-    assert set(office.tally.lost) == {"RB"}
+    assert set(office.state.lost) == {"RB"}
 
 
 # Its counts
@@ -363,14 +363,14 @@ def test_it_has_checked_what_cannot_be(lied: Callable[..., InMemoryNetwork], cha
 )
 def test_counts_that_cannot_be(lied: Callable[..., InMemoryNetwork], lie: Lie, why: str) -> None:
     office = lied(lie)
-    assert set(office.tally.lost) == {"RB"}
-    assert why in office.tally.lost["RB"]
+    assert set(office.state.lost) == {"RB"}
+    assert why in office.state.lost["RB"]
 
 
 def test_more_taken_in_than_was_sent(lied: Callable[..., InMemoryNetwork]) -> None:
     """The sums tell that somebody lies; the report, held against its own earlier words, who."""
     office = lied(traitors.counting(lambda sent: sent, lambda received: received + 3))
-    assert set(office.tally.lost) == {"RB"}
+    assert set(office.state.lost) == {"RB"}
 
 
 def exchanging(change: Callable[[Exchanged], Exchanged], who: str = "RA") -> Lie:
@@ -399,36 +399,43 @@ def test_messages_that_nobody_has_sent(
     lied: Callable[..., InMemoryNetwork], change: Callable[[Exchanged], Exchanged], why: str
 ) -> None:
     office = lied(exchanging(change))
-    doubts = office.tally.doubts_about_counts
+    doubts = office.state.doubts_about_counts
     assert [set(doubt.between) for doubt in doubts] == [{"RA", "RB"}]
     assert doubts[0].why.startswith(why)
-    assert not office.tally.doubts_about_verdict, "a solution is checked, whatever was counted"
+    assert not office.state.doubts_about_verdict, "a solution is checked, whatever was counted"
 
 
-def quiet(accounts: dict[str, Account], heard: dict[str, tuple[int, int]], traits: Traits) -> SearchState:
+def quiet(accounts: dict[str, Account], heard: dict[str, tuple[int, int]], traits: Traits) -> AuditedSearchState:
     """All have answered two waves, and reported."""
-    tally = begun(traits)
+    state = begun(traits)
     for _ in range(2):
-        wave = tally.counters.begin_wave()
+        wave = state.counters.begin_wave()
         for name, counts in heard.items():
-            assert not tally.hear(name, Counters(1, wave, *counts))
+            assert not state.handle(name, Counters(1, wave, *counts))
     for name, account in accounts.items():
-        assert not tally.hear(name, account)
-    assert tally.counters.quiescent
-    return tally
+        assert not state.handle(name, account)
+    assert state.counters.quiescent
+    return state
 
 
 def reported(kind: str = "Ok", checks: int = 0, **exchanged: Exchanged) -> Account:
     sent = sum(one.sent for one in exchanged.values())
-    return Account(1, False, {}, Metrics({kind: sent}, sent, 0, checks, largest=min(sent, 1)), NOTHING, exchanged)
+    return Account(
+        1,
+        {},
+        Metrics({kind: sent}, sent, 0, checks, largest=min(sent, 1)),
+        NOTHING,
+        assigned=False,
+        exchanged=exchanged,
+    )
 
 
 def test_quiet_too_early() -> None:
     """RB has counted as many messages taken in as RA sent it; RA's message to RC, it says, it has had itself."""
     heard = {"RA": (2, 0), "RB": (0, 2), "RC": (0, 0)}
     accounts = {"RA": reported(RB=Exchanged(1), RC=Exchanged(1)), "RB": reported(RA=Exchanged(0, 2)), "RC": reported()}
-    tally = quiet(accounts, heard, SFB.traits)
-    assert [doubt.between for doubt in tally.doubts_about_verdict] == [("RA", "RB"), ("RA", "RC")]
+    state = quiet(accounts, heard, SFB.traits)
+    assert [doubt.between for doubt in state.doubts_about_verdict] == [("RA", "RB"), ("RA", "RC")]
     assert not quiet(accounts, heard, ABT.traits).doubts_about_verdict, (
         "where nothing is minimised, the answer is checked"
     )
@@ -441,35 +448,35 @@ def test_whom_it_stirs_after_all_were_quiet_is_not_blamed() -> None:
         "RB": reported(RA=Exchanged(1, 1)),
         "RC": reported(),
     }
-    tally = begun(SFB.traits)
+    state = begun(SFB.traits)
     for _ in range(2):
-        wave = tally.counters.begin_wave()
+        wave = state.counters.begin_wave()
         for name, counts in heard.items():
-            tally.hear(name, Counters(1, wave, *counts))
-    assert not tally.hear("RA", accounts["RA"]), "it has answered what it was told"
-    assert tally.hear("RB", accounts["RB"]) == "it has sent messages after all were quiet, in answer to none"
-    assert not tally.hear("RC", accounts["RC"])
+            state.handle(name, Counters(1, wave, *counts))
+    assert not state.handle("RA", accounts["RA"]), "it has answered what it was told"
+    assert state.handle("RB", accounts["RB"]) == "it has sent messages after all were quiet, in answer to none"
+    assert not state.handle("RC", accounts["RC"])
 
 
 def test_who_keeps_it_awake() -> None:
-    tally = begun()
-    assert not tally.hear("RA", reported(RB=Exchanged(150, 3)))
-    assert not tally.hear("RB", reported(RA=Exchanged(3, 2), RC=Exchanged(0, 0)))
-    assert not tally.hear("RC", reported())
-    assert tally.restless == "RA says that it has sent RB 150 messages, and RB that it has had 2 of it"
+    state = begun()
+    assert not state.handle("RA", reported(RB=Exchanged(150, 3)))
+    assert not state.handle("RB", reported(RA=Exchanged(3, 2), RC=Exchanged(0, 0)))
+    assert not state.handle("RC", reported())
+    assert state.unfinished == "RA says that it has sent RB 150 messages, and RB that it has had 2 of it"
 
 
 def test_who_does_not_answer() -> None:
-    tally = begun()
-    for name in tally.order:
-        tally.hear(name, Ready(1))
-    tally.hear("RA", Counters(1, tally.counters.begin_wave(), 150, 3))
-    tally.note_end(1, in_time=False)
-    assert tally.restless == "RB, RC have not answered the master"
+    state = begun()
+    for name in state.order:
+        state.handle(name, Ready(1))
+    state.handle("RA", Counters(1, state.counters.begin_wave(), 150, 3))
+    state.note_end(1, in_time=False)
+    assert state.unfinished == "RB, RC have not answered the master"
 
 
 def test_who_was_never_ready() -> None:
-    tally = begun()
-    tally.hear("RA", Ready(1))
-    tally.note_end(1, in_time=False)
-    assert tally.restless.startswith("RB, RC have not answered the master")
+    state = begun()
+    state.handle("RA", Ready(1))
+    state.note_end(1, in_time=False)
+    assert state.unfinished.startswith("RB, RC have not answered the master")

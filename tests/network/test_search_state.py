@@ -1,12 +1,12 @@
-"""The tally of a search: who is ready, when it is over, and what came of it."""
+"""The state of a search: who is ready, when it is over, and what came of it."""
 
 from __future__ import annotations
 
 import pytest
 
 from robochoc.communication.control import Conclusion, Counters, OfEpoch, Ready
-from robochoc.communication.network.control_messages import Account, Checked, Exchanged, Said
-from robochoc.communication.network.search_state import SearchState
+from robochoc.communication.network.audited_state import AuditedSearchState
+from robochoc.communication.network.control_messages import Account, Checked, Exchanged, ProtocolMessage
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.findings import NOTHING, Findings
 
@@ -17,45 +17,45 @@ def account(epoch: int = 1, values: dict[str, int] | None = None, to: str = "R3"
     """What a robot reports that has sent all its messages `to` one, and heard nothing."""
     sent = spent.pop("ok", 0)
     exchanged = {to: Exchanged(sent)} if sent else {}
-    return Account(epoch, bool(values), values or {}, Metrics(messages={"Ok": sent}, **spent), NOTHING, exchanged)
+    return Account(epoch, values or {}, Metrics(messages={"Ok": sent}, **spent), NOTHING, bool(values), exchanged)
 
 
-def begun(tally: SearchState) -> SearchState:
+def begun(state: AuditedSearchState) -> AuditedSearchState:
     """The search is ordered."""
-    tally.ordered = True
-    return tally
+    state.ordered = True
+    return state
 
 
-def all_hear(tally: SearchState, word: OfEpoch) -> None:
+def all_hear(state: AuditedSearchState, word: OfEpoch) -> None:
     for name in ROBOTS:
-        assert not tally.hear(name, word)
+        assert not state.handle(name, word)
 
 
-def waved(tally: SearchState, sent: int, received: int) -> None:
+def waved(state: AuditedSearchState, sent: int, received: int) -> None:
     """Ask all, who answer with these counters each."""
-    all_hear(tally, Counters(1, tally.counters.begin_wave(), sent, received))
+    all_hear(state, Counters(1, state.counters.begin_wave(), sent, received))
 
 
 def test_ready_when_all_are() -> None:
-    tally = SearchState(1, ROBOTS)
+    state = AuditedSearchState(1, ROBOTS)
     for name in ROBOTS:
-        assert not tally.ready
-        tally.hear(name, Ready(1))
-    assert tally.ready
+        assert not state.ready
+        state.handle(name, Ready(1))
+    assert state.ready
 
 
 def test_nothing_is_awaited_before_the_first_search() -> None:
-    tally = SearchState()
-    assert tally.ready
-    assert not tally.hear("R1", Ready(0))
-    assert not tally.hear("R1", Account(0, True, {"X": 1}, Metrics(), NOTHING))
-    assert tally.result(0).verdict is Verdict.UNKNOWN
-    assert not tally.assigned
+    state = AuditedSearchState()
+    assert state.ready
+    assert not state.handle("R1", Ready(0))
+    assert not state.handle("R1", Account(0, {"X": 1}, Metrics(), NOTHING, assigned=True))
+    assert state.result(0).verdict is Verdict.UNKNOWN
+    assert not state.assigned
 
 
 @pytest.mark.parametrize("epoch", [0, 1, 3])
 def test_late_words_of_other_searches_say_nothing(epoch: int) -> None:
-    tally = SearchState(2, ROBOTS)
+    state = AuditedSearchState(2, ROBOTS)
     for word in (
         Ready(epoch),
         Counters(epoch, 0, 7, 7),
@@ -63,148 +63,148 @@ def test_late_words_of_other_searches_say_nothing(epoch: int) -> None:
         account(epoch, {"X": 1}),
         Checked(epoch, allowed=False, cost=5),
     ):
-        all_hear(tally, word)
-    assert not tally.ready
-    assert (tally.verdict, tally.silent, tally.unchecked) == (None, ROBOTS, True)
-    assert (tally.cost, tally.counters.sent, tally.wave_due) == (0, 0, False)
+        all_hear(state, word)
+    assert not state.ready
+    assert (state.verdict, state.pending_reports, state.unchecked) == (None, ROBOTS, True)
+    assert (state.cost, state.counters.sent, state.wave_due) == (0, 0, False)
 
 
 def test_strangers_say_nothing() -> None:
-    tally = SearchState(1, ROBOTS)
+    state = AuditedSearchState(1, ROBOTS)
     for word in (Ready(1), Counters(1, 0, 1, 1), Conclusion(1, "solution"), account(1, {"X": 1})):
-        assert not tally.hear("R9", word)
-    assert tally.verdict is None
-    assert not tally.assigned
+        assert not state.handle("R9", word)
+    assert state.verdict is None
+    assert not state.assigned
 
 
 @pytest.mark.parametrize("verdict", ["", "bogus", "SOLUTION", "Solution "])
 def test_a_verdict_that_is_none_is_refused(verdict: str) -> None:
-    tally = begun(SearchState(1, ROBOTS))
-    assert tally.hear("R1", Conclusion(1, verdict)).startswith("it has concluded what is no verdict")
-    assert tally.verdict is None
+    state = begun(AuditedSearchState(1, ROBOTS))
+    assert state.handle("R1", Conclusion(1, verdict)).startswith("it has concluded what is no verdict")
+    assert state.verdict is None
 
 
 def test_words_that_are_not_for_the_master_are_told() -> None:
-    assert SearchState(1, ROBOTS).hear("R1", Said(1, 0, b"")) == "it is none for the master"
+    assert AuditedSearchState(1, ROBOTS).handle("R1", ProtocolMessage(1, 0, b"")) == "it is none for the master"
 
 
-def quiet(tally: SearchState) -> bool:
+def quiet(state: AuditedSearchState) -> bool:
     """Whether nobody will ever say anything again."""
-    return tally.counters.quiescent
+    return state.counters.quiescent
 
 
-def due(tally: SearchState) -> bool:
+def due(state: AuditedSearchState) -> bool:
     """Whether it is worth asking all."""
-    return tally.wave_due
+    return state.wave_due
 
 
-def enough(tally: SearchState) -> bool:
+def enough(state: AuditedSearchState) -> bool:
     """Whether there were messages enough."""
-    return tally.broken_off
+    return state.broken_off
 
 
 def test_two_waves_of_equal_sums_are_quiet() -> None:
-    tally = SearchState(1, ROBOTS)
-    assert not due(tally)
-    all_hear(tally, Counters(1, 0, 2, 2))
-    assert due(tally)
-    waved(tally, 2, 2)
-    assert tally.counters.quiescent
+    state = AuditedSearchState(1, ROBOTS)
+    assert not due(state)
+    all_hear(state, Counters(1, 0, 2, 2))
+    assert due(state)
+    waved(state, 2, 2)
+    assert state.counters.quiescent
 
 
 def test_news_between_two_waves_are_not_quiet() -> None:
-    tally = SearchState(1, ROBOTS)
-    all_hear(tally, Counters(1, 0, 2, 2))
-    waved(tally, 3, 3)
-    assert not quiet(tally)
-    assert tally.wave_due
-    waved(tally, 3, 3)
-    assert quiet(tally)
+    state = AuditedSearchState(1, ROBOTS)
+    all_hear(state, Counters(1, 0, 2, 2))
+    waved(state, 3, 3)
+    assert not quiet(state)
+    assert state.wave_due
+    waved(state, 3, 3)
+    assert quiet(state)
 
 
 def test_what_is_under_way_is_not_quiet() -> None:
-    tally = SearchState(1, ROBOTS)
+    state = AuditedSearchState(1, ROBOTS)
     for _ in range(3):
-        waved(tally, 3, 2)
-    assert not tally.counters.quiescent
-    assert not tally.wave_due
+        waved(state, 3, 2)
+    assert not state.counters.quiescent
+    assert not state.wave_due
 
 
 def test_a_limit_on_messages_breaks_off() -> None:
-    tally = SearchState(1, ROBOTS, enough=9)
-    assert tally.wave_due  # how many there are is asked for all the time
-    waved(tally, 2, 0)
-    assert not enough(tally)
-    waved(tally, 3, 0)
-    assert tally.broken_off
-    assert tally.result(0).verdict is Verdict.UNKNOWN
+    state = AuditedSearchState(1, ROBOTS, max_messages=9)
+    assert state.wave_due  # how many there are is asked for all the time
+    waved(state, 2, 0)
+    assert not enough(state)
+    waved(state, 3, 0)
+    assert state.broken_off
+    assert state.result(0).verdict is Verdict.UNKNOWN
 
 
 def test_a_verdict_and_its_witness() -> None:
-    tally = begun(SearchState(1, ROBOTS))
-    tally.hear("R2", Conclusion(1, "no-solution"))
-    all_hear(tally, account())
-    result = tally.result(1.5)
+    state = begun(AuditedSearchState(1, ROBOTS))
+    state.handle("R2", Conclusion(1, "no-solution"))
+    all_hear(state, account())
+    result = state.result(1.5)
     assert (result.verdict, result.witness) == (Verdict.NO_SOLUTION, "R2")
     assert result.metrics.wall_s == 1.5
 
 
 def test_accounts_make_the_result() -> None:
-    tally = SearchState(1, ROBOTS)
-    tally.verdict = Verdict.SOLUTION
-    tally.hear("R1", account(1, {"X": 1}, ok=3, bytes=10, largest=4, ncccs=5, checks=6))
-    tally.hear("R2", account(1, {"Y": 2}, ok=4, bytes=20, largest=8, ncccs=1, checks=9))
-    assert list(tally.silent) == ["R3"]
-    tally.hear("R3", Account(1, False, {}, Metrics(), Findings(bound=4)))
-    assert not list(tally.silent)
-    result = tally.result(0)
+    state = AuditedSearchState(1, ROBOTS)
+    state.verdict = Verdict.SOLUTION
+    state.handle("R1", account(1, {"X": 1}, ok=3, bytes=10, largest=4, ncccs=5, checks=6))
+    state.handle("R2", account(1, {"Y": 2}, ok=4, bytes=20, largest=8, ncccs=1, checks=9))
+    assert list(state.pending_reports) == ["R3"]
+    state.handle("R3", Account(1, {}, Metrics(), Findings(bound=4), assigned=False))
+    assert not list(state.pending_reports)
+    result = state.result(0)
     assert result.assignments == {"R1": {"X": 1}, "R2": {"Y": 2}, "R3": {}}
     assert (result.metrics.messages, result.metrics.bytes, result.metrics.largest) == ({"Ok": 7}, 30, 8)
     assert (result.metrics.ncccs, result.metrics.checks) == (5, 15)
     assert result.findings["R3"] == Findings(bound=4)
-    assert tally.assigned == {"R1": True, "R2": True, "R3": False}
+    assert state.assigned == {"R1": True, "R2": True, "R3": False}
 
 
 def test_a_lost_robot_is_waited_for_no_longer_and_its_words_are_void() -> None:
-    tally = SearchState(1, ROBOTS)
-    tally.hear("R1", Ready(1))
-    tally.hear("R2", Ready(1))
-    tally.hear("R3", Conclusion(1, "no-solution"))
-    tally.hear("R3", account(1, {"Z": 1}))
-    tally.lose("R3", "it fell")
-    tally.lose("R3", "again")
-    assert tally.ready
-    assert tally.broken_off
-    assert tally.silent == ("R1", "R2")
-    tally.hear("R3", account(1, {"Z": 2}))
-    tally.hear("R1", account(1, {"X": 1}))
-    tally.hear("R2", account(1, {"Y": 1}))
-    result = tally.result(0)
+    state = AuditedSearchState(1, ROBOTS)
+    state.handle("R1", Ready(1))
+    state.handle("R2", Ready(1))
+    state.handle("R3", Conclusion(1, "no-solution"))
+    state.handle("R3", account(1, {"Z": 1}))
+    state.lose("R3", "it fell")
+    state.lose("R3", "again")
+    assert state.ready
+    assert state.broken_off
+    assert state.pending_reports == ("R1", "R2")
+    state.handle("R3", account(1, {"Z": 2}))
+    state.handle("R1", account(1, {"X": 1}))
+    state.handle("R2", account(1, {"Y": 1}))
+    result = state.result(0)
     assert (result.verdict, result.witness, result.lost) == (Verdict.UNKNOWN, None, {"R3": "it fell"})
     assert "R3" not in result.assignments
 
 
-def checked(tally: SearchState) -> bool:
+def checked(state: AuditedSearchState) -> bool:
     """Whether all have held their constraints against the decision."""
-    assert not (tally.unchecked and tally.held)
-    return not tally.unchecked
+    assert not (state.unchecked and state.held)
+    return not state.unchecked
 
 
 def test_all_have_to_check() -> None:
-    tally = SearchState(1, ROBOTS)
-    all_hear(tally, account(1, {"X": 1}))
-    tally.hear("R1", Checked(1, allowed=True, cost=2))
-    tally.hear("R2", Checked(1, allowed=True, cost=3))
-    assert not checked(tally)
-    tally.hear("R3", Checked(1, allowed=True, cost=0))
-    assert checked(tally)
-    assert tally.held
-    assert tally.cost == 5
+    state = AuditedSearchState(1, ROBOTS)
+    all_hear(state, account(1, {"X": 1}))
+    state.handle("R1", Checked(1, allowed=True, cost=2))
+    state.handle("R2", Checked(1, allowed=True, cost=3))
+    assert not checked(state)
+    state.handle("R3", Checked(1, allowed=True, cost=0))
+    assert checked(state)
+    assert state.held
+    assert state.cost == 5
 
 
 def test_one_broken_constraint_is_enough() -> None:
-    tally = SearchState(1, ROBOTS)
-    all_hear(tally, Checked(1, allowed=True, cost=0))
-    tally.hear("R2", Checked(1, allowed=False, cost=0))
-    assert not tally.unchecked
-    assert not tally.held
+    state = AuditedSearchState(1, ROBOTS)
+    all_hear(state, Checked(1, allowed=True, cost=0))
+    state.handle("R2", Checked(1, allowed=False, cost=0))
+    assert not state.unchecked
+    assert not state.held

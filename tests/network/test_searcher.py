@@ -9,21 +9,22 @@ import pytest
 
 from robochoc.communication.control import Conclusion, Counters, Events, Ready
 from robochoc.communication.host import BadMessageError
+from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import (
     LATEST,
     Account,
+    Charge,
     Checked,
     Copies,
-    Judged,
-    Said,
+    ProtocolMessage,
     Task,
     ToMaster,
 )
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.quotas import MIB
-from robochoc.communication.network.search_state import SearchState
-from robochoc.communication.network.searcher import EVENTS_AT_ONCE, Searcher, Surroundings
+from robochoc.communication.network.searcher import RobotContext, Searcher
 from robochoc.communication.network.shared import SharedRecord, record_of
+from robochoc.communication.robot_loop import EVENTS_AT_ONCE
 from robochoc.formats import PREDEFINED
 from robochoc.journal.events import Received
 from robochoc.model.message import Envelope, encode
@@ -45,11 +46,11 @@ class Around:
     """What a searcher has said and sent."""
 
     said: list[ToMaster] = field(default_factory=list)
-    sent: list[tuple[str, Said | Copies]] = field(default_factory=list)
+    sent: list[tuple[str, ProtocolMessage | Copies]] = field(default_factory=list)
     places: list[tuple[int, int]] = field(default_factory=list)
 
-    def surroundings(self, *, observed: bool = False, private: bool = False) -> Surroundings:
-        return Surroundings(
+    def context(self, *, observed: bool = False, private: bool = False) -> RobotContext:
+        return RobotContext(
             self.said.append,
             lambda receiver, word: self.sent.append((receiver, word)),
             lambda rank, size: self.places.append((rank, size)),
@@ -76,7 +77,7 @@ def tasks(team: Team, protocol: type[Protocol], brief: RunParameters = DEFAULT_P
 
 
 def searcher(
-    around: Surroundings,
+    around: RobotContext,
     protocol: type[Protocol] = ABT,
     brief: RunParameters = DEFAULT_PARAMETERS,
     team: Team | None = None,
@@ -92,30 +93,30 @@ def ok(value: int | None, clock: int = 0) -> Envelope:
 
 def said_all(one: Searcher) -> bool:
     """Whether the master knows the counters."""
-    return not one.restless
+    return not one.is_restless
 
 
 def test_ready_once_with_its_place() -> None:
     around = Around()
-    one = searcher(around.surroundings())
+    one = searcher(around.context())
     one.prepare()
     assert around.said == [Ready(1)]
     assert around.places == [(1, 3)]
     assert not around.sent
-    assert not one.restless
+    assert not one.is_restless
     assert one.assignment == {}
 
 
 def test_where_all_know_a_constraint_its_holder_tells_and_waits_to_be_told() -> None:
     around = Around()
-    one = searcher(around.surroundings(), AWC)
+    one = searcher(around.context(), AWC)
     one.prepare()
     assert not around.said
     ((receiver, word),) = around.sent
     assert receiver == "RA"
     assert isinstance(word, Copies)
     assert [record.scope for record in msgspec.msgpack.decode(word.content, type=list[SharedRecord])] == [("A", "B")]
-    one.search()
+    one.begin(0)
     assert len(around.sent) == 1  # not ready: there is nothing to begin
     one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held_above(chain()["RC"])))))
     one.learn("RC", b"\x90")
@@ -124,47 +125,47 @@ def test_where_all_know_a_constraint_its_holder_tells_and_waits_to_be_told() -> 
 
 def test_searching_counts_and_tells() -> None:
     around = Around()
-    one = searcher(around.surroundings())
+    one = searcher(around.context())
     one.prepare()
-    assert not one.hear(ok(1))  # before the start it waits
-    one.search()
+    assert not one.admit(ok(1))  # before the start it waits
+    one.begin(0)
     assert not said_all(one)
     (said,) = [word for _, word in around.sent[-1:]]
-    assert isinstance(said, Said)
+    assert isinstance(said, ProtocolMessage)
     assert one.assignment == {"B": 2}
-    one.tell_counters(0)
+    one.report_counters(0)
     assert said_all(one)
     assert around.said[-1] == Counters(1, 0, len(around.sent), 1)
-    assert one.hear(ok(2, clock=50))
+    assert one.admit(ok(2, clock=50))
     one.take_in([ok(2, clock=50)])
     assert not said_all(one)
     assert one.assignment == {"B": 1}
     last = around.sent[-1][1]
-    assert isinstance(last, Said)
+    assert isinstance(last, ProtocolMessage)
     assert last.clock > 50
 
 
 def test_after_the_end_nothing_is_taken_in() -> None:
     around = Around()
-    one = searcher(around.surroundings())
+    one = searcher(around.context())
     one.prepare()
-    one.search()
+    one.begin(0)
     one.take_in([ok(1)])
     one.pause()
     sent = len(around.sent)
     (account,) = around.heard(Account)
     assert isinstance(account, Account)
     assert account.assignment == {"B": 2}
-    assert not one.hear(ok(2))
+    assert not one.admit(ok(2))
     one.take_in([ok(2), Envelope("RA", "RB", b"no message", 0)])
     assert one.assignment == {"B": 2}
     assert len(around.sent) == sent
-    assert not one.restless
+    assert not one.is_restless
 
 
 def test_nothing_is_taken_in_before_the_start() -> None:
     around = Around()
-    one = searcher(around.surroundings())
+    one = searcher(around.context())
     one.prepare()
     one.take_in([ok(1)])
     assert not around.sent
@@ -172,27 +173,27 @@ def test_nothing_is_taken_in_before_the_start() -> None:
 
 
 def test_what_is_no_message_is_bad() -> None:
-    one = searcher(Around().surroundings())
+    one = searcher(Around().context())
     one.prepare()
-    one.search()
+    one.begin(0)
     with pytest.raises(BadMessageError, match="RA sent RB what is no message"):
         one.take_in([Envelope("RA", "RB", b"\x93", 0)])
 
 
 def test_what_waits_for_the_start_is_bounded_for_each_sender() -> None:
-    one = searcher(Around().surroundings())
+    one = searcher(Around().context())
     one.prepare()
     much = bytes(100 * MIB)
     for _ in range(2):
-        assert not one.hear(Envelope("RA", "RB", much, 0))
+        assert not one.admit(Envelope("RA", "RB", much, 0))
     with pytest.raises(BadMessageError, match="RA says too much before the search has begun"):
-        one.hear(Envelope("RA", "RB", much, 0))
-    assert not one.hear(Envelope("RC", "RB", much, 0))
+        one.admit(Envelope("RA", "RB", much, 0))
+    assert not one.admit(Envelope("RC", "RB", much, 0))
 
 
 def test_who_never_was_ready_reports_all_the_same() -> None:
     around = Around()
-    one = searcher(around.surroundings(), AWC)
+    one = searcher(around.context(), AWC)
     one.prepare()
     one.pause()
     (account,) = around.said
@@ -203,9 +204,9 @@ def test_who_never_was_ready_reports_all_the_same() -> None:
 def test_in_a_private_run_values_stay_at_home() -> None:
     for private in (False, True):
         around = Around()
-        one = searcher(around.surroundings(private=private))
+        one = searcher(around.context(private=private))
         one.prepare()
-        one.search()
+        one.begin(0)
         one.pause()
         (account,) = around.heard(Account)
         assert isinstance(account, Account)
@@ -218,9 +219,9 @@ def test_in_a_private_run_values_stay_at_home() -> None:
 def test_events_are_told_if_anybody_wants_them_and_not_too_many_at_once() -> None:
     for observed in (False, True):
         around = Around()
-        one = searcher(around.surroundings(observed=observed))
+        one = searcher(around.context(observed=observed))
         one.prepare()
-        one.search()
+        one.begin(0)
         one.take_in([ok(1 + number % 2) for number in range(2 * EVENTS_AT_ONCE)])
         one.pause()
         told = [word.events for word in around.said if isinstance(word, Events)]
@@ -232,9 +233,9 @@ def test_events_are_told_if_anybody_wants_them_and_not_too_many_at_once() -> Non
 def test_a_verdict_is_told_once() -> None:
     team = team_of({"A": (1,), "B": (1,), "C": (1,)}, chain().constraints())
     around = Around()
-    one = Searcher(CompiledRobot(team["RA"]), tasks(team, ABT)["RA"], ABT, around.surroundings())
+    one = Searcher(CompiledRobot(team["RA"]), tasks(team, ABT)["RA"], ABT, around.context())
     one.prepare()
-    one.search()
+    one.begin(0)
     nogood = msgspec.msgpack.encode(["Nogood", {}, [1]])
     for _ in range(2):
         one.take_in([Envelope("RB", "RA", nogood, 0)])
@@ -243,37 +244,37 @@ def test_a_verdict_is_told_once() -> None:
 
 def test_checking_is_by_the_own_file() -> None:
     around = Around()
-    one = searcher(around.surroundings())
+    one = searcher(around.context())
     one.prepare()
-    one.search()
+    one.begin(0)
     one.take_in([ok(1)])
-    assert one.judged({"A": 1, "C": 1}) == judgement(price=0)
-    assert one.judged({"A": 2, "C": 2}) == judgement(price=INFINITE)
-    assert one.judged({"A": 1, "B": 1}) == judgement(price=0)  # its own value it knows itself
-    assert one.judged({"C": 2}) == Checked(1, allowed=True, cost=0, held=1)  # RA has stepped aside
+    assert one.check_constraints({"A": 1, "C": 1}) == judgement(price=0)
+    assert one.check_constraints({"A": 2, "C": 2}) == judgement(price=INFINITE)
+    assert one.check_constraints({"A": 1, "B": 1}) == judgement(price=0)  # its own value it knows itself
+    assert one.check_constraints({"C": 2}) == Checked(1, allowed=True, cost=0, held=1)  # RA has stepped aside
 
 
 def judgement(price: float) -> Checked:
     """Of RB's two constraints the private one holds, and RA can know the other."""
     allowed = price < INFINITE
-    return Checked(1, allowed, price if allowed else 0, held=2, shared=(Judged("RB", ("A", "B"), 1, price),))
+    return Checked(1, allowed, price if allowed else 0, held=2, shared=(Charge("RB", ("A", "B"), 1, price),))
 
 
 def test_checking_adds_up_what_its_constraints_charge() -> None:
     around = Around()
-    one = searcher(around.surroundings(), team=chain(4))
+    one = searcher(around.context(), team=chain(4))
     one.prepare()
-    one.search()
+    one.begin(0)
     assert one.assignment == {"B": 1}
-    assert one.judged({"A": 1}) == judgement(price=4)
-    assert one.judged({"A": 2}) == judgement(price=0)
+    assert one.check_constraints({"A": 1}) == judgement(price=4)
+    assert one.check_constraints({"A": 2}) == judgement(price=0)
 
 
 def test_who_steps_aside_answers_for_nothing() -> None:
     around = Around()
-    one = searcher(around.surroundings(), brief=RunParameters(withdrawal_cost=1))
+    one = searcher(around.context(), brief=RunParameters(withdrawal_cost=1))
     one.prepare()
-    assert one.judged({"A": 1, "C": 1}) == Checked(1, allowed=True, cost=0)
+    assert one.check_constraints({"A": 1, "C": 1}) == Checked(1, allowed=True, cost=0)
 
 
 # What others tell it must not make it say what cannot be: it would be lost for that
@@ -283,29 +284,29 @@ def believed(around: Around) -> Account:
     """Its account, which the master believes."""
     (account,) = around.heard(Account)
     assert isinstance(account, Account)
-    assert not SearchState(1, ("RA", "RB", "RC")).hear("RB", account)
+    assert not AuditedSearchState(1, ("RA", "RB", "RC")).handle("RB", account)
     return account
 
 
 def test_a_clock_that_another_has_set_as_late_as_can_be() -> None:
     around = Around()
-    one = searcher(around.surroundings())
+    one = searcher(around.context())
     one.prepare()
-    one.search()
+    one.begin(0)
     one.take_in([ok(1, clock=LATEST)])
     last = around.sent[-1][1]
-    assert isinstance(last, Said)
+    assert isinstance(last, ProtocolMessage)
     assert last.clock == LATEST
-    msgspec.msgpack.decode(msgspec.msgpack.encode(last), type=Said)  # others can read it
+    msgspec.msgpack.decode(msgspec.msgpack.encode(last), type=ProtocolMessage)  # others can read it
     one.pause()
     assert believed(around).metrics.ncccs == LATEST
 
 
 def test_costs_that_another_has_made_up_are_not_passed_on() -> None:
     around = Around()
-    one = searcher(around.surroundings(), SyncBB, team=chain(4))
+    one = searcher(around.context(), SyncBB, team=chain(4))
     one.prepare()
-    one.search()
+    one.begin(0)
     best = BestPath(-5, ((1,), (2,), (1,)))
     one.take_in([Envelope("RA", "RB", encode(Path([((1,), 0)], best)), 0)])
     one.pause()
@@ -314,11 +315,11 @@ def test_costs_that_another_has_made_up_are_not_passed_on() -> None:
 
 def test_of_copies_it_checks_no_more_than_can_be_told(monkeypatch: pytest.MonkeyPatch) -> None:
     around = Around()
-    one = searcher(around.surroundings(), AWC)
+    one = searcher(around.context(), AWC)
     one.prepare()
     one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held_above(chain()["RC"])))))
-    one.search()
-    copy = Judged("RC", ("B", "C"), 1, 0)
-    assert one.judged({"A": 2, "C": 2}).copies == (copy,)
-    monkeypatch.setattr("robochoc.communication.network.searcher.MOST_JUDGED", 1)
-    assert one.judged({"A": 2, "C": 2}).copies == ()
+    one.begin(0)
+    copy = Charge("RC", ("B", "C"), 1, 0)
+    assert one.check_constraints({"A": 2, "C": 2}).copies == (copy,)
+    monkeypatch.setattr("robochoc.communication.network.constraint_check.MOST_CHARGES", 1)
+    assert one.check_constraints({"A": 2, "C": 2}).copies == ()

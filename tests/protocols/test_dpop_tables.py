@@ -11,7 +11,8 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from robochoc.communication.processes import queues, robot_process
+from robochoc.communication.processes import queues
+from robochoc.communication.processes.queue_robot import QueueRobot
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.expression import Type, parse
 from robochoc.model.problem import Constraint, Predicate, Team
@@ -163,7 +164,7 @@ def test_tables_of_several_mib_travel(runtime: Runtime) -> None:
 def test_tables_larger_than_a_queue_takes_travel_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """And the journal of such a run is kept, over a pipe that takes no more either."""
     monkeypatch.setattr(queues, "LARGEST_BODY", 1 << 20)
-    monkeypatch.setattr(robot_process, "BUNDLE_BYTES", 1 << 18)
+    monkeypatch.setattr(QueueRobot, "bundle_bytes", 1 << 18)
     monkeypatch.setattr(dpop_tables, "PIECE", 1 << 18)
     team, least = large()
     events: list[AnyEvent] = []

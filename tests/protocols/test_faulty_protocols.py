@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from robochoc.communication.processes.processes import ProcessesRun
-from robochoc.communication.processes.robot_link import RobotsLostError
+from robochoc.communication.run_result import RobotsLostError
 from robochoc.journal.events import AnyEvent, Lost
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.protocol import Protocol

@@ -16,16 +16,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robochoc.ros.live import rosbridge
+from robochoc.ros.live import rosbridge_connection
 from robochoc.ros.live.inbox import Inbox
-from robochoc.ros.live.rosbridge import (
-    Address,
-    MalformedMessageError,
-    RosbridgeSink,
-    RosbridgeSource,
-    incoming,
-    outgoing,
-)
+from robochoc.ros.live.rosbridge import RosbridgeSink, RosbridgeSource
+from robochoc.ros.live.rosbridge_connection import Address
+from robochoc.ros.live.rosbridge_json import MalformedMessageError, incoming, outgoing
 from robochoc.ros.sink import SinkError
 from robochoc.ros.source import ReceivedMessage, SourceError
 from tests.support.clocks import waiting
@@ -71,7 +66,7 @@ def publish_long(sink: RosbridgeSink, times: int) -> None:
 @pytest.fixture(autouse=True)
 def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("CONNECT_S", "DRAIN_S", "CONFIRM_S", "CLOSE_S"):
-        monkeypatch.setattr(rosbridge, name, 0.6)
+        monkeypatch.setattr(rosbridge_connection, name, 0.6)
 
 
 @pytest.fixture
@@ -219,7 +214,7 @@ def test_a_message_that_is_too_long_ends_it() -> None:
     with Server() as server, RosbridgeSource(server.place) as source:
         source.listen({"/a/blocked": "geometry_msgs/PointStamped"})
         assert server.wait_for(lambda: "subscribe" in server.log)
-        server.say("/a/blocked", {"x": "x" * (rosbridge.MOST_BYTES + 1)})
+        server.say("/a/blocked", {"x": "x" * (rosbridge_connection.MESSAGE_BYTES_MAX + 1)})
         with waiting(5), pytest.raises(SourceError, match="has closed the connection"):
             source.next(30)
 

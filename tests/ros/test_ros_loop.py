@@ -11,7 +11,7 @@ from dataclasses import replace
 import pytest
 
 from robochoc.api import Problem
-from robochoc.communication.processes.robot_link import RobotsLostError
+from robochoc.communication.run_result import RobotsLostError
 from robochoc.formats import read_team
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import AddAgent, RemoveAgent, RemoveValue, ScenarioEvent, Team

@@ -12,8 +12,9 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
 
-from robochoc.ros.live import rospy_node
-from robochoc.ros.live.rospy_node import RospySink, RospySource, fields_of, filled, message_class
+from robochoc.ros.live import ros_master
+from robochoc.ros.live.rospy_messages import fields_of, filled, message_class
+from robochoc.ros.live.rospy_node import RospySink, RospySource
 from robochoc.ros.sink import SinkError
 from robochoc.ros.source import SourceError
 from tests.support.clocks import waiting
@@ -24,7 +25,7 @@ from tests.support.fake_servers import fake_server
 def _rospy(monkeypatch: pytest.MonkeyPatch) -> None:
     """One that can be imported, and would fail if anybody used it."""
     monkeypatch.setitem(sys.modules, "rospy", ModuleType("rospy"))
-    monkeypatch.setattr(rospy_node, "MASTER_S", 0.3)
+    monkeypatch.setattr(ros_master, "MASTER_S", 0.3)
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ from typing import cast
 
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Failed, OfEpoch, Pause, Wave
+from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import (
     Joined,
     Judge,
@@ -25,7 +26,6 @@ from robochoc.communication.network.framing import MASTER, Framing
 from robochoc.communication.network.inbox import Arrived, Item
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.robot import Ending, NetworkRobot
-from robochoc.communication.network.search_state import SearchState
 from robochoc.communication.network.transport import Transport
 from robochoc.communication.run_result import RunResult
 from robochoc.model.outcome import Verdict
@@ -89,7 +89,7 @@ class InMemoryNetwork:
         self.traitor = traitor
         self.inboxes: dict[str, SimpleQueue[Item]] = {name: SimpleQueue() for name in (*team.order, MASTER)}
         self.members = Members(team.order)
-        self.tally = SearchState()
+        self.state = AuditedSearchState()
         self.objections: list[Objection] = []
         self.failures: dict[str, Failed] = {}
         self._protocol = protocol
@@ -113,33 +113,33 @@ class InMemoryNetwork:
 
     def search(self) -> RunResult:
         """One search, until all is quiet."""
-        tally = self.tally = SearchState(
-            self.tally.epoch + 1, self.members.order, None, self.members.declared(self._protocol.traits)
+        state = self.state = AuditedSearchState(
+            self.state.epoch + 1, self.members.order, None, self.members.declared(self._protocol.traits)
         )
-        tasks = self.members.tasks(tally.epoch, self._protocol.__name__, self._protocol.traits, self._brief)
+        tasks = self.members.tasks(state.epoch, self._protocol.__name__, self._protocol.traits, self._brief)
         for name, task in tasks.items():
             self.tell(name, task)
         self._settle()
-        if tally.ready:
-            self._tell_all(Search(tally.epoch))
-            self._searching = tally.ordered = True
+        if state.ready:
+            self._tell_all(Search(state.epoch))
+            self._searching = state.ordered = True
             self._settle()
-            while not (tally.verdict or tally.counters.quiescent or tally.broken_off) and tally.wave_due:
-                self._tell_all(Wave(tally.counters.begin_wave()))
+            while not (state.verdict or state.counters.quiescent or state.broken_off) and state.wave_due:
+                self._tell_all(Wave(state.counters.begin_wave()))
                 self._settle()
-            if tally.counters.quiescent:
-                tally.verdict = tally.verdict or Verdict.SOLUTION
+            if state.counters.quiescent:
+                state.verdict = state.verdict or Verdict.SOLUTION
         self._searching = False
         self._tell_all(Pause())
         self._settle()
-        return tally.result(0)
+        return state.result(0)
 
     def judge(self, values: dict[str, dict[str, int]]) -> tuple[bool, float]:
         """Have all check what was decided."""
         for name in self.members.order:
-            self.tell(name, Judge(self.tally.epoch, self.members.neighbourhood(name, values)))
+            self.tell(name, Judge(self.state.epoch, self.members.neighbourhood(name, values)))
         self._settle()
-        return self.tally.held, self.tally.cost
+        return self.state.held, self.state.cost
 
     def leave(self) -> dict[str, Ending]:
         """Send all home."""
@@ -154,7 +154,7 @@ class InMemoryNetwork:
         """Who says what cannot be is lost; of nobody but the `traitor` that is to be expected."""
         if fault:
             assert name == self.traitor, (name, fault)
-            self.tally.lose(name, fault)
+            self.state.lose(name, fault)
 
     def _tell_all(self, word: ToRobot) -> None:
         for name in self._robots:
@@ -163,7 +163,7 @@ class InMemoryNetwork:
     def _settle(self) -> None:
         """Until nobody has anything to say, or a search has its verdict, after which robots may talk for ever."""
         while any(not inbox.empty() for inbox in self.inboxes.values()):
-            if self._searching and self.tally.verdict is not None:
+            if self._searching and self.state.verdict is not None:
                 return
             for name, robot in self._robots.items():
                 robot.step(_drained(self.inboxes[name]))
@@ -190,7 +190,7 @@ class InMemoryNetwork:
             case Failed() as failed:
                 self.failures[name] = failed
             case OfEpoch() as word:
-                self._weigh(name, self.tally.hear(name, word))
+                self._weigh(name, self.state.handle(name, word))
             case _:
                 pass
 
@@ -216,7 +216,7 @@ class SteppedRobot(NetworkRobot):
         super().__init__(CompiledRobot(robot), identity, cast("Transport", desk), lambda _name: protocol)
 
     def begin(self) -> None:
-        self._register()
+        self._registration.send()
 
     def step(self, items: list[Item]) -> None:
         self._turn(items)

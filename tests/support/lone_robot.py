@@ -14,10 +14,10 @@ from robochoc.communication.network.control_messages import (
     Word,
 )
 from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
-from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot import Ending, NetworkRobot
+from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.transport import Transport
 from robochoc.formats import PREDEFINED
 from robochoc.model.message import encode
@@ -71,6 +71,6 @@ def played(
 
     post = ScriptedTransport("RB", answers)
     robot = NetworkRobot(
-        CompiledRobot(chain_of_three()["RB"]), UNPROVEN, cast("Transport", post), named, Manner(patience_s)
+        CompiledRobot(chain_of_three()["RB"]), UNPROVEN, cast("Transport", post), named, RobotSettings(patience_s)
     )
     return robot.run(), post

@@ -19,10 +19,10 @@ from robochoc.communication.network.control_messages import Word
 from robochoc.communication.network.framing import Framing
 from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.local import LOOPBACK
-from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.robot import Ending, NetworkRobot
+from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.network.transport import Transport
 from robochoc.communication.run_result import RunResult
@@ -65,7 +65,7 @@ class NetworkRun:
         self,
         folder: Path,
         team: Team = CHAIN,
-        conditions: NetworkSettings = NetworkSettings(),
+        settings: NetworkSettings = NetworkSettings(),
         *,
         absent: Iterable[str] = (),
         seconds: float | None = 60,
@@ -79,7 +79,7 @@ class NetworkRun:
         self.held: tuple[bool, float] | None = None
         self.endings: dict[str, Ending] = {}
         self.threads: dict[str, threading.Thread] = {}
-        self.conditions = conditions
+        self.settings = settings
         self._seconds = seconds
         self._publication = publication
         self._absent = set(absent)
@@ -92,7 +92,7 @@ class NetworkRun:
         identity = self.household.master_identity((LOOPBACK,))
         members = Members(self.team.order)
         master = Master(
-            self.household, identity, endpoint, members, self.conditions, observer=self.events.append, watched=True
+            self.household, identity, endpoint, members, self.settings, observer=self.events.append, watched=True
         )
         if self._publication:
             master.publish(self._publication)
@@ -124,7 +124,7 @@ class NetworkRun:
     def post(self, name: str, *, endpoint: str = "", patience_s: float = 10) -> Transport:
         """A connection of somebody who has an identity of `name` from the household."""
         place, identity = endpoint or self.endpoint, self.household.identity(name)
-        return Transport(place, identity, watch=(), patience_s=patience_s, lease_ms=self.conditions.lease_ms)
+        return Transport(place, identity, watch=(), patience_s=patience_s, lease_ms=self.settings.lease_ms)
 
     def let_go(self) -> RunResult:
         """Let the team search to the end, and return what came of it."""
@@ -187,7 +187,7 @@ class NetworkRun:
     @property
     def router(self) -> int:
         """The id of the router's process."""
-        process = self.master._gate._router._process  # noqa: SLF001
+        process = self.master._policy._router._process  # noqa: SLF001
         return process.pid if process else 0
 
     # Its threads
@@ -213,6 +213,6 @@ class NetworkRun:
                 self.household.identity(name),
                 post,
                 lambda _name: PausedABT,
-                Manner(self.conditions.patience_s),
+                RobotSettings(self.settings.patience_s),
             )
             self.endings[name] = robot.run()

@@ -13,7 +13,7 @@ import msgspec
 
 from robochoc.communication.control import Conclusion, Counters, Ready
 from robochoc.communication.network.control_messages import Account, Checked, Exchanged, Task, ToMaster
-from robochoc.communication.network.searcher import Searcher, Surroundings
+from robochoc.communication.network.searcher import RobotContext, Searcher
 from robochoc.model.outcome import Metrics
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.protocol import Protocol
@@ -155,15 +155,15 @@ def install(lie: Lie, name: str, patch: Callable[[type, str, object], None] = se
     begin = Searcher.__init__
 
     def begin_lying(
-        me: Searcher, own: CompiledRobot, task: Task, protocol: type[Protocol], around: Surroundings
+        me: Searcher, own: CompiledRobot, task: Task, protocol: type[Protocol], context: RobotContext
     ) -> None:
         def say(word: ToMaster) -> None:
             for one in lie(me, word):
-                around.say(one)
+                context.say(one)
 
-        begin(me, own, task, protocol, replace(around, say=say) if own.robot.name == name else around)
+        begin(me, own, task, protocol, replace(context, say=say) if own.robot.name == name else context)
 
-    judge = Searcher.judged
+    judge = Searcher.check_constraints
 
     def judge_lying(me: Searcher, told: Mapping[str, int]) -> Checked:
         (found,) = lie(me, judge(me, told)) if me.name == name else (judge(me, told),)
@@ -171,7 +171,7 @@ def install(lie: Lie, name: str, patch: Callable[[type, str, object], None] = se
         return found
 
     patch(Searcher, "__init__", begin_lying)
-    patch(Searcher, "judged", judge_lying)
+    patch(Searcher, "check_constraints", judge_lying)
 
 
 def program(lie: str, name: str, *words: object) -> str:

@@ -12,12 +12,10 @@ from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import InputPath, refuse_same_places
 from robochoc.cli.options.ros import (
     FRAME,
-    conditions_of,
     flight_options,
-    open_sinks,
-    ros_failures_told,
     ros_options,
 )
+from robochoc.cli.options.ros_setup import conditions_of, open_sinks, ros_errors_fail
 from robochoc.cli.options.saved import saved_outcome, team_of, team_option
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.reports.failures import INVALID, LOST, Failure, invalid_input_fails
@@ -89,7 +87,7 @@ def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[Flight
     from robochoc.ros.sink_publisher import SinkPublisher, publish_flight
 
     conditions = conditions_of(given, mission)
-    with ros_failures_told(), ExitStack() as stack:
+    with ros_errors_fail(), ExitStack() as stack:
         sinks = open_sinks(given["sinks"], stack)
         frame = given["frame"] or FRAME
         publishers = [SinkPublisher(mission.team, mission.drones, sink, frame) for sink in sinks]

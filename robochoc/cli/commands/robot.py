@@ -11,7 +11,8 @@ import click
 from robochoc.cli.options.local_problems import limits, local_options
 from robochoc.cli.options.network import identity_option, master_option, network_failures_told, patience_option
 from robochoc.cli.options.paths import InputPath
-from robochoc.cli.options.ros import robot_publisher, ros_options
+from robochoc.cli.options.ros import ros_options
+from robochoc.cli.options.ros_setup import robot_publisher
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.options.tokens import token_options
 from robochoc.cli.reports.failures import LIMIT, LOST, Failure
@@ -59,7 +60,7 @@ def robot(
     robochoc robot Robot3.1.xml --master 192.168.1.14:7447 --token-file token
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     with network_failures_told(file):
-        from robochoc.communication.network.manner import Manner
+        from robochoc.communication.network.robot_settings import RobotSettings
         from robochoc.communication.run_result import Progress
         from robochoc.formats import read_robot
         from robochoc.run.networked.join import identity_of, join
@@ -78,11 +79,11 @@ def robot(
             published = stack.enter_context(robot_publisher(itself, given))
             stage(f"looking for the master at {place}")
             proof = identity_of(file.stem, place, identity, token, given["patience"])
-            manner = Manner(given["patience"], sniffed=given["sniff"], stage=stage)
+            settings = RobotSettings(given["patience"], sniffed=given["sniff"], stage=stage)
             cache = None if given["no_cache"] else SolutionCache()
             bounds = limits(given["local_solutions"], given["local_timeout"], always_ace=given["always_ace"])
             with Compiler(bounds, cache) as compiler:
-                ending = join(itself, place, proof, manner, compiler)
+                ending = join(itself, place, proof, settings, compiler)
             if ending.failed:
                 raise Failure(LOST, f"{file.stem}: {ending.why}")
             told = published(ending.why, ending.assignment)

@@ -19,13 +19,13 @@ from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import TeamFolder, refuse_same_places, teams_at
 from robochoc.cli.options.recording import journal_option, recording, shown_and_flushed
 from robochoc.cli.options.ros import (
-    check_ros,
+    check_ros_options,
     flight_options,
-    looped,
-    ros_asked,
     ros_options,
     situation_options,
+    take_ros_options,
 )
+from robochoc.cli.options.ros_setup import closed_loop
 from robochoc.cli.options.sections import COMMON, Sections
 from robochoc.cli.options.solve import (
     Products,
@@ -180,9 +180,9 @@ def solve(
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
 
-    ros = ros_asked(settings)
+    ros = take_ros_options(settings)
     check_settings(settings)
-    check_ros(ros, settings)
+    check_ros_options(ros, settings)
     if explain and as_json:
         raise click.UsageError("--explain is for people; the JSON result has the tree without it")
     withdraw = settings.pop("withdraw")
@@ -245,7 +245,7 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
             header = partial(_header, team, options)
             objective = None if wanted.ros.situation else _objective(team, options)
             with (
-                looped(wanted.ros, team, options.seed) as loop,
+                closed_loop(wanted.ros, team, options.seed) as loop,
                 recording(products.journal, header, objective, watch.begun()) as recorder,
             ):
                 outcome = _run(team, options, recorder, loop)

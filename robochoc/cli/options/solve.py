@@ -12,7 +12,7 @@ import click
 
 from robochoc.cli.options.names import ProtocolName
 from robochoc.cli.options.order import GIVEN
-from robochoc.cli.options.ros import Ros
+from robochoc.cli.options.ros import RosOptions
 from robochoc.cli.options.sections import SectionedCommand
 from robochoc.cli.reports.live_sniffer import Watching
 from robochoc.run.defaults import MINIMISES, SATISFIES
@@ -135,7 +135,7 @@ class Wanted:
     order: str | Path
     as_json: bool
     explain: bool
-    ros: Ros
+    ros: RosOptions
 
 
 def protocol_settings(given: Iterable[str]) -> dict[str, str]:

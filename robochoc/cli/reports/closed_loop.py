@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from robochoc.cli.options.ros import FLIGHT, Ros
+from robochoc.cli.options.ros import FLIGHT, RosOptions
 from robochoc.cli.reports.failures import LOST
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class Flight(NamedTuple):
     flown: FlightLog | None = None
 
 
-def flight_told(loop: ClosedLoop | None, ros: Ros, *, quiet: bool) -> Flight:
+def flight_told(loop: ClosedLoop | None, ros: RosOptions, *, quiet: bool) -> Flight:
     """How a simulated flight went, which is told. Whoever fell has left the team: that alone is no failure."""
     if loop is None or ros.situation != FLIGHT:
         return Flight()
@@ -40,7 +40,7 @@ def flight_told(loop: ClosedLoop | None, ros: Ros, *, quiet: bool) -> Flight:
     mission, flown = flight
     if not quiet:
         click.echo(how_it_went(flown))
-        for line in too_late(ros.surroundings.get("failures", ()), flown):
+        for line in too_late(ros.flight.get("failures", ()), flown):
             click.echo(line, err=True)
     return Flight(0 if as_planned(flown, may_fall=True) else LOST, mission, flown)
 

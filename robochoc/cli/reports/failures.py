@@ -68,7 +68,7 @@ def failures_told(place: object) -> Iterator[None]:
 
 def _status(error: Exception) -> int | None:
     """The exit status that stands for `error`; None for one that should not be. Imports only what may be wanted."""
-    from robochoc.communication.processes.robot_link import RobotsLostError
+    from robochoc.communication.run_result import RobotsLostError
     from robochoc.formats import InvalidInputError
     from robochoc.run.registry import UnknownProtocolError
     from robochoc.solver.compile import CompileError, CompileTimeoutError

@@ -98,9 +98,17 @@ def _apart(flown: FlightLog) -> str:
 
 
 def _speed(flown: FlightLog) -> str:
-    seconds = flown.times[-1] if len(flown.times) else 0.0
-    times = f", {seconds / flown.wall_s:.0f} times as fast" if flown.wall_s > 0 else ""
-    return f"{seconds:.1f} s of flight in {flown.wall_s:.2f} s{times}"
+    seconds = float(flown.times[-1]) if len(flown.times) else 0.0
+    return f"{seconds:.1f} s of flight simulated in {flown.wall_s:.2f} s{_rate(seconds, flown.wall_s)}"
+
+
+def _rate(seconds: float, wall_s: float) -> str:
+    """Return how the simulation compares with real time; nothing where neither took any time."""
+    if seconds <= 0 or wall_s <= 0:
+        return ""
+    if seconds >= wall_s:
+        return f" ({seconds / wall_s:.1f} times as fast as real time)"
+    return f" ({wall_s / seconds:.1f} times slower than real time)"
 
 
 def _pair(flown: FlightLog, nearest: ClosestApproach) -> str:

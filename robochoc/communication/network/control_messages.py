@@ -1,8 +1,9 @@
 """What the master and robots say to each other across machines. Letters (`letters.py`) carry these words.
 
 The master is the paper's: it registers robots, waits until all are there, orders the start, finds out when all is
-quiet, and stops all (Figure 3). Of robots' files it knows what their profiles say; protocol messages (`Said`) go from
-robot to robot, and it never sees them. What both runtimes with processes say alike stands in `control.py`.
+quiet, and stops all (Figure 3). Of robots' files it knows what their profiles say. Protocol messages
+(`ProtocolMessage`) go from robot to robot, and it never sees them. Messages that the runtime of processes has as well
+are in `communication/control.py`.
 """
 
 from __future__ import annotations
@@ -12,10 +13,8 @@ from typing import Annotated, NamedTuple
 
 import msgspec
 
-from robochoc.communication.control import Conclusion, Counters, Events, Failed, OfEpoch, Pause, Ready, Wave
+from robochoc.communication.control import Conclusion, Counters, Events, Failed, OfEpoch, Pause, Ready, Report, Wave
 from robochoc.communication.network.profile import Profile, Ranges
-from robochoc.model.outcome import Metrics
-from robochoc.protocols.findings import Findings
 
 LATEST = 2**53
 """The latest that a clock of constraint checks can be. Each says its own, and must not overflow another's."""
@@ -59,20 +58,18 @@ class Exchanged(NamedTuple):
     clock: int = 0
 
 
-class Account(OfEpoch, frozen=True):
-    """What the epoch has come to. `assigned`: I have values; in private runs `assignment` and findings stay empty.
+class Account(Report, frozen=True):
+    """A report with what the master needs to check it. In private runs `assignment` and findings stay empty.
 
-    `exchanged` counts the messages with each other robot, so that what one says is held against what another says.
+    `assigned` says whether the robot has values. `exchanged` counts the messages with each other robot, so that what
+    one robot says is held against what another says.
     """
 
     assigned: bool
-    assignment: dict[str, int]
-    metrics: Metrics
-    findings: Findings
     exchanged: dict[str, Exchanged] = msgspec.field(default_factory=dict)
 
 
-class Judged(NamedTuple):
+class Charge(NamedTuple):
     """What all totally known constraints over the same `variables` that `holder` holds charge together."""
 
     holder: str
@@ -91,8 +88,8 @@ class Checked(OfEpoch, frozen=True):
     allowed: bool
     cost: int | float
     held: int = 0
-    shared: tuple[Judged, ...] = ()
-    copies: tuple[Judged, ...] = ()
+    shared: tuple[Charge, ...] = ()
+    copies: tuple[Charge, ...] = ()
 
 
 class Objection(_Word, frozen=True):
@@ -214,7 +211,7 @@ class Leave(_Word, frozen=True):
 # From robot to robot
 
 
-class Said(OfEpoch, frozen=True):
+class ProtocolMessage(OfEpoch, frozen=True):
     """A protocol's message, as the filters have sealed it, with the sender's NCCC clock."""
 
     clock: Annotated[int, msgspec.Meta(ge=0, le=LATEST)]
@@ -248,5 +245,5 @@ ToMaster = (
     | Bye
 )
 ToRobot = Welcome | Denied | Show | Task | Search | Wave | Pause | Judge | Revoked | Told | Sniffable | Leave
-ToPeer = Said | Copies
+ToPeer = ProtocolMessage | Copies
 Word = ToMaster | ToRobot | ToPeer

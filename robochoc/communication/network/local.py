@@ -28,7 +28,7 @@ from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot_process import START_S, Given, robot_process
 from robochoc.communication.network.router import RouterError
 from robochoc.communication.network.settings import NetworkSettings
-from robochoc.communication.processes.robot_link import fate_of
+from robochoc.communication.processes.process_status import describe_end
 from robochoc.communication.resources import require_descriptors, signals_held
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import Epoch, Session
@@ -69,7 +69,7 @@ class LocalNetwork(Session):
         *,
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
-        conditions: NetworkSettings = NetworkSettings(),
+        settings: NetworkSettings = NetworkSettings(),
         brief: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
         super().__init__(team)
@@ -78,8 +78,8 @@ class LocalNetwork(Session):
         self._protocol = protocol
         self._brief = brief
         self._context = _fork_server(protocol)
-        conditions = replace(conditions, scratch=get_temp_dir())
-        self._conditions = conditions
+        settings = replace(settings, scratch=get_temp_dir())
+        self._settings = settings
         self._processes: dict[str, BaseProcess] = {}
         self._sent_home = False
         self._household = Household(team.order)
@@ -93,7 +93,7 @@ class LocalNetwork(Session):
                 self._household.master_identity((LOOPBACK,)),
                 endpoint,
                 Members(team.order, order=team.order, ways=ways),
-                conditions,
+                settings,
                 observer=observer,
                 watched=watched,
                 progress=progress,
@@ -174,7 +174,7 @@ class LocalNetwork(Session):
         for own in waiting:
             name = own.robot.name
             texts = self._household.identity(name).texts
-            limits = (self._conditions.patience_s, self._conditions.lease_ms)
+            limits = (self._settings.patience_s, self._settings.lease_ms)
             given = Given(own, texts, self._master.endpoint, self._protocol, *limits)
             process = self._context.Process(target=robot_process, name=name, args=(given,), daemon=True)
             with signals_held():  # half begun, it would wait for the rest for ever, and the end of the program for it
@@ -189,7 +189,7 @@ class LocalNetwork(Session):
             for sentinel in wait(list(names), 0.2):
                 name = names.pop(cast("int", sentinel))
                 if not self._sent_home:
-                    self._master.lose(name, fate_of(processes[name]))
+                    self._master.lose(name, describe_end(processes[name]))
 
     def _end_processes(self) -> None:
         until = time.monotonic() + GRACE_S

@@ -10,8 +10,7 @@ import msgspec
 from robochoc.communication.network.plausibility import Doubt
 from robochoc.communication.network.quotas import EVENTS_A_SECOND, Allowance
 from robochoc.communication.network.refusals import Refusals
-from robochoc.communication.network.search_state import is_of
-from robochoc.journal.events import AnyEvent, Granted, Lost, Observer, Refused, Registered
+from robochoc.journal.events import AnyEvent, Granted, Lost, Observer, Refused, Registered, actor
 
 
 class MasterEvents:
@@ -44,13 +43,13 @@ class MasterEvents:
         """What the Authority tells, whose time is another."""
         self._tell(msgspec.structs.replace(event, t=self._now))
 
-    def told(self, name: str, events: Sequence[AnyEvent]) -> None:
+    def relay_from(self, name: str, events: Sequence[AnyEvent]) -> None:
         """What a robot tells of itself, as it is watched or wants to be; of others it may not tell."""
         if not self._is_within_quota(name, len(events)):
             self.refuse(name, "tell of events", f"more than {EVENTS_A_SECOND:,} a second")
             return
         for event in events:
-            if is_of(event, name):
+            if actor(event) == name:
                 self._tell(event)
             else:
                 self.refuse(name, f"tell of {type(event).__name__}", "it is not about itself")

@@ -14,7 +14,7 @@ from itertools import chain
 from types import MappingProxyType
 from typing import NamedTuple
 
-from robochoc.communication.network.control_messages import Account, Checked, Exchanged, Judged
+from robochoc.communication.network.control_messages import Account, Charge, Checked, Exchanged
 from robochoc.communication.network.framing import LARGEST_LETTER
 from robochoc.communication.network.profile import LONGEST_NAME, MOST_VARIABLES
 from robochoc.communication.quiescence import Counts
@@ -31,7 +31,7 @@ CHECKS_PER_S = 10**12
 LARGEST_MEMORY = 2**50
 MOST_KINDS = 100
 """Of messages: a protocol has fewer."""
-MOST_JUDGED = 10_000
+MOST_CHARGES = 10_000
 NOTICEABLE = 100
 """A gap of fewer messages may be under way when the time is over."""
 _ROUNDED = 1 + 2**-40
@@ -65,14 +65,14 @@ NOTHING_DECLARED = Declared()
 class Course(NamedTuple):
     """What the master knows of a search that is over.
 
-    `order` names its robots, `heard` holds the counters that one has told last, `lasted_s` is how many seconds it
-    lasted, `quiet` whether it ended as all were quiet.
+    `order` names its robots, `counts` holds the last counters of one of them, `duration_s` is how many seconds it
+    took, `by_quiescence` whether it ended by quiescence.
     """
 
     order: Collection[str]
-    heard: Counts
-    lasted_s: float
-    quiet: bool
+    counts: Counts
+    duration_s: float
+    by_quiescence: bool
 
 
 # One robot's words
@@ -94,7 +94,7 @@ def fault_of_account(name: str, account: Account, declared: Declared, course: Co
     """Return why the robot `name` cannot report `account`; empty if it can."""
     return (
         next(_faults_of_values(name, account, declared), "")
-        or _fault_of_metrics(account, course.lasted_s)
+        or _fault_of_metrics(account, course.duration_s)
         or _fault_of_exchange(name, account, course)
         or fault_of_findings(account.findings, course.order)
     )
@@ -125,9 +125,9 @@ def _fault_of_exchange(name: str, account: Account, course: Course) -> str:
     if sum(account.metrics.messages.values()) != sum(one.sent for one in exchanged.values()):
         return "the messages that it says it has sent are not as many as those that it says it has sent to others"
     total = total_of(account)
-    if fault := fault_of_counters(total, course.heard):
+    if fault := fault_of_counters(total, course.counts):
         return fault
-    if course.quiet and total.sent > course.heard.sent and total.received == course.heard.received:
+    if course.by_quiescence and total.sent > course.counts.sent and total.received == course.counts.received:
         return "it has sent messages after all were quiet, in answer to none"
     return ""
 
@@ -138,7 +138,7 @@ def total_of(account: Account) -> Counts:
     return Counts(sum(one.sent for one in exchanged), sum(one.received for one in exchanged))
 
 
-def _fault_of_metrics(account: Account, lasted_s: float) -> str:
+def _fault_of_metrics(account: Account, duration_s: float) -> str:
     spent = account.metrics
     if len(spent.messages) > MOST_KINDS or not all(
         is_name(kind) and len(kind) <= LONGEST_NAME for kind in spent.messages
@@ -151,8 +151,8 @@ def _fault_of_metrics(account: Account, lasted_s: float) -> str:
     if not (sent <= spent.bytes <= sent * LARGEST_LETTER and spent.largest <= spent.bytes <= sent * spent.largest):
         many = f"{sent:,} messages of {spent.bytes:,} bytes together, the largest of {spent.largest:,}"
         return f"it has reported {many}, which cannot be"
-    if spent.checks > CHECKS_PER_S * (lasted_s + 1):
-        return f"it has reported {spent.checks:,} constraint checks in {lasted_s:.1f} s, which cannot be"
+    if spent.checks > CHECKS_PER_S * (duration_s + 1):
+        return f"it has reported {spent.checks:,} constraint checks in {duration_s:.1f} s, which cannot be"
     heard = max((one.clock for one in account.exchanged.values()), default=0)
     if spent.ncccs > heard + spent.checks:
         return (
@@ -184,7 +184,7 @@ def fault_of_check(name: str, check: Checked, declared: Declared, order: Collect
     if not 0 <= check.cost <= declared.dearest.get(name, LARGEST_COUNT) * _ROUNDED < INFINITE:
         return "its constraints charge more than it has declared"
     if not (
-        len(judged) <= MOST_JUDGED and 0 <= sum(one.constraints for one in check.shared) <= check.held <= LARGEST_COUNT
+        len(judged) <= MOST_CHARGES and 0 <= sum(one.constraints for one in check.shared) <= check.held <= LARGEST_COUNT
     ):
         return "it has checked constraints in a number that cannot be"
     if any(one.constraints < 1 or not one.price >= 0 or not all(map(is_name, one.variables)) for one in judged):
@@ -286,7 +286,7 @@ def objections(checks: Mapping[str, Checked]) -> Iterator[str]:
             yield f"{name} finds one of its constraints broken, which nobody else may know"
 
 
-def _key(one: Judged) -> tuple[str, tuple[str, ...]]:
+def _key(one: Charge) -> tuple[str, tuple[str, ...]]:
     return one.holder, tuple(sorted(one.variables))
 
 

@@ -1,13 +1,12 @@
-"""A robot's end of a run across machines: it registers with the master, and searches when that orders the start.
+"""A robot in a run across machines: it registers with the master, and searches when that orders the start.
 
-It knows its own file; what else it has to know (names, order, interfaces) the master tells it in its `Task`. What
-happens then is `searcher.py`'s; this is the loop around it, with the letters: all messages that wait when it looks up
-are one packet. It ends when the master says so, and by itself once the master is gone for longer than its patience.
+It knows its own file; what else it has to know (names, order, interfaces) is in the master's `Task`. The search itself
+is in `searcher.py`; this is the loop around it. All frames that wait when it looks into its inbox are one packet. It
+ends when the master says so, and by itself once the master is gone for longer than its patience.
 """
 
 from __future__ import annotations
 
-import secrets
 import time
 import traceback
 from collections.abc import Callable
@@ -15,12 +14,10 @@ from contextlib import suppress
 from queue import Empty
 from typing import NamedTuple
 
-import msgspec
-
 from robochoc.authority.identity import Identity
-from robochoc.authority.keyring import KeyCard, KeyCardError, KeyRing, UnknownPeerError
+from robochoc.authority.keyring import UnknownPeerError
 from robochoc.communication.control import Failed, Pause, Wave
-from robochoc.communication.filters import FilterStack, NotGenuineError, UnknownFilterError, filter_named
+from robochoc.communication.filters import NotGenuineError
 from robochoc.communication.host import BadMessageError
 from robochoc.communication.network.control_messages import (
     Bye,
@@ -31,9 +28,9 @@ from robochoc.communication.network.control_messages import (
     Judge,
     Leave,
     Objection,
+    ProtocolMessage,
     Register,
     Revoked,
-    Said,
     Search,
     Show,
     Shown,
@@ -41,94 +38,89 @@ from robochoc.communication.network.control_messages import (
     Task,
     Told,
     ToMaster,
+    ToPeer,
     Welcome,
     Word,
 )
-from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing, Opened
+from robochoc.communication.network.framing import MASTER, FrameRefusedError, Opened
 from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
-from robochoc.communication.network.manner import AS_USUAL, Manner
 from robochoc.communication.network.profile import among, profile_of, ranges_of
 from robochoc.communication.network.quotas import Kept
 from robochoc.communication.network.refusals import Refusals
-from robochoc.communication.network.searcher import Searcher, Surroundings
+from robochoc.communication.network.registration import Registration, RunOverError
+from robochoc.communication.network.robot_settings import DEFAULT_SETTINGS, RobotSettings
+from robochoc.communication.network.searcher import RobotContext, Searcher
+from robochoc.communication.network.secure_channel import SecureChannel
 from robochoc.communication.network.transport import Transport
+from robochoc.communication.robot_loop import IDLE_S
 from robochoc.model.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 
-IDLE_S = 0.002
-"""A robot that has heard nothing for so long reports its counters. Only when to ask; never whether it is over."""
-LOOK_UP_S = 0.25
-"""How often a robot that waits looks whether the link is still there."""
-REGISTER_AGAIN_S = 1.0
+CHECK_S = 0.25
+"""How often a robot that waits checks whether the link is still there."""
 AT_ONCE = 10_000
-"""So many letters at most are one packet."""
-_VISIT_BYTES = 8
+"""So many frames at most are one packet."""
 _UNUSABLE = (FrameRefusedError, NotGenuineError, UnknownPeerError, BadMessageError)
 
 
 class Ending(NamedTuple):
-    """How the run ended for this robot: the master's words, whether it failed, and the own decision."""
+    """How the run ended for this robot.
+
+    Attributes:
+        why: The reason that the master gave, or why the robot ended by itself.
+        failed: The run could not be completed.
+        assignment: The values that the robot has decided on.
+    """
 
     why: str
     failed: bool
     assignment: dict[str, int]
 
 
-class _RunOverError(Exception):
-    def __init__(self, why: str, *, failed: bool) -> None:
-        super().__init__(why)
-        self.why = why
-        self.failed = failed
-
-
 class NetworkRobot:
-    """The robot `own` at its `post`.
+    """The robot `own` at its `transport`.
 
-    `protocol_named` finds the protocol that the master asks for; it raises `LookupError`.
+    Args:
+        own: The robot, compiled.
+        identity: Its certificate and key.
+        transport: Its connection to the router.
+        protocol_named: Finds the protocol that the master asks for; raises `LookupError`.
+        settings: How its owner wants it to take part.
     """
 
     def __init__(
         self,
         own: CompiledRobot,
         identity: Identity,
-        post: Transport,
+        transport: Transport,
         protocol_named: Callable[[str], type[Protocol]],
-        manner: Manner = AS_USUAL,
+        settings: RobotSettings = DEFAULT_SETTINGS,
     ) -> None:
         self._own = own
         self._robot = own.robot
-        self._identity = identity
-        self._post = post
+        self._transport = transport
         self._protocol_named = protocol_named
-        self._manner = manner
-        self._letters = Framing(own.robot.name)
-        self._visit = secrets.token_hex(_VISIT_BYTES)
-        self._ring: KeyRing | None = None
-        self._filters: FilterStack | None = None
-        self._welcome: Welcome | None = None
+        self._settings = settings
+        self._channel = SecureChannel(own.robot.name, identity)
+        self._registration = Registration(own.robot.name, transport, settings.patience_s, self._register)
         self._searcher: Searcher | None = None
         self._ahead: list[tuple[str, Opened]] = []
-        """What others have said in an epoch that the master has not told this robot of yet."""
+        """Frames of an epoch that the master has not told this robot of yet."""
         self._kept = Kept()
-        self._registered = 0.0
-        self._gaps: set[tuple[int, str]] = set()
-        """In which search the master was told that letters of whom are lost: nobody floods it through this robot."""
+        self._lost_frames: set[tuple[int, str]] = set()
+        """In which search the loss of whose frames was reported: nobody floods the master through this robot."""
         self._refusals = Refusals(lambda who, what, why: self._say(Objection(who, what, why)))
-        self._connected = time.monotonic()
-        self._router = post.router
-        self._unanswered: float | None = None
-        """Since when this robot has registered, and heard nothing of it."""
 
     def run(self) -> Ending:
         """Register, and take part until the end."""
         try:
-            self._register()
+            self._registration.send()
             while True:
                 self._turn(self._items())
-        except _RunOverError as over:
+        except RunOverError as over:
             return Ending(
                 on_one_line(over.why, LONGEST_REASON), over.failed, self._searcher.assignment if self._searcher else {}
             )
@@ -145,13 +137,13 @@ class NetworkRobot:
     # The loop
 
     def _items(self) -> list[Item]:
-        """All that has come; none when nothing has for a while."""
-        restless = self._searcher is not None and self._searcher.restless
+        """Return all that has come; nothing when nothing has for a while."""
+        restless = self._searcher is not None and self._searcher.is_restless
         items = []
         with suppress(Empty):
-            items.append(self._post.inbox.get(timeout=IDLE_S if restless else LOOK_UP_S))
+            items.append(self._transport.inbox.get(timeout=IDLE_S if restless else CHECK_S))
             while len(items) < AT_ONCE:
-                items.append(self._post.inbox.get_nowait())
+                items.append(self._transport.inbox.get_nowait())
         return items
 
     def _turn(self, items: list[Item]) -> None:
@@ -160,232 +152,176 @@ class NetworkRobot:
             match item:
                 case Arrived(sender, content):
                     self._read(sender, content, packet)
-                case Missed(sender, letters) if sender == MASTER:
-                    raise UnsupportedError(
-                        f"{letters:,} letters of the master to {self._robot.name} were lost for good"
-                    )
-                case Missed(sender, letters) if self._welcome:
-                    self._tell_of_gap(sender, letters)
+                case Missed(sender, frames) if sender == MASTER:
+                    raise UnsupportedError(f"{frames:,} letters of the master to {self._robot.name} were lost for good")
+                case Missed(sender, frames) if self._registration.welcome:
+                    self._report_lost_frames(sender, frames)
                 case Missed() | Presence() | Woken():
                     pass
         if self._searcher:
             self._searcher.take_in(packet)
-        if not items:
-            self._idle()
-
-    def _tell_of_gap(self, sender: str, letters: int) -> None:
-        """Tell the master, once a search of each: it finds out whether the run can do without these letters."""
-        gap = (self._searcher.epoch if self._searcher else 0, sender)
-        if gap not in self._gaps:
-            self._gaps.add(gap)
-            self._say(Gap(sender, letters))
-
-    def _idle(self) -> None:
-        if self._searcher and self._searcher.restless:
-            self._searcher.report_events()
-            self._searcher.tell_counters(0)
+        if items:
             return
-        self._look_up()
-        if self._unanswered is not None and time.monotonic() - self._registered >= REGISTER_AGAIN_S:
-            self._register()
+        if self._searcher and self._searcher.is_restless:
+            self._searcher.report_idle()
+        else:
+            self._registration.check_link()
 
-    def _look_up(self) -> None:
-        """Whether the master can be reached; behind a new router, whether it is the same one, and still takes us."""
-        now = time.monotonic()
-        router = self._post.router
-        if router:
-            self._connected = now
-            if router != self._router:
-                self._router = router
-                self._register()
-        elif now - self._connected > self._manner.patience_s:
-            raise _RunOverError(f"the master is gone: no link to it for {self._manner.patience_s:g} s", failed=True)
-        if self._unanswered is not None and now - self._unanswered > max(self._manner.patience_s, 2 * REGISTER_AGAIN_S):
-            raise _RunOverError(
-                f"the master does not answer {self._robot.name}: is it enrolled there, and not revoked?", failed=True
-            )
+    def _report_lost_frames(self, sender: str, frames: int) -> None:
+        """Tell the master, once for each search: it finds out whether the run can do without these frames."""
+        loss = (self._searcher.epoch if self._searcher else 0, sender)
+        if loss not in self._lost_frames:
+            self._lost_frames.add(loss)
+            self._say(Gap(sender, frames))
 
-    # Letters
+    # Frames
 
-    def _say(self, word: ToMaster) -> None:
-        self._post.send(MASTER, self._letters.write(MASTER, word))
+    def _say(self, message: ToMaster) -> None:
+        self._transport.send(MASTER, self._channel.frame(message))
 
-    def _send(self, receiver: str, word: Said | Copies) -> None:
-        if self._filters:
-            context = self._context(self._robot.name, receiver, self._letters.next_number(receiver), word)
-            try:
-                word = msgspec.structs.replace(word, content=self._filters.seal(receiver, word.content, context))
-            except UnknownPeerError:
-                return  # it was revoked, and hears nothing any more
-        self._post.send(receiver, self._letters.write(receiver, word))
+    def _send(self, receiver: str, message: ToPeer) -> None:
+        frame = self._channel.sealed_frame(receiver, message)
+        if frame is not None:
+            self._transport.send(receiver, frame)
 
     def _read(self, sender: str, content: bytes, packet: list[Envelope]) -> None:
         try:
-            opened = self._letters.read(sender, content)
-            self._use(sender, opened, packet)
+            self._handle(sender, self._channel.read(sender, content), packet)
         except _UNUSABLE as refused:
             self._object(sender, str(refused))
 
-    def _use(self, sender: str, opened: Opened, packet: list[Envelope]) -> None:
-        """Take in what is for now; what is for later waits as it is, for the cards that open it have not come yet.
+    def _handle(self, sender: str, opened: Opened, packet: list[Envelope]) -> None:
+        """Handle what belongs to this epoch. What belongs to the next one waits, for its key cards have not come yet.
 
-        Raises `BadMessageError`, `NotGenuineError`, `FrameRefusedError`, `UnknownPeerError`, so that what nobody can
-        use does not take the place of another letter.
+        A frame is taken only if it can be used, so that an unusable one does not take the place of another.
+
+        Raises:
+            BadMessageError: when it holds no message of the protocol, or one that nobody may send now.
+            FrameRefusedError: when it is of an epoch that is far away, or is more than is kept for the next one.
+            NotGenuineError: when the filters find that it was changed.
+            UnknownPeerError: when the sender's key card is not known.
         """
-        word, epoch = opened.word, self._searcher.epoch if self._searcher else 0
-        if not isinstance(word, Said | Copies):
-            self._letters.take(sender, opened.number)
-            self._obey(word)
-        elif word.epoch > epoch:
-            if word.epoch > epoch + 1:
-                raise FrameRefusedError(f"it is of epoch {word.epoch}, and this is {epoch}")
-            if not self._kept.takes(sender, len(word.content)):
-                raise FrameRefusedError(f"it is more than is kept of {sender} for epoch {word.epoch}")
-            self._letters.take(sender, opened.number)
-            self._ahead.append((sender, opened))
+        message, epoch = opened.word, self._searcher.epoch if self._searcher else 0
+        if not isinstance(message, ToPeer):
+            self._channel.take(sender, opened.number)
+            self._obey(message)
+        elif message.epoch > epoch:
+            self._keep(sender, opened, message, epoch)
         else:
-            word = self._unsealed(sender, opened.number, word)
-            if isinstance(word, Said) and self._searcher and word.epoch == epoch:
-                self._searcher.check(word.content)
-            self._letters.take(sender, opened.number)
-            self._hear(sender, word, packet)
+            message = self._channel.unsealed(sender, opened.number, message)
+            if isinstance(message, ProtocolMessage) and self._searcher and message.epoch == epoch:
+                self._searcher.check(message.content)
+            self._channel.take(sender, opened.number)
+            self._handle_message(sender, message, packet)
 
-    def _unsealed(self, sender: str, number: int, word: Said | Copies) -> Said | Copies:
-        if self._filters is None:
-            return word
-        context = self._context(sender, self._robot.name, number, word)
-        return msgspec.structs.replace(word, content=self._filters.open(sender, word.content, context))
+    def _keep(self, sender: str, opened: Opened, message: ToPeer, epoch: int) -> None:
+        """Keep a frame for the next epoch. Raises `FrameRefusedError`."""
+        if message.epoch > epoch + 1:
+            raise FrameRefusedError(f"it is of epoch {message.epoch}, and this is {epoch}")
+        if not self._kept.takes(sender, len(message.content)):
+            raise FrameRefusedError(f"it is more than is kept of {sender} for epoch {message.epoch}")
+        self._channel.take(sender, opened.number)
+        self._ahead.append((sender, opened))
 
-    def _context(self, sender: str, receiver: str, number: int, word: Said | Copies) -> bytes:
-        """What binds a sealed word to its place in the run."""
-        kind = word.clock if isinstance(word, Said) else "copies"
-        return f"{self._letters.run} {sender} {receiver} {number} {word.epoch} {kind}".encode()
-
-    def _hear(self, sender: str, word: Said | Copies, packet: list[Envelope]) -> None:
+    def _handle_message(self, sender: str, message: ToPeer, packet: list[Envelope]) -> None:
         searcher = self._searcher
-        if searcher is None or word.epoch != searcher.epoch:
+        if searcher is None or message.epoch != searcher.epoch:
             return
-        if isinstance(word, Copies):
-            searcher.learn(sender, word.content)
-        else:
-            envelope = Envelope(sender, self._robot.name, word.content, word.clock)
-            if searcher.hear(envelope):
-                packet.append(envelope)
+        if isinstance(message, Copies):
+            searcher.learn(sender, message.content)
+            return
+        envelope = Envelope(sender, self._robot.name, message.content, message.clock)
+        if searcher.admit(envelope):
+            packet.append(envelope)
 
     def _object(self, sender: str, why: str) -> None:
-        """Tell the master of a letter that was refused."""
-        if self._welcome is not None:
+        """Tell the master of a frame that was refused."""
+        if self._registration.welcome is not None:
             self._refusals.note(sender, f"a letter to {self._robot.name}", why)
 
     # The master's orders
 
-    def _obey(self, word: Word) -> None:
-        match word:
+    def _obey(self, order: Word) -> None:
+        match order:
             case Welcome():
-                self._enter(word)
-            case Denied(visit, why) if visit == self._visit:
-                raise _RunOverError(f"the master does not take {self._robot.name}: {why}", failed=True)
+                self._enter(order)
+            case Denied(incarnation, why) if incarnation == self._registration.incarnation:
+                raise RunOverError(f"the master does not take {self._robot.name}: {why}", failed=True)
             case Show(variables):
                 domains = {variable.name: variable.domain for variable in self._robot.variables}
                 self._say(Shown({name: ranges_of(domains[name]) for name in variables if name in domains}))
             case Revoked(name):
-                if self._ring:
-                    self._ring.dismiss(name)
+                self._channel.revoke(name)
             case Leave(why, failed):
                 self._say(Bye())
-                raise _RunOverError(why, failed=failed)
+                raise RunOverError(why, failed=failed)
             case Denied() | Told() | Sniffable():
                 pass
             case _:
-                self._obey_in_search(word)
+                self._obey_in_search(order)
 
-    def _obey_in_search(self, word: Word) -> None:
+    def _obey_in_search(self, order: Word) -> None:
         searcher = self._searcher
-        match word:
+        match order:
             case Task():
-                self._take_task(word)
+                self._take_task(order)
             case Search(epoch) if searcher and epoch == searcher.epoch:
-                self._manner.stage("searching")
-                searcher.search()
+                self._settings.stage("searching")
+                searcher.begin(time.monotonic())
             case Wave(number) if searcher:
-                searcher.tell_counters(number)
+                searcher.report_counters(number)
             case Pause() if searcher:
                 searcher.pause()
             case Judge(epoch, values) if searcher and epoch == searcher.epoch:
-                self._say(searcher.judged(values))
+                self._say(searcher.check_constraints(values))
             case _:
-                self._object(MASTER, f"{type(word).__name__} is nothing to be told now")
+                self._object(MASTER, f"{type(order).__name__} is nothing to be told now")
 
-    def _register(self) -> None:
-        self._registered = time.monotonic()
-        if self._unanswered is None:
-            self._unanswered = self._registered
-        self._say(Register(profile_of(self._robot), self._visit))
+    def _register(self, incarnation: str) -> None:
+        self._say(Register(profile_of(self._robot), incarnation))
 
     def _enter(self, welcome: Welcome) -> None:
-        """Registered; a second welcome comes after an outage, and of another run from another master."""
-        if welcome.visit != self._visit:
+        """Enter the run. A second welcome comes after an outage, and one of another run from another master."""
+        if welcome.visit != self._registration.incarnation:
             return
-        self._unanswered = None
-        if self._welcome is None:
-            self._begin(welcome)
-        elif welcome.run != self._welcome.run:
-            raise _RunOverError("the master was started anew; start this robot anew as well", failed=True)
-        self._say(Joined(self._visit, self._ring.card.encode() if self._ring else b""))
-
-    def _begin(self, welcome: Welcome) -> None:
-        self._welcome = welcome
-        self._letters.begin(welcome.run)
-        if welcome.filters:
-            self._ring = KeyRing(self._identity, welcome.run)
-            try:
-                self._filters = FilterStack(self._ring, [filter_named(name) for name in welcome.filters])
-            except UnknownFilterError as unknown:
-                raise UnsupportedError(f"{self._robot.name}: {unknown}") from None
-        self._manner.stage("registered, waiting for the others")
+        if self._registration.accept(welcome):
+            self._channel.begin(welcome.run, welcome.filters)
+            self._settings.stage("registered, waiting for the others")
+        self._say(Joined(welcome.visit, self._channel.card))
 
     def _take_task(self, task: Task) -> None:
-        """A new epoch."""
-        if self._welcome is None:
+        """Enter a new epoch."""
+        welcome = self._registration.welcome
+        if welcome is None:
             return
-        self._admit(task.cards)
+        for fault in self._channel.admit(task.cards):
+            self._object(MASTER, fault)
         try:
             protocol = self._protocol_named(task.protocol)
         except LookupError as unknown:
             raise UnsupportedError(f"{self._robot.name}: {unknown}") from None
-        told = self._welcome.observed and not self._welcome.private  # events have values in them
-        observed = told or self._manner.sniffed
-        around = Surroundings(self._say, self._send, self._manner.place, observed, self._welcome.private)
-        own = self._own.relinked(among(self._robot, task.interfaces), self._manner.compiled)
-        self._searcher = Searcher(own, task, protocol, around)
+        observed = (welcome.observed and not welcome.private) or self._settings.sniffed  # events have values in them
+        context = RobotContext(self._say, self._send, self._settings.set_rank, observed, welcome.private)
+        own = self._own.relinked(among(self._robot, task.interfaces), self._settings.compiled)
+        self._searcher = Searcher(own, task, protocol, context)
         self._searcher.prepare()
         ahead, self._ahead = self._ahead, []
         self._kept.clear()
         for sender, opened in ahead:
             try:
-                self._use(sender, opened, [])
+                self._handle(sender, opened, [])
             except _UNUSABLE as refused:
                 self._object(sender, str(refused))
 
-    def _admit(self, cards: tuple[bytes, ...]) -> None:
-        """Believe the key cards of the others, if the Authority has certified them."""
-        if self._ring is None:
-            return
-        for content in cards:
-            try:
-                card = KeyCard.decode(content)
-                if card.name != self._robot.name:
-                    self._ring.admit(card, time.time())
-            except KeyCardError as bad:
-                self._object(MASTER, str(bad))
+    # The end
 
-    def _fail(self, word: Failed) -> None:
-        """Tell the master why this robot cannot go on, and wait a while for its leave."""
-        if self._welcome is None:
+    def _fail(self, message: Failed) -> None:
+        """Tell the master why this robot cannot continue, and wait a while for its leave."""
+        if self._registration.welcome is None:
             return
-        self._say(word)
-        until = time.monotonic() + self._manner.patience_s
-        while time.monotonic() < until and self._post.router:
+        self._say(message)
+        until = time.monotonic() + self._settings.patience_s
+        while time.monotonic() < until and self._transport.router:
             for item in self._items():
                 if isinstance(item, Arrived) and item.sender == MASTER and self._is_leave(item.content):
                     self._say(Bye())
@@ -393,8 +329,8 @@ class NetworkRobot:
 
     def _is_leave(self, content: bytes) -> bool:
         try:
-            opened = self._letters.read(MASTER, content)
+            opened = self._channel.read(MASTER, content)
         except FrameRefusedError:
             return False
-        self._letters.take(MASTER, opened.number)
+        self._channel.take(MASTER, opened.number)
         return isinstance(opened.word, Leave)

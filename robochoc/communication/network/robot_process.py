@@ -13,8 +13,8 @@ from multiprocessing.connection import wait
 from typing import NamedTuple
 
 from robochoc.authority.identity import Identity, IdentityTexts
-from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.robot import NetworkRobot
+from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.transport import CannotConnectError, Transport
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
@@ -49,15 +49,15 @@ def robot_process(given: Given) -> None:
     threading.Thread(target=_end_with_the_parent, daemon=True).start()
     identity = Identity.of(given.identity)
 
-    def take_place(rank: int, size: int) -> None:
-        """As in `robot_process.py`: who comes earlier in the order goes first."""
+    def set_niceness(rank: int, size: int) -> None:
+        """Let the scheduler favour robots that come earlier in the order, as `processes/robot_process.py` does."""
         wanted = _LOWEST_NICE * rank // size
         os.setpriority(os.PRIO_PROCESS, 0, max(wanted, os.getpriority(os.PRIO_PROCESS, 0)))
 
     try:
         with Transport(given.endpoint, identity, watch=(), patience_s=START_S, lease_ms=given.lease_ms) as post:
-            manner = Manner(given.patience_s, place=take_place)
-            NetworkRobot(given.own, identity, post, lambda _name: given.protocol, manner).run()
+            settings = RobotSettings(given.patience_s, set_rank=set_niceness)
+            NetworkRobot(given.own, identity, post, lambda _name: given.protocol, settings).run()
     except CannotConnectError as error:
         sys.exit(str(error))
 

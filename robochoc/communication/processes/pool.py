@@ -1,4 +1,4 @@
-"""The crew: the robots' processes, as the parent has them. They are begun here, listened to, and ended."""
+"""The pool of the robots' processes: the parent starts them here, reads what they send, and ends them."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import multiprocessing.connection
 import selectors
 import socket
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from multiprocessing.context import ForkContext, ForkServerContext
 from typing import Literal, cast
 
-from robochoc.communication.control import FromParent, FromRobot, QueueFrom, QueuesTo
-from robochoc.communication.processes.robot_link import Condition, RobotLink
-from robochoc.communication.processes.robot_process import Beginning, robot_process
+from robochoc.communication.control import FromRobot, QueueFrom, QueuesTo
+from robochoc.communication.processes.process_status import ProcessStatus
+from robochoc.communication.processes.robot_link import RobotLink
+from robochoc.communication.processes.robot_process import RobotStart, robot_process
 from robochoc.communication.resources import allow_descriptors, signals_held
 from robochoc.solver.encoding import UnsupportedError
 
@@ -22,16 +23,16 @@ _CONTEXTS: dict[StartMethod, type[ForkContext | ForkServerContext]] = {
     "fork": ForkContext,
     "forkserver": ForkServerContext,
 }
-FAREWELL_S = 0.5
+GRACE_S = 0.5
 """How long processes may take to end by themselves before they are killed."""
 _FDS_PER_ROBOT = 4
 _FDS_SPARE = 128
 
 
 class ProcessPool:
-    """The processes of a team. `robots` are those that are there, by name.
+    """The processes of a team. `robots` holds those that take part, by name.
 
-    Whoever died is told of by `ended`; whoever is dismissed ends by itself, soon.
+    `ended` finds those that have died. A dismissed one ends by itself, soon.
     """
 
     def __init__(self, start_method: StartMethod) -> None:
@@ -43,24 +44,24 @@ class ProcessPool:
         self._selector.register(self._ends.fileno(), selectors.EVENT_READ)
 
     def make_room(self, robots: int) -> None:
-        """Get ready for so many robots."""
+        """Raise the limit on open files as so many robots need it."""
         allow_descriptors(robots * _FDS_PER_ROBOT + _FDS_SPARE)
 
-    def start(self, begin: Beginning) -> None:
+    def start(self, start: RobotStart) -> None:
         """Start one process. Raises `OSError` when the system does not allow it.
 
-        Signals wait until it has set its own handlers, and until it is known here: one by one, so that they wait for
-        the start of one robot, and not of a large team.
+        Signals wait until it has set its own handlers, and until it is known here. They wait for the start of one robot
+        only, and not of a large team.
         """
         with signals_held():
-            self._start(begin)
+            self._start(start)
 
-    def _start(self, begin: Beginning) -> None:
-        name = begin.part.robot.name
+    def _start(self, start: RobotStart) -> None:
+        name = start.part.robot.name
         ours, theirs = socket.socketpair()
         forked = self._context.get_start_method() == "fork"
         inherited = [other.control for other in self.robots.values()] + [ours] if forked else []
-        process = self._context.Process(target=robot_process, name=name, args=(begin, theirs, inherited), daemon=True)
+        process = self._context.Process(target=robot_process, name=name, args=(start, theirs, inherited), daemon=True)
         with theirs:
             try:
                 process.start()
@@ -71,43 +72,46 @@ class ProcessPool:
         self._selector.register(link.control, selectors.EVENT_READ, link)
         self._ends.register(process.sentinel, selectors.EVENT_READ, link)
 
-    # Listening
+    # Reading
 
-    def speakers(self, patience_s: float) -> list[RobotLink]:
-        """Robots that have something to say, waited for at most `patience_s`; none as well when one has ended."""
+    def readable(self, patience_s: float) -> list[RobotLink]:
+        """Return robots that have sent something, or none: after `patience_s` seconds, or when one has ended."""
         return [key.data for key, _ in self._selector.select(patience_s) if key.data is not None]
 
-    def words(self, robot: RobotLink) -> list[FromRobot]:
-        """What `robot` says. One that has hung up is about to end, which its sentinel tells soon, if not before."""
+    def receive(self, robot: RobotLink) -> list[FromRobot]:
+        """Return what `robot` has sent. One that has hung up is about to end, and its sentinel shows it soon."""
         if self.robots.get(robot.name) is not robot or robot.control not in self._selector.get_map():
-            return []  # dismissed, or ended, since it began to speak
-        words = robot.words()
+            return []  # dismissed, or ended, since it was found to be readable
+        messages = robot.receive()
         if robot.hung_up:
             self._selector.unregister(robot.control)
-        return words
+        return messages
 
     def ended(self) -> Iterator[tuple[RobotLink, list[FromRobot]]]:
-        """Robots whose processes have ended since the last look, with their last words."""
+        """Yield robots whose processes have ended since the last call, with the last messages that they sent."""
         for key, _ in self._ends.select(0):
             robot: RobotLink = key.data
             self._ends.unregister(robot.process.sentinel)
-            words = robot.last_words()
+            messages = robot.receive_rest()
             robot.ended = True
             self._unwatch(robot)
-            yield robot, words
+            yield robot, messages
 
-    def in_condition(self, *conditions: Condition) -> dict[Condition, list[RobotLink]]:
-        """The robots whose processes are in one of `conditions`, for each of these."""
-        found: dict[Condition, list[RobotLink]] = {condition: [] for condition in conditions}
+    def with_status(self, *statuses: ProcessStatus) -> dict[ProcessStatus, list[RobotLink]]:
+        """Return the robots whose processes have one of `statuses`, for each of these."""
+        found: dict[ProcessStatus, list[RobotLink]] = {status: [] for status in statuses}
         for robot in self.robots.values():
-            if (now := robot.condition()) in found:
-                found[now].append(robot)
+            if (status := robot.status) in found:
+                found[status].append(robot)
         return found
 
     # Queues
 
     def open_queues(self, sender: RobotLink, receivers: Sequence[str]) -> None:
-        """Make the queues from `sender` to `receivers`: it gets the write ends, each of them its read end."""
+        """Open queues: `sender` gets their write ends, and each of `receivers` its read end.
+
+        Raises `UnsupportedError`.
+        """
         with ExitStack() as copies:
             writers = []
             for name in receivers:
@@ -120,18 +124,13 @@ class ProcessPool:
                     ) from error
                 writers.append(copies.enter_context(writer))
                 with reader:
-                    self.robots[name].tell(QueueFrom(sender.name), [reader.fileno()])
-            sender.tell(QueuesTo(list(receivers)), [writer.fileno() for writer in writers])
-
-    def tell_all(self, order: FromParent) -> None:
-        """Say `order` to every robot."""
-        for robot in list(self.robots.values()):
-            robot.tell(order)
+                    self.robots[name].send(QueueFrom(sender.name), [reader.fileno()])
+            sender.send(QueuesTo(list(receivers)), [writer.fileno() for writer in writers])
 
     # Ending
 
     def dismiss(self, name: str, *, kill: bool = False) -> None:
-        """The robot leaves: it is hung up on, and ends by itself unless it is to be killed."""
+        """Let the robot go: its control pipe is closed, and it ends by itself unless it is to be killed."""
         robot = self.robots.pop(name)
         self._unwatch(robot)
         if robot.process.sentinel in self._ends.get_map():
@@ -142,22 +141,22 @@ class ProcessPool:
         self._dismissed.append(robot)
 
     def reap(self) -> None:
-        """Let go of what is left of those who have been dismissed, as far as they have ended."""
+        """Release dismissed processes that have ended."""
         ended = [robot for robot in self._dismissed if robot.process.exitcode is not None]
         self._dismissed = [robot for robot in self._dismissed if robot not in ended]
         for robot in ended:
             robot.process.close()
 
-    def end_all(self) -> None:
-        """Hang up; robots that have reported get a moment to end by themselves, others are killed at once.
+    def end_all(self, reported: Callable[[str], bool]) -> None:
+        """End all processes. Robots that have `reported` get a moment to end by themselves; others are killed at once.
 
-        They lose nothing by it, and on a busy machine the turns that they would need to end by themselves take time.
+        Nothing is lost by that, and on a busy machine it takes long until a process has ended by itself.
         """
         with signals_held():
             self._selector.close()
             self._ends.close()
             for robot in self.robots.values():
-                if robot.report is None:
+                if not reported(robot.name):
                     robot.process.kill()
                 robot.control.close()
             everybody = [*self.robots.values(), *self._dismissed]
@@ -175,7 +174,7 @@ class ProcessPool:
 
 
 def _await(sentinels: Sequence[int]) -> None:
-    deadline = time.monotonic() + FAREWELL_S
+    deadline = time.monotonic() + GRACE_S
     alive = set(sentinels)
     while alive and time.monotonic() < deadline:
         ended = multiprocessing.connection.wait(list(alive), max(0.0, deadline - time.monotonic()))

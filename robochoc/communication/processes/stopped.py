@@ -1,49 +1,48 @@
-"""Robots that are stopped (SIGSTOP): told after a while, and given up once patience is over.
+"""Robots that are stopped (SIGSTOP): reported after a while, and lost once the patience is over.
 
-A stopped robot neither dies nor answers, so the team would wait for it without a word. One that computes for long is
-not stopped: the kernel knows the difference.
+A stopped robot neither dies nor answers, so the team would wait for it in silence. One that computes for long is not
+stopped: the kernel knows the difference.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-TOLD_S = 5.0
-"""So long a robot is stopped before that is told."""
-_LONGEST_LOOK_S = 1.0
-"""No more is counted between two looks: whoever looks may have been stopped as well, by the same Ctrl-Z."""
+REPORT_AFTER_S = 5.0
+"""How long a robot is stopped before that is reported."""
+_LONGEST_STEP_S = 1.0
+"""No more is counted between two updates: this process may have been stopped as well, by the same Ctrl-Z."""
 
 
-class Stopped:
-    """Keeps count of how long robots have been stopped. `patience_s`: then one is lost (None: never)."""
+class StoppedRobots:
+    """Counts how long robots have been stopped. A robot is lost after `patience_s` seconds (None: never)."""
 
     def __init__(self, patience_s: float | None = None) -> None:
         self._patience_s = patience_s
-        self._looked: float | None = None
-        self._since_s: dict[str, float] = {}
-        self._told: set[str] = set()
+        self._updated: float | None = None
+        self._stopped_s: dict[str, float] = {}
+        self._reported: set[str] = set()
 
-    def look(self, stopped: Iterable[str], now: float) -> Mapping[str, str]:
-        """Robots are `stopped` at the time `now` (seconds); return those for which patience is over, and why.
+    def update(self, stopped: Iterable[str], now: float) -> Mapping[str, str]:
+        """Note which robots are `stopped` at the time `now` (seconds), and return why robots are lost, by name.
 
-        Whoever has been stopped for long, or goes on after that, is told of by Python's `logging`, as a warning.
+        A robot that has been stopped for long, or continues after that, is reported by Python's `logging` as a warning.
         """
-        passed = 0.0 if self._looked is None else min(now - self._looked, _LONGEST_LOOK_S)
-        self._looked = now
-        before, self._since_s = self._since_s, {}
-        for name in stopped:
-            self._since_s[name] = before[name] + passed if name in before else 0.0
-        for name in self._told - self._since_s.keys():
-            self._told.discard(name)
-            _tell(f"{name} goes on")
-        lost = {name: s for name, s in self._since_s.items() if self._patience_s is not None and s >= self._patience_s}
-        for name, seconds in self._since_s.items():
-            if seconds >= TOLD_S and name not in self._told and name not in lost:
-                self._told.add(name)
-                _tell(f"{name} has been stopped (SIGSTOP) for {seconds:.0f} s; the others wait for it{self._hint}")
+        passed = 0.0 if self._updated is None else min(now - self._updated, _LONGEST_STEP_S)
+        self._updated = now
+        before = self._stopped_s
+        self._stopped_s = {name: before[name] + passed if name in before else 0.0 for name in stopped}
+        for name in self._reported - self._stopped_s.keys():
+            self._reported.discard(name)
+            _warn(f"{name} goes on")
+        lost = {} if self._patience_s is None else {n: s for n, s in self._stopped_s.items() if s >= self._patience_s}
+        for name, seconds in self._stopped_s.items():
+            if seconds >= REPORT_AFTER_S and name not in self._reported and name not in lost:
+                self._reported.add(name)
+                _warn(f"{name} has been stopped (SIGSTOP) for {seconds:.0f} s; the others wait for it{self._hint}")
         for name in lost:
-            del self._since_s[name]
-            self._told.discard(name)
+            del self._stopped_s[name]
+            self._reported.discard(name)
         return {name: f"its process had been stopped (SIGSTOP) for {seconds:.0f} s" for name, seconds in lost.items()}
 
     @property
@@ -53,7 +52,7 @@ class Stopped:
         return f" (kill -CONT lets it go on; after {self._patience_s:g} s it is lost)"
 
 
-def _tell(what: str) -> None:
-    import logging  # noqa: PLC0415 - nearly no run has anything to tell
+def _warn(text: str) -> None:
+    import logging  # noqa: PLC0415 - nearly no run has anything to report
 
-    logging.getLogger("robochoc").warning("%s", what)
+    logging.getLogger("robochoc").warning("%s", text)

@@ -9,8 +9,8 @@ from pathlib import Path
 from robochoc.authority.authority import check_name
 from robochoc.authority.enrolment import EnrolmentError, NobodyThereError, enrol, renew
 from robochoc.authority.identity import Identity, IdentityError, default_folder
-from robochoc.communication.network.manner import Manner
 from robochoc.communication.network.robot import Ending, NetworkRobot
+from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.transport import Transport
 from robochoc.formats import check_robot
 from robochoc.model.problem import Robot
@@ -58,15 +58,15 @@ def _enrolled(name: str, place: Address, folder: Path, token: str, patience_s: f
             time.sleep(_TRY_AGAIN_S)
 
 
-def join(robot: Robot, place: Address, identity: Identity, manner: Manner, compiler: Compiler) -> Ending:
+def join(robot: Robot, place: Address, identity: Identity, settings: RobotSettings, compiler: Compiler) -> Ending:
     """Be `robot` in one run of the master at `place`. `compiler` compiles its domain.
 
     Raises `InvalidInputError` for a robot that is not valid by itself, `CannotConnectError`, and what compiling raises.
     """
     check_robot(robot)
-    manner.stage("compiling")
-    manner = replace(manner, compiled=lambda shown: compiler.compile(shown).domain)
-    own = CompiledRobot(robot, manner.compiled)
-    manner.stage(f"looking for the master at {place}")
-    with Transport(str(place), identity, watch=(), patience_s=manner.patience_s) as post:
-        return NetworkRobot(own, identity, post, protocol_by_name, manner).run()
+    settings.stage("compiling")
+    settings = replace(settings, compiled=lambda shown: compiler.compile(shown).domain)
+    own = CompiledRobot(robot, settings.compiled)
+    settings.stage(f"looking for the master at {place}")
+    with Transport(str(place), identity, watch=(), patience_s=settings.patience_s) as post:
+        return NetworkRobot(own, identity, post, protocol_by_name, settings).run()

@@ -21,8 +21,7 @@ from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.router import RouterError
 from robochoc.communication.network.settings import NetworkSettings
-from robochoc.communication.processes.robot_link import RobotsLostError
-from robochoc.communication.run_result import Progress
+from robochoc.communication.run_result import Progress, RobotsLostError
 from robochoc.journal.events import Observer
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
@@ -122,7 +121,7 @@ def lead(
     master = Master(
         authority, identity, endpoint, members, conditions, observer=observer, watched=watched, progress=progress
     )
-    authority.observer = master.chronicle.relay
+    authority.observer = master.events.relay
     if publication:
         master.publish(publication)
     with _enrolling(authority, identity, plan.place), master:

@@ -15,8 +15,7 @@ from typing import assert_never
 from msgspec import UNSET
 
 from robochoc.communication.network.master import Master
-from robochoc.communication.processes.robot_link import RobotsLostError
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.run_result import RobotsLostError, RunResult
 from robochoc.journal.events import Began, Observer
 from robochoc.model.outcome import ALL_ROBOTS, Outcome, Verdict
 from robochoc.model.problem import Domain, ProblemKind, Team, Variable
@@ -68,7 +67,7 @@ class Machines(Deployment):
     @property
     def unsettled(self) -> str:
         """See `Deployment.unsettled`."""
-        return self._master.tally.restless
+        return self._master.state.unfinished
 
     def withdrawal_cost(self) -> float:
         """See `Deployment.withdrawal_cost`."""
@@ -109,7 +108,7 @@ class Machines(Deployment):
             RefutedError: when a robot objects to what the protocol claims, or robots contradict each other.
             RobotsLostError: when a robot has values and does not report them.
         """
-        state, members = self._master.tally, self._master.members
+        state, members = self._master.state, self._master.members
         without = tuple(name for name in members.order if not state.assigned.get(name))
         if self._master.is_private:
             withdrawn = without if phase.withdrawal and result.verdict is Verdict.SOLUTION else ()
@@ -128,14 +127,14 @@ class Machines(Deployment):
 
     def _reported(self, assignments: Mapping[str, dict[str, int]]) -> dict[str, dict[str, int]]:
         """Return the reported values. Raises `RobotsLostError` for a robot that has values and does not report them."""
-        for name, assigned in self._master.tally.assigned.items():
+        for name, assigned in self._master.state.assigned.items():
             if assigned and not assignments[name]:
                 raise RobotsLostError({name: "it has reported that it has values, and none of them"})
         return dict(assignments)
 
     def _refuse_contradictions(self) -> None:
         """Raise `RefutedError` if robots contradict each other: nobody can say which of them lies."""
-        doubts = "; ".join(doubt.why for doubt in self._master.tally.doubts_about_verdict)
+        doubts = "; ".join(doubt.why for doubt in self._master.state.doubts_about_verdict)
         if doubts:
             raise RefutedError(f"{self._name} has no answer that can be believed: {doubts}")
 

@@ -35,7 +35,21 @@
       "zoom-in": () => chart.zoom(1.25), "zoom-out": () => chart.zoom(0.8), wider: () => chart.widen(1.25), narrower: () => chart.widen(0.8),
       fit: () => chart.fit() };
     for (const [id, does] of Object.entries(press)) byId(id).addEventListener("click", does);
+    menu(byId("display"));
     keys(page, focus);
+  };
+
+  /* Closes by a click elsewhere, and by Escape. */
+  const menu = (details) => {
+    document.addEventListener("click", (event) => {
+      if (!details.contains(event.target)) details.open = false;
+    });
+    details.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape" || !details.open) return;
+      event.stopPropagation();
+      details.open = false;
+      details.querySelector("summary").focus();
+    });
   };
 
   const keys = (page, focus) => {

@@ -36,7 +36,7 @@
         make("div", { class: "buttons" },
           button("Collapse groups", "One lifeline for each row", () => this._collapse(true)),
           button("Expand groups", "One lifeline for each robot", () => this._collapse(false)),
-          button("As at first", "Robots, groups and order as they were", () => {
+          button("Reset", "Robots, groups and order as they were at first", () => {
             this.search.value = this.wanted = "";
             this.told.begin();
             this.paint();

@@ -18,8 +18,7 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.communication.processes import pool as crew
-from robochoc.communication.processes import processes
+from robochoc.communication.processes import pool, processes
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Lost, Sent
@@ -301,7 +300,7 @@ def test_a_stopped_robot_does_not_outlive_the_time_limit(team: Path, tmp_path: P
             if len(robots) < len(NAMES):
                 continue  # the machine is so busy that the time was over before all had started
             run.strike(signal.SIGSTOP, robots[30])
-            assert run.end(100) < limit_s + processes.LATE_WORDS_S + crew.FAREWELL_S + gone_within_s()
+            assert run.end(100) < limit_s + processes.LATE_REPORTS_S + pool.GRACE_S + gone_within_s()
             assert run.status() in {3, 4}
             nothing_is_left(run)
             return

@@ -1,4 +1,4 @@
-"""Stopped robots: told after a while, lost once patience is over; those that only compute are neither."""
+"""StoppedRobots robots: told after a while, lost once patience is over; those that only compute are neither."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from threading import Thread
 
 import pytest
 
+from robochoc.communication.processes.process_status import ProcessStatus
 from robochoc.communication.processes.processes import ProcessesRun
-from robochoc.communication.processes.robot_link import Condition, RobotsLostError
-from robochoc.communication.processes.stopped import TOLD_S, Stopped
+from robochoc.communication.processes.stopped import REPORT_AFTER_S, StoppedRobots
+from robochoc.communication.run_result import RobotsLostError
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Lost
@@ -34,19 +35,19 @@ def team(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def looks(stopped: Stopped, *names: str, start: float, seconds: float) -> dict[str, str]:
+def looks(stopped: StoppedRobots, *names: str, start: float, seconds: float) -> dict[str, str]:
     """Look ten times a second, while these robots are stopped."""
     lost: dict[str, str] = {}
     for tenth in range(int(seconds * 10)):
-        lost |= stopped.look([name for name in names if name not in lost], start + tenth / 10)
+        lost |= stopped.update([name for name in names if name not in lost], start + tenth / 10)
     return lost
 
 
 def test_it_is_told_once_and_again_when_it_goes_on(caplog: pytest.LogCaptureFixture) -> None:
-    stopped = Stopped()
-    assert looks(stopped, "R1", start=100, seconds=TOLD_S - 1) == {}
+    stopped = StoppedRobots()
+    assert looks(stopped, "R1", start=100, seconds=REPORT_AFTER_S - 1) == {}
     assert caplog.messages == []
-    assert looks(stopped, "R1", start=100 + TOLD_S - 1, seconds=20) == {}
+    assert looks(stopped, "R1", start=100 + REPORT_AFTER_S - 1, seconds=20) == {}
     assert len(caplog.messages) == 1
     assert caplog.messages[0].startswith("R1 has been stopped (SIGSTOP) for 5 s; the others wait for it")
     assert caplog.records[0].levelno == logging.WARNING
@@ -55,7 +56,7 @@ def test_it_is_told_once_and_again_when_it_goes_on(caplog: pytest.LogCaptureFixt
 
 
 def test_patience_is_for_each_and_begins_anew_when_it_goes_on(caplog: pytest.LogCaptureFixture) -> None:
-    stopped = Stopped(2)
+    stopped = StoppedRobots(2)
     assert looks(stopped, "R1", start=0, seconds=1.5) == {}
     assert looks(stopped, start=1.5, seconds=0.2) == {}
     assert looks(stopped, "R1", "R2", start=2, seconds=1.5) == {}
@@ -66,10 +67,10 @@ def test_patience_is_for_each_and_begins_anew_when_it_goes_on(caplog: pytest.Log
 
 def test_time_in_which_nobody_looked_does_not_count() -> None:
     """A terminal's Ctrl-Z stops all, the one who looks included."""
-    stopped = Stopped(2)
+    stopped = StoppedRobots(2)
     assert looks(stopped, "R1", start=0, seconds=0.2) == {}
-    assert stopped.look(["R1"], 3600) == {}
-    assert stopped.look([], 3600.1) == {}
+    assert stopped.update(["R1"], 3600) == {}
+    assert stopped.update([], 3600.1) == {}
 
 
 FIRST = TEAM.robots[0].name
@@ -81,7 +82,7 @@ def test_a_stopped_robot_is_lost_when_patience_is_over() -> None:
     with ProcessesRun(TEAM, StopsItself, patience_s=0.3, observer=lost.append) as session:
         with pytest.raises(RobotsLostError) as refused:
             session.search()
-        pids = [robot.process.pid for robot in session._crew.robots.values()]  # noqa: SLF001 - nothing else knows them
+        pids = [robot.process.pid for robot in session._pool.robots.values()]  # noqa: SLF001 - nothing else knows them
     assert [*refused.value.robots] == [FIRST]
     assert WHY.fullmatch(refused.value.robots[FIRST])
     assert [event.robot for event in lost if isinstance(event, Lost)] == [FIRST]
@@ -91,7 +92,7 @@ def test_a_stopped_robot_is_lost_when_patience_is_over() -> None:
 def test_the_others_go_on_without_it() -> None:
     with ProcessesRun(TEAM, StopsItself, patience_s=0.3, survive=True) as session:
         result = session.search()
-        assert FIRST not in session._crew.robots  # noqa: SLF001 - nothing else knows them
+        assert FIRST not in session._pool.robots  # noqa: SLF001 - nothing else knows them
     assert [*result.lost] == [FIRST]
     assert WHY.fullmatch(result.lost[FIRST])
 
@@ -108,8 +109,8 @@ def test_one_that_goes_on_is_not_lost() -> None:
 
 def wake(session: ProcessesRun) -> None:
     """Let the first robot go on, once it is stopped."""
-    robots = session._crew.robots  # noqa: SLF001 - nothing else knows them
-    wait_until(lambda: FIRST in robots and robots[FIRST].condition() is Condition.STOPPED, "it is not stopped")
+    robots = session._pool.robots  # noqa: SLF001 - nothing else knows them
+    wait_until(lambda: FIRST in robots and robots[FIRST].status is ProcessStatus.STOPPED, "it is not stopped")
     pid = robots[FIRST].process.pid
     assert pid is not None
     os.kill(pid, signal.SIGCONT)

@@ -20,7 +20,7 @@ def test_what_is_flown_in_cells_is_said_not_to_be_to_scale(values: dict[str, int
     assert scene.playback
     assert scene.playback.duration_s < 10
     assert facts["flown"].endswith(" s, not to scale")
-    assert "nearest" not in facts
+    assert "separation" not in facts
 
 
 def test_more_epochs_than_are_flown_for_a_picture() -> None:

@@ -231,6 +231,22 @@ def test_the_caption_says_what_happened() -> None:
 # The page
 
 
+def test_the_legend_says_what_colours_mean() -> None:
+    html = page(four()).decode()
+    (found,) = re.findall(r'<ul id="legend"[^>]*>(.*?)</ul>', html)
+    assert re.findall(r"</i>([^<]*)<", found) == ["row 1", "row 2", "row 3", "row 4", "withdrawn"]
+
+
+def test_many_rows_are_one_ramp_in_the_legend() -> None:
+    html = page(scene_of(outcome({f"V{row}.1": 1 for row in range(1, 21)}))).decode()
+    (found,) = re.findall(r'<ul id="legend"[^>]*>(.*?)</ul>', html)
+    assert re.findall(r"</i>([^<]*)<", found) == ["row 1 to 20"]
+
+
+def test_drones_that_look_alike_need_no_legend() -> None:
+    assert b'<ul id="legend"' not in page(scene_of(outcome({"V1.1": 1, "V1.2": 2})))
+
+
 def test_key_frames_begin_at_home_and_end_at_the_place() -> None:
     scene = four()
     tracks = tracks_of(page(scene))

@@ -1,0 +1,88 @@
+"""The master's loop of one search, whatever carries the messages: processes' pipes, or the network.
+
+The master waits until all robots are ready, orders the start, asks for counters until they show quiescence, and ends
+the search. What it decides is in `SearchState`; how it reads and sends control messages is the runtime's.
+"""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+
+from robochoc.communication.control import Wave
+from robochoc.communication.run_result import Progress
+from robochoc.communication.search_state import SearchState
+from robochoc.communication.session import over
+
+TICK_S = 0.2
+"""Seconds between two reports of progress, and between two checks of which robots are still there."""
+
+
+class MasterLoop(ABC):
+    """The loop of a master whose search is in `state`. `progress` is called with the count of messages, if given."""
+
+    state: SearchState
+
+    def __init__(self, progress: Callable[[Progress], None] | None = None) -> None:
+        self._progress = progress
+        self._shown = self._checked = 0.0
+        self._began = time.monotonic()
+
+    @abstractmethod
+    def _serve(self, patience_s: float, deadline: float | None) -> None:
+        """Handle what has come, after waiting for it for at most `patience_s` seconds.
+
+        Raises:
+            RobotsLostError: when a robot is lost whose loss ends the run.
+            UnsupportedError: when a robot cannot take part.
+        """
+
+    @abstractmethod
+    def _check_robots(self, now: float) -> None:
+        """Find out which robots are gone. Raises as `_serve`."""
+
+    @abstractmethod
+    def _order_start(self) -> None:
+        """Tell all robots to begin."""
+
+    @abstractmethod
+    def _send_wave(self, wave: Wave) -> None:
+        """Ask all robots for their counters."""
+
+    def _search_until(self, deadline: float | None) -> None:
+        """Search until there is a verdict, the search has to be broken off, or the deadline comes.
+
+        Raises as `_serve`.
+        """
+        state = self.state
+        self._serve_until(lambda: state.ready or state.broken_off, deadline)
+        if not state.ready or state.ended:
+            return
+        self._order_start()
+        state.ordered = state.searching = True
+        self._serve_until(lambda: state.ended, deadline)
+        state.searching = False
+
+    def _serve_until(self, done: Callable[[], bool], deadline: float | None) -> None:
+        """Serve the robots until `done()`, or until the deadline on the monotonic clock. Raises as `_serve`."""
+        while not done():
+            now = time.monotonic()
+            if over(deadline):
+                return
+            self._serve(TICK_S if deadline is None else min(TICK_S, deadline - now), deadline)
+            if now - self._checked >= TICK_S:
+                self._checked = now
+                self._check_robots(now)
+            if self.state.searching:
+                self._detect_end(now)
+
+    def _detect_end(self, now: float) -> None:
+        """Begin a wave when it could show quiescence, or when somebody waits for the count of messages."""
+        wanted = self._progress is not None and now - self._shown >= TICK_S
+        if self._progress and wanted:
+            self._shown = now
+            self._progress(Progress(self.state.counters.sent, time.monotonic() - self._began))
+        wave = self.state.next_wave(wanted=wanted)
+        if wave is not None:
+            self._send_wave(Wave(wave))

@@ -1,0 +1,215 @@
+"""The search state of a master that cannot trust its robots: their messages are held against each other. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import islice
+
+from robochoc.communication.control import OfEpoch, Report
+from robochoc.communication.network.control_messages import Account, Checked
+from robochoc.communication.network.plausibility import (
+    NOTHING_DECLARED,
+    Course,
+    Declared,
+    Doubt,
+    doubts_about_checks,
+    doubts_about_messages,
+    doubts_about_values,
+    fault_of_account,
+    fault_of_check,
+    fault_of_counters,
+    objections,
+    thoroughness,
+    total_of,
+    widest_gap,
+)
+from robochoc.communication.quiescence import Counts
+from robochoc.communication.search_state import SearchState
+from robochoc.model.outcome import CheckCounts
+
+_ASKED_ENOUGH = 2
+_MOST_NAMED = 3
+"""So many doubts are described."""
+
+
+class AuditedSearchState(SearchState):
+    """The state of a search whose robots are not trusted: what they say is checked for plausibility.
+
+    Attributes:
+        stuck: Why the search can never end; empty if it can.
+        duration_s: How long the search took, once `note_end` was called.
+    """
+
+    def __init__(
+        self,
+        epoch: int = 0,
+        order: Sequence[str] = (),
+        max_messages: int | None = None,
+        declared: Declared = NOTHING_DECLARED,
+    ) -> None:
+        super().__init__(epoch, order, max_messages, declared.traits)
+        self.stuck = ""
+        self.duration_s = 0.0
+        self._declared = declared
+        self._late: tuple[str, ...] = ()
+        self._received_before: int | None = None
+        self._accounts: dict[str, Account] = {}
+        self._checks: dict[str, Checked] = {}
+        self._contradictions: list[Doubt] = []
+        self._still: Counts | None = None
+        self._still_since = 0.0
+        self._asked = 0
+
+    def handle(self, name: str, message: OfEpoch) -> str:
+        """See `SearchState.handle`. Robots also report what their constraints charge."""
+        if isinstance(message, Checked) and message.epoch == self.epoch and name in self._present:
+            return self._take_check(name, message)
+        return super().handle(name, message)
+
+    def _count(self, name: str, wave: int, counts: Counts) -> str:
+        """Take in counters. In one wave robots have received no more than all have sent by the next one."""
+        if fault := fault_of_counters(counts, self.counters.latest(name)):
+            return fault
+        was_waving = self.counters.waving
+        super()._count(name, wave, counts)
+        total = self.counters.total
+        if was_waving and not self.counters.waving and total is not None:
+            if self._received_before is not None and self._received_before > total.sent:
+                self.stuck = f"robots have counted {self._received_before:,} messages taken in, and {total.sent:,} sent"
+            self._received_before = total.received
+        return ""
+
+    def _conclude(self, name: str, verdict: str) -> str:
+        """Take in a verdict that the robot `name` concluded alone. The first one stands, whatever others conclude."""
+        if not self.ordered:
+            return "it has concluded something before the search began"
+        if fault := super()._conclude(name, verdict):
+            return fault
+        if self.verdict == verdict or self.witness is None:  # after quiescence the answer is checked, so none matters
+            return ""
+        if self.witness == name:
+            return f"it has concluded {verdict}, and {self.verdict} before"
+        why = f"{self.witness} has concluded {self.verdict}, and {name} {verdict}"
+        self._contradictions.append(Doubt((self.witness, name), why))
+        return ""
+
+    def _take_report(self, name: str, report: Report) -> str:
+        if not isinstance(report, Account):
+            return "it is none for the master"
+        counts = self.counters.latest(name) or Counts(0, 0)
+        course = Course(self.order, counts, self.duration_s, self.by_quiescence)
+        fault = fault_of_account(name, report, self._declared, course)
+        if not fault:
+            self._accounts[name] = report
+            super()._take_report(name, report)
+        return fault
+
+    def _take_check(self, name: str, check: Checked) -> str:
+        fault = fault_of_check(name, check, self._declared, self.order)
+        if not fault:
+            self._checks[name] = check
+        return fault
+
+    def lose(self, name: str, why: str) -> None:
+        """See `SearchState.lose`."""
+        super().lose(name, why)
+        self._accounts.pop(name, None)
+        self._checks.pop(name, None)
+
+    def note_end(self, duration_s: float, *, in_time: bool) -> None:
+        """Note that the search is over after `duration_s` seconds: `in_time`, or because the time was over."""
+        self.duration_s = duration_s
+        if not in_time:
+            self._late = tuple(sorted(self._unready)) or self.counters.silent
+
+    @property
+    def broken_off(self) -> bool:
+        """Whether the search has to end without a verdict: see `SearchState.broken_off`, or it is stuck."""
+        return bool(self.stuck) or super().broken_off
+
+    @property
+    def wave_due(self) -> bool:
+        """Whether a wave could show something: see `SearchState.wave_due`, or that messages are missing."""
+        return super().wave_due or (bool(self._asked) and not self.counters.waving)
+
+    def missing(self, now: float, patience_s: float) -> int:
+        """Return how many messages were sent and are lost for good; 0 as long as that is not certain.
+
+        It is certain when nothing has been sent or received for `patience_s` seconds, and all robots, asked twice after
+        that, say the same again: then nothing is under way either.
+
+        Args:
+            now: The time on the monotonic clock.
+            patience_s: How long a message may be under way.
+        """
+        total = self.counters.total
+        if total is None or total != self._still or total.sent == total.received:
+            self._still, self._still_since, self._asked = total, now, 0
+        elif now - self._still_since > patience_s and not self.counters.waving:
+            if self._asked == _ASKED_ENOUGH:
+                return total.sent - total.received
+            self._asked += 1
+        return 0
+
+    @property
+    def by_quiescence(self) -> bool:
+        """Whether the search ended by quiescence, and not by one robot's conclusion."""
+        return self.counters.quiescent and self.witness is None
+
+    @property
+    def unchecked(self) -> bool:
+        """Whether a robot has not checked its constraints against the decision yet."""
+        return bool(self._present - self._checks.keys())
+
+    @property
+    def held(self) -> bool:
+        """Whether all robots have checked their constraints, and none is broken."""
+        return not self.unchecked and all(check.allowed for check in self._checks.values())
+
+    @property
+    def objections(self) -> tuple[str, ...]:
+        """Descriptions of broken constraints, by the robots that hold them."""
+        return tuple(islice(objections(self._checks), _MOST_NAMED))
+
+    @property
+    def thoroughness(self) -> CheckCounts:
+        """How many constraints were checked by one robot, and how many by more."""
+        return thoroughness(self._checks)
+
+    # Contradictions between robots
+
+    @property
+    def doubts_about_counts(self) -> tuple[Doubt, ...]:
+        """Pairs of robots whose counts of messages do not agree, once all have reported."""
+        stirred = any(total_of(one) != self.counters.latest(name) for name, one in self._accounts.items())
+        still = (self.by_quiescence and not stirred) or bool(self.stuck)
+        return tuple(islice(doubts_about_messages(self._accounts, quiet=still), _MOST_NAMED))
+
+    @property
+    def doubts_about_verdict(self) -> tuple[Doubt, ...]:
+        """Pairs of robots that contradict each other on the verdict, the values, or a constraint that both know.
+
+        After quiescence the verdict is that of the counters; only the proof that a cost is optimal rests on it.
+        """
+        proven = self._declared.traits.costs and self.by_quiescence
+        found = [*self._contradictions, *(self.doubts_about_counts if proven else ())]
+        found += [*doubts_about_values(self._accounts), *doubts_about_checks(self._checks)]
+        return tuple(found[:_MOST_NAMED])
+
+    @property
+    def unfinished(self) -> str:
+        """Which robots kept the search from its end until the time was over, in words; empty if that is unknown."""
+        names = ", ".join(self._late[:_MOST_NAMED]) + ", ..." * (len(self._late) > _MOST_NAMED)
+        waited = f"{names} {'has' if len(self._late) == 1 else 'have'} not answered the master"
+        doubts = [doubt.why for doubt in self.doubts_about_counts]
+        return "; ".join(filter(None, [waited if names else "", *(doubts or [widest_gap(self._accounts)])]))
+
+    @property
+    def cost(self) -> float:
+        """What all constraints charge together, as far as they were checked."""
+        return sum(check.cost for check in self._checks.values())
+
+    @property
+    def assigned(self) -> Mapping[str, bool]:
+        """Whether each robot that has reported has values."""
+        return {name: account.assigned for name, account in self._accounts.items()}

@@ -1,0 +1,52 @@
+"""A robot checks its constraints, and its copies of others' constraints, against what the team has decided. Pure.
+
+It uses the problem itself, not the compiled constraints that the protocol works with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import islice
+
+from robochoc.communication.network.control_messages import Charge, Checked
+from robochoc.communication.network.plausibility import MOST_CHARGES
+from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Robot
+
+
+def check_constraints(
+    epoch: int,
+    robot: Robot,
+    values: Mapping[str, int],
+    assignment: Mapping[str, int],
+    learnt: Mapping[str, Sequence[Constraint]],
+) -> Checked:
+    """Return what the constraints charge that `robot` knows.
+
+    Args:
+        epoch: The epoch of the search.
+        robot: The robot that checks.
+        values: The decided values of all variables that it knows. Withdrawn robots have none, and constraints over
+            their variables are left out.
+        assignment: Those of its own variables; empty if it is withdrawn.
+        learnt: Constraints that it has learnt from others, by the robots that hold them.
+    """
+    parts = [part for child in robot.children for part in child.constraints]
+    own = robot.private if assignment else ()
+    held = [one for one in (*own, *robot.shared, *parts) if values.keys() >= set(one.variables)]
+    cost = sum(constraint.price(values) for constraint in held)
+    shared = tuple(_charges(robot.name, [one for one in robot.shared if one.model is not ConstraintModel.PKC], values))
+    known = [*((child.name, child.copies) for child in robot.children), *learnt.items()]
+    charges = (one for holder, theirs in known for one in _charges(holder, theirs, values))
+    copies = tuple(islice(charges, max(0, MOST_CHARGES - len(shared))))  # others may have told any number
+    allowed = cost < INFINITE
+    return Checked(epoch, allowed, cost if allowed else 0, len(held), shared, copies)
+
+
+def _charges(holder: str, constraints: Iterable[Constraint], values: Mapping[str, int]) -> Iterator[Charge]:
+    """Yield, by scope, what those `constraints` of `holder` charge whose variables all have `values`."""
+    groups: dict[tuple[str, ...], list[Constraint]] = {}
+    for one in constraints:
+        if values.keys() >= set(one.variables):
+            groups.setdefault(tuple(sorted(one.variables)), []).append(one)
+    for variables, group in groups.items():
+        yield Charge(holder, variables, len(group), sum(one.price(values) for one in group))

@@ -1,0 +1,77 @@
+"""The master's registration of robots: it checks profiles, welcomes robots, and enters them in the directory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from robochoc.communication.network.connection_policy import ConnectionPolicy
+from robochoc.communication.network.control_messages import Denied, ToRobot, Welcome
+from robochoc.communication.network.facilitator import DirectoryFacilitator
+from robochoc.communication.network.framing import Framing
+from robochoc.communication.network.master_events import MasterEvents
+from robochoc.communication.network.members import Members, RegistrationRefusedError
+from robochoc.communication.network.profile import Profile
+from robochoc.communication.network.settings import NetworkSettings
+
+
+class Registrar:
+    """Registers robots as `members`.
+
+    Args:
+        members: Robots that are registered.
+        framing: The master's framing; frames of a new incarnation are numbered anew.
+        policy: Which identities are robots.
+        facilitator: The directory that robots are entered in.
+        events: Receives registrations and refusals.
+        send: Sends a control message to a robot.
+        settings: What a welcome tells the robot of the run.
+        watched: The robots' events are wanted.
+    """
+
+    def __init__(
+        self,
+        members: Members,
+        framing: Framing,
+        policy: ConnectionPolicy,
+        facilitator: DirectoryFacilitator,
+        events: MasterEvents,
+        send: Callable[[str, ToRobot], None],
+        settings: NetworkSettings,
+        *,
+        watched: bool,
+    ) -> None:
+        self._members = members
+        self._framing = framing
+        self._policy = policy
+        self._facilitator = facilitator
+        self._events = events
+        self._send = send
+        self._settings = settings
+        self._watched = watched
+
+    def register(self, name: str, profile: Profile, incarnation: str) -> bool:
+        """Register a robot and welcome it, or refuse it; return whether it was not registered before."""
+        known = self._members.robots.get(name)
+        try:
+            member = self._members.register(name, profile, incarnation, admitted=self._policy.is_robot(name))
+        except RegistrationRefusedError as refusal:
+            self._events.refuse(name, "register", str(refusal))
+            self._send(name, Denied(incarnation, str(refusal)))
+            return False
+        if member is not known:
+            self._framing.forget(name)
+            if unfit := self._facilitator.enter(profile):
+                self._events.refuse(name, "be in the directory", unfit)
+            self._events.registered(name)
+        self._welcome(name, incarnation)
+        return member is not known
+
+    def welcome_again(self) -> None:
+        """Welcome robots that have not answered a welcome since they came, or came back."""
+        for name, incarnation in self._members.to_welcome().items():
+            self._welcome(name, incarnation)
+
+    def _welcome(self, name: str, incarnation: str) -> None:
+        settings = self._settings
+        welcome = Welcome(incarnation, self._framing.run, settings.filters, self._watched, settings.private)
+        self._send(name, welcome)

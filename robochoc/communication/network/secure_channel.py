@@ -1,0 +1,104 @@
+"""A robot's channel to the master and to other robots: frames, and the filters that seal what robots say to each other.
+
+No I/O: it makes and reads bytes. Key cards of other robots come with the master's task.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+
+import msgspec
+
+from robochoc.authority.identity import Identity
+from robochoc.authority.keyring import KeyCard, KeyCardError, KeyRing, UnknownPeerError
+from robochoc.communication.filters import FilterStack, UnknownFilterError, filter_named
+from robochoc.communication.network.control_messages import Copies, ProtocolMessage, ToMaster, ToPeer
+from robochoc.communication.network.framing import MASTER, Framing, Opened
+from robochoc.solver.encoding import UnsupportedError
+
+
+class SecureChannel:
+    """The channel of the robot with this identity, under the name `name`."""
+
+    def __init__(self, name: str, identity: Identity) -> None:
+        self._name = name
+        self._identity = identity
+        self._framing = Framing(name)
+        self._ring: KeyRing | None = None
+        self._filters: FilterStack | None = None
+
+    def begin(self, run: str, filters: tuple[str, ...]) -> None:
+        """Begin a run, in which messages go through `filters`. Raises `UnsupportedError` for an unknown filter."""
+        self._framing.begin(run)
+        if not filters:
+            return
+        self._ring = KeyRing(self._identity, run)
+        try:
+            self._filters = FilterStack(self._ring, [filter_named(name) for name in filters])
+        except UnknownFilterError as unknown:
+            raise UnsupportedError(f"{self._name}: {unknown}") from None
+
+    @property
+    def card(self) -> bytes:
+        """The robot's key card of this run; empty if no filter needs one."""
+        return self._ring.card.encode() if self._ring else b""
+
+    def admit(self, cards: Iterable[bytes]) -> list[str]:
+        """Accept the key cards of others that the Authority has certified; return why others were not accepted."""
+        if self._ring is None:
+            return []
+        faults = []
+        for content in cards:
+            try:
+                card = KeyCard.decode(content)
+                if card.name != self._name:
+                    self._ring.admit(card, time.time())
+            except KeyCardError as bad:
+                faults.append(str(bad))
+        return faults
+
+    def revoke(self, name: str) -> None:
+        """Accept nothing more from `name`, whose certificate was revoked."""
+        if self._ring:
+            self._ring.dismiss(name)
+
+    def frame(self, message: ToMaster) -> bytes:
+        """Return the next frame to the master."""
+        return self._framing.write(MASTER, message)
+
+    def sealed_frame(self, receiver: str, message: ToPeer) -> bytes | None:
+        """Return the next frame to another robot; None if that was revoked."""
+        if self._filters:
+            context = self._context(self._name, receiver, self._framing.next_number(receiver), message)
+            try:
+                content = self._filters.seal(receiver, message.content, context)
+            except UnknownPeerError:
+                return None
+            message = msgspec.structs.replace(message, content=content)
+        return self._framing.write(receiver, message)
+
+    def read(self, sender: str, content: bytes) -> Opened:
+        """Return what is in a frame; it counts as received once it is `taken`. Raises `FrameRefusedError`."""
+        return self._framing.read(sender, content)
+
+    def take(self, sender: str, number: int) -> None:
+        """Accept the frame `number` of `sender`: the next one is expected now."""
+        self._framing.take(sender, number)
+
+    def unsealed(self, sender: str, number: int, message: ToPeer) -> ToPeer:
+        """Return the message of another robot as it was before the filters sealed it.
+
+        Raises:
+            NotGenuineError: when the filters find that it was changed.
+            UnknownPeerError: when the sender's key card is not known.
+        """
+        if self._filters is None:
+            return message
+        context = self._context(sender, self._name, number, message)
+        return msgspec.structs.replace(message, content=self._filters.open(sender, message.content, context))
+
+    def _context(self, sender: str, receiver: str, number: int, message: ProtocolMessage | Copies) -> bytes:
+        """Return what binds a sealed message to its place in the run."""
+        kind = message.clock if isinstance(message, ProtocolMessage) else "copies"
+        return f"{self._framing.run} {sender} {receiver} {number} {message.epoch} {kind}".encode()

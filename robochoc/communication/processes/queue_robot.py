@@ -1,0 +1,184 @@
+"""A robot that talks to others through queues, and to the parent through its control pipe.
+
+One loop waits for whatever comes: messages, the parent's orders, room in a pipe that was full, the parent's end. All
+messages that wait when it wakes up are one packet.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import selectors
+import struct
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import assert_never
+
+from robochoc.communication.control import (
+    QUEUES_AT_ONCE,
+    Begin,
+    Change,
+    FromParent,
+    FromRobot,
+    OpenQueues,
+    Pause,
+    QueueFrom,
+    QueuesTo,
+    Report,
+    Wave,
+    unsealed,
+)
+from robochoc.communication.host import Host
+from robochoc.communication.processes.control_pipe import ControlPipe
+from robochoc.communication.processes.queues import LARGEST_BODY, QueueReader, QueueWriter
+from robochoc.communication.resources import own_memory
+from robochoc.communication.robot_loop import IDLE_S, RobotLoop
+from robochoc.model.message import Envelope
+
+_STAMP = struct.Struct("!IQ")
+"""Goes before each message: its epoch, and the sender's clock."""
+
+
+class QueueRobot(RobotLoop):
+    """The robot of `host`, in a process of its own, with the control pipe `link`.
+
+    Every message is stamped with its epoch. Messages of an epoch that is over are lost.
+    """
+
+    bundle_bytes = LARGEST_BODY // 4
+
+    def __init__(self, host: Host, link: ControlPipe, epoch: int, *, observed: bool) -> None:
+        super().__init__(epoch, observed=observed)
+        self._name = host.name
+        self._link = link
+        self._readers: dict[str, QueueReader] = {}
+        self._writers: dict[str, QueueWriter] = {}
+        self._running = True
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(link, selectors.EVENT_READ, self._read_orders)
+        parent = multiprocessing.parent_process()
+        if parent is not None:
+            self._selector.register(parent.sentinel, selectors.EVENT_READ, self._end)
+        self.confirm(host)
+
+    def run(self) -> None:
+        """Wait and act until the parent hangs up or is gone."""
+        while self._running:
+            ready = self._selector.select(IDLE_S if self.is_restless else None)
+            if not ready:
+                self.report_idle()
+                continue
+            packet: list[Envelope] = []
+            for key, _ in ready:
+                key.data(packet)
+            self.take_in(packet)
+
+    # Messages
+
+    def _transmit(self, envelopes: Sequence[Envelope]) -> None:
+        touched = {}
+        unopened = []
+        for envelope in envelopes:
+            writer = self._writers.get(envelope.receiver)
+            if writer is None:
+                writer = self._writers[envelope.receiver] = QueueWriter()
+                unopened.append(envelope.receiver)
+            writer.put(_STAMP.pack(self.epoch, envelope.clock) + envelope.content)
+            touched[envelope.receiver] = writer
+        for start in range(0, len(unopened), QUEUES_AT_ONCE):
+            self._say(OpenQueues(unopened[start : start + QUEUES_AT_ONCE]))
+        for writer in touched.values():
+            self._flush(writer)
+
+    def _flush(self, writer: QueueWriter) -> None:
+        if writer.flush() or writer.fd is None:
+            return
+        if writer.fd not in self._selector.get_map():
+            self._selector.register(writer.fd, selectors.EVENT_WRITE, lambda _packet: self._flush_later(writer))
+
+    def _flush_later(self, writer: QueueWriter) -> None:
+        if writer.flush() and writer.fd is not None:
+            self._selector.unregister(writer.fd)
+
+    def _read(self, sender: str, reader: QueueReader, packet: list[Envelope]) -> None:
+        if self._readers.get(sender) is not reader:
+            return  # closed by an order that came in the same moment
+        for body in reader.get():
+            epoch, clock = _STAMP.unpack_from(body)
+            if epoch == self.epoch:
+                envelope = Envelope(sender, self._name, body[_STAMP.size :], clock)
+                if self.admit(envelope):
+                    packet.append(envelope)
+        if reader.ended:  # the sender is gone; the parent decides what that means
+            self._close_reader(reader)
+
+    # The parent
+
+    def _say(self, message: FromRobot) -> None:
+        if not self._link.send(message):
+            self._selector.modify(self._link, selectors.EVENT_READ | selectors.EVENT_WRITE, self._read_orders)
+
+    def _read_orders(self, _packet: list[Envelope]) -> None:
+        if self._link.flush():
+            self._selector.modify(self._link, selectors.EVENT_READ, self._read_orders)
+        for order in self._link.orders():
+            self._obey(order)
+        if self._link.ended:
+            self._running = False
+
+    def _end(self, _packet: list[Envelope]) -> None:
+        self._running = False
+
+    def _obey(self, order: FromParent) -> None:
+        match order:
+            case Begin(began, lossless):
+                self.begin(began, lossless=lossless)
+            case QueuesTo(robots):
+                for robot in robots:
+                    self._writers[robot].open(self._link.take_fd())
+                    self._flush(self._writers[robot])
+            case QueueFrom(robot):
+                self._open_reader(robot, QueueReader(self._link.take_fd()))
+            case Wave(number):
+                self.report_counters(number)
+            case Pause():
+                self.pause()
+            case Change():
+                self._change(order)
+            case never:
+                assert_never(never)
+
+    def _report_end(self) -> None:
+        if self._host is not None:
+            protocol = self._host.protocol
+            metrics = replace(self._host.metrics(), memory=own_memory())
+            self._say(Report(self.epoch, protocol.assignment, metrics, protocol.findings))
+
+    def _change(self, order: Change) -> None:
+        """Enter the next epoch, with a changed problem and no message under way."""
+        part, void = unsealed(order.change)
+        for name in order.gone:
+            if name in self._readers:
+                self._close_reader(self._readers[name])
+            if name in self._writers:
+                self._close_writer(self._writers.pop(name))
+        self.epoch = order.epoch
+        self._reset()
+        if self._host is not None:
+            self._host.change(part, void)
+            self.confirm(self._host)
+
+    # Queues
+
+    def _open_reader(self, sender: str, reader: QueueReader) -> None:
+        self._readers[sender] = reader
+        self._selector.register(reader.fd, selectors.EVENT_READ, lambda packet: self._read(sender, reader, packet))
+
+    def _close_reader(self, reader: QueueReader) -> None:
+        self._readers = {name: other for name, other in self._readers.items() if other is not reader}
+        self._selector.unregister(reader.fd)
+        reader.close()
+
+    def _close_writer(self, writer: QueueWriter) -> None:
+        if writer.fd is not None and writer.fd in self._selector.get_map():
+            self._selector.unregister(writer.fd)
+        writer.close()

@@ -1,0 +1,155 @@
+"""A robot's part in a search, whatever carries the messages: queues between processes, or the network.
+
+It stands between the host, which drives the protocol, and a runtime, which moves bytes. It confirms that the robot is
+ready, hands packets of messages to the host, counts, reports to the master, and is silent once the search is over.
+"""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+from robochoc.communication.control import Conclusion, Counters, Events, Ready, RobotMessage
+from robochoc.communication.host import Host
+from robochoc.journal.events import AnyEvent, Sent
+from robochoc.model.message import Envelope
+
+IDLE_S = 0.002
+"""A robot that has received nothing for so many seconds reports its counters.
+
+It says when to ask, never what is true.
+"""
+EVENTS_AT_ONCE = 500
+"""The most events in one bundle to the master."""
+
+
+class RobotLoop(ABC):
+    """One robot in the search `epoch`; `observed` says whether its events are wanted.
+
+    A runtime calls `confirm` when the robot's host is there, `begin` when the master orders the start, `admit` for each
+    message and `take_in` for each packet of them, `report_idle` when nothing comes, and `pause` at the end.
+    """
+
+    bundle_bytes: int
+    """A bundle of events is closed once its messages have so many bytes together."""
+
+    def __init__(self, epoch: int, *, observed: bool) -> None:
+        self.epoch = epoch
+        self._observed = observed
+        self._host: Host | None = None
+        self._events: list[AnyEvent] = []
+        self._began = 0.0
+        self._reset()
+
+    def _reset(self) -> None:
+        self._early: list[Envelope] = []
+        self._sent = self._received = 0
+        self._reported: tuple[int, int] | None = None
+        self._searching = self._concluded = self._paused = False
+
+    # What a runtime supplies
+
+    @abstractmethod
+    def _say(self, message: RobotMessage) -> None:
+        """Send a control message to the master."""
+
+    @abstractmethod
+    def _transmit(self, envelopes: Sequence[Envelope]) -> None:
+        """Send messages of the protocol to other robots."""
+
+    @abstractmethod
+    def _report_end(self) -> None:
+        """Tell the master what came of the search."""
+
+    # The course of a search
+
+    def confirm(self, host: Host) -> None:
+        """Tell the master that the robot is ready to search with `host`."""
+        if self._host is not host and self._observed:
+            host.observe(self._events.append, self._now)
+        self._host = host
+        self._conclude(host)  # a verdict can stand in spite of a change
+        self._say(Ready(self.epoch))
+
+    def begin(self, began: float, *, lossless: bool = True) -> None:
+        """Begin the search, or resume it after a change. Nothing happens before `confirm`.
+
+        Args:
+            began: When the run began, on the monotonic clock.
+            lossless: No message of the epoch before was lost.
+        """
+        if self._host is None:
+            return
+        self._began = began
+        self._searching = True
+        self._reported = (-1, -1)
+        self._send(self._host, self._host.start(lossless=lossless))
+        early, self._early = self._early, []
+        self.take_in(early)
+
+    def admit(self, envelope: Envelope) -> bool:
+        """Return whether `envelope` belongs to the packet at hand.
+
+        It is kept before the start, and lost after the end.
+        """
+        if not (self._searching or self._paused):
+            self._early.append(envelope)
+        return self._searching
+
+    def take_in(self, packet: Sequence[Envelope]) -> None:
+        """Handle all messages that wait, and send the answers. Raises `BadMessageError`."""
+        if packet and self._host and self._searching:
+            self._received += len(packet)
+            self._send(self._host, self._host.handle(packet))
+        if len(self._events) > EVENTS_AT_ONCE:
+            self.report_events()
+
+    def pause(self) -> None:
+        """Be silent, and report. What still arrives is lost."""
+        self._searching, self._paused = False, True
+        self._early = []
+        self.report_events()
+        self._report_end()
+
+    def _send(self, host: Host, envelopes: Sequence[Envelope]) -> None:
+        self._transmit(envelopes)
+        self._sent += len(envelopes)
+        self._conclude(host)
+
+    def _conclude(self, host: Host) -> None:
+        """Tell the master, once, that the protocol has a verdict."""
+        verdict = host.protocol.verdict
+        if verdict is not None and not self._concluded:
+            self._concluded = True
+            self._say(Conclusion(self.epoch, verdict))
+
+    # Reports
+
+    @property
+    def is_restless(self) -> bool:
+        """Whether the master does not know the counters yet."""
+        return self._searching and self._reported != (self._sent, self._received)
+
+    def report_counters(self, wave: int) -> None:
+        """Tell the master how many messages were sent and received: in answer to `wave`, or (0) unasked."""
+        self._reported = (self._sent, self._received)
+        self._say(Counters(self.epoch, wave, *self._reported))
+
+    def report_idle(self) -> None:
+        """Tell the master all that it does not know yet, as there is nothing else to do."""
+        self.report_events()
+        self.report_counters(0)
+
+    def report_events(self) -> None:
+        """Send the events since the last report, in bundles that the way to the master can carry."""
+        events, self._events[:] = list(self._events), []
+        size = start = 0
+        for end, event in enumerate(events, 1):
+            size += event.bytes if isinstance(event, Sent) else 0
+            if size >= self.bundle_bytes or end - start == EVENTS_AT_ONCE or end == len(events):
+                self._say(Events(events[start:end]))
+                size, start = 0, end
+
+    def _now(self) -> float:
+        return time.monotonic() - self._began

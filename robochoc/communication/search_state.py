@@ -1,0 +1,146 @@
+"""The state of one search as its master sees it, whatever carries the messages. Pure.
+
+It knows which robots are ready, their counters, who was lost, which verdict the search has, and what robots report.
+The runtimes of processes and of the network use the same state; the network's also distrusts what robots say
+(`network/audited_state.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from robochoc.communication.control import Conclusion, Counters, OfEpoch, Ready, Report
+from robochoc.communication.quiescence import Counts, FourCounters
+from robochoc.communication.run_result import RunResult
+from robochoc.model.outcome import Verdict
+from robochoc.protocols.traits import Traits
+
+NO_TRAITS = Traits()
+
+
+class SearchState:
+    """The state of the search `epoch` by the robots in `order`.
+
+    Attributes:
+        counters: The robots' message counters, and the wave that is under way.
+        lost: Why robots were lost in this search, by name.
+        verdict: How the search has ended; None while it has not.
+        witness: The robot that concluded the verdict; None when quiescence or a limit ended the search.
+        max_messages: The limit on messages, if there is one.
+        ordered: The robots were told to begin.
+        searching: They search now.
+    """
+
+    def __init__(
+        self, epoch: int = 0, order: Sequence[str] = (), max_messages: int | None = None, traits: Traits = NO_TRAITS
+    ) -> None:
+        self.epoch = epoch
+        self.order = tuple(order)
+        self.counters = FourCounters(order)
+        self.lost: dict[str, str] = {}
+        self.verdict: Verdict | None = None
+        self.witness: str | None = None
+        self.max_messages = max_messages
+        self.ordered = self.searching = False
+        self._traits = traits
+        self._present = set(order)
+        self._unready = set(order)
+        self._reports: dict[str, Report] = {}
+
+    def handle(self, name: str, message: OfEpoch) -> str:
+        """Take in a control message of the robot `name`; return what is wrong with it, or an empty text.
+
+        Late messages of another search, and those of lost robots, change nothing.
+        """
+        if message.epoch != self.epoch or name not in self._present:
+            return ""
+        match message:
+            case Ready():
+                self._unready.discard(name)
+                return ""
+            case Counters(_, wave, sent, received):
+                return self._count(name, wave, Counts(sent, received))
+            case Conclusion(_, verdict):
+                return self._conclude(name, verdict)
+            case Report():
+                return self._take_report(name, message)
+            case _:
+                return "it is none for the master"
+
+    def _count(self, name: str, wave: int, counts: Counts) -> str:
+        self.counters.answer(name, wave, counts)
+        return ""
+
+    def _conclude(self, name: str, verdict: str) -> str:
+        """Take in a verdict that the robot `name` concluded alone. The first one stands."""
+        fault = self._traits.fault_of_conclusion(verdict)
+        if not fault and self.verdict is None:
+            self.verdict, self.witness = Verdict(verdict), name
+        return fault
+
+    def _take_report(self, name: str, report: Report) -> str:
+        self._reports[name] = report
+        return ""
+
+    def lose(self, name: str, why: str) -> None:
+        """Note that the robot is lost; what it reported no longer counts."""
+        self.lost.setdefault(name, why)
+        self._present.discard(name)
+        self._unready.discard(name)
+        self._reports.pop(name, None)
+
+    @property
+    def ready(self) -> bool:
+        """Whether all robots can begin."""
+        return not self._unready
+
+    @property
+    def broken_off(self) -> bool:
+        """Whether the search has to end without a verdict: robots were lost, or the limit on messages is reached."""
+        return bool(self.lost) or (self.max_messages is not None and self.counters.sent >= self.max_messages)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the search is over, with a verdict or without."""
+        return self.verdict is not None or self.broken_off
+
+    @property
+    def wave_due(self) -> bool:
+        """Whether a wave could show that all is quiet, or that the limit on messages is reached."""
+        return self.counters.due or (self.max_messages is not None and not self.counters.waving)
+
+    def next_wave(self, *, wanted: bool = False) -> int | None:
+        """Return the number of a wave to begin now, or None.
+
+        When the last wave has shown quiescence, the verdict is a solution (unless a robot has concluded another).
+
+        Args:
+            wanted: Begin a wave unless one is under way, because somebody waits for the count of messages.
+        """
+        if self.counters.quiescent:
+            self.verdict = self.verdict or Verdict.SOLUTION
+            return None
+        return self.counters.begin_wave() if self.wave_due or (wanted and not self.counters.waving) else None
+
+    def has_reported(self, name: str) -> bool:
+        """Whether the robot has reported the end of its search."""
+        return name in self._reports
+
+    @property
+    def pending_reports(self) -> tuple[str, ...]:
+        """The robots that have not reported yet, sorted."""
+        return tuple(sorted(self._present - self._reports.keys()))
+
+    def result(self, wall_s: float) -> RunResult:
+        """Return the result of the search, which lasted `wall_s` seconds."""
+        settled = self.verdict is not None and not self.lost
+        result = RunResult.of(
+            self.verdict if self.verdict is not None and settled else Verdict.UNKNOWN,
+            self.witness if settled else None,
+            {name: report.assignment for name, report in self._reports.items()},
+            [report.metrics for report in self._reports.values()],
+            wall_s,
+        )
+        findings = {name: report.findings for name, report in self._reports.items()}
+        return replace(result, lost=dict(self.lost), findings=findings)

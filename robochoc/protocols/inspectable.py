@@ -1,0 +1,38 @@
+"""What a replay asks of a protocol besides its attributes: whatever is special about how its state is to be shown.
+
+A replay shows a robot's state after each of its steps (`replay/inspection.py`). It finds agent views, nogood stores,
+contexts and partial assignments by themselves. A protocol overrides these members only where that is not enough.
+Looking changes nothing: none of them may check constraints or change state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import ClassVar
+
+from robochoc.model.message import Value
+
+
+class Inspectable:
+    """Base of `Protocol`: members with which its state is shown. All are optional."""
+
+    numbered_values: ClassVar[bool] = False
+    """Whether robots never see others' values, but numbers of assignments; `view` holds these numbers then."""
+
+    @property
+    def checked_against(self) -> Mapping[str, Value] | None:
+        """The values of others that own values are checked against; None: all that this robot knows."""
+        return None
+
+    @property
+    def kept_nogoods(self) -> Iterable[Mapping[str, Value]]:
+        """The nogoods kept besides a `NogoodStore`: assignments that cannot all hold, the own one among them."""
+        return ()
+
+    def value_notes(self, index: int) -> Mapping[str, float]:  # noqa: ARG002 - for those that have notes
+        """Return what this robot notes on its value at `index`, by name: `{"LB": 3, "UB": 7}`."""
+        return {}
+
+    def tried(self, index: int) -> bool:  # noqa: ARG002 - as above
+        """Return whether the value at `index` has been tried in vain since the view is as it is."""
+        return False

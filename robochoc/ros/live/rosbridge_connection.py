@@ -1,0 +1,232 @@
+"""A connection to a rosbridge. roslibpy speaks the protocol (rosbridge v2); this module alone knows roslibpy.
+
+A place is `//HOST:PORT`, or `wss://HOST:PORT` for TLS.
+"""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import socket
+import threading
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from functools import partial
+from typing import Any, NamedTuple
+from urllib.parse import urlsplit
+
+from robochoc.formats.diagnostics import on_one_line, shortened
+
+PORT = 9090
+"""The default port of rosbridge."""
+CONNECT_S = 5.0
+"""How long a server may take to answer."""
+DRAIN_S = 10.0
+"""How long it may read nothing of what is there for it."""
+CONFIRM_S = 3.0
+"""How long it may take to confirm that it has read all. One that forbids services never does."""
+CLOSE_S = 4.0
+"""How long it may take to agree to the end; less than roslibpy would wait."""
+MESSAGE_BYTES_MAX = 256 * 1024
+"""A longer message from the server ends the connection: reports are short."""
+_BUFFERED = 1_000_000
+"""Bytes on their way to the server before we wait for it."""
+_START = "start it there: `roslaunch rosbridge_server rosbridge_websocket.launch`, or `ros2 launch` the .xml in ROS 2"
+
+
+class Address(NamedTuple):
+    """The address of a rosbridge."""
+
+    host: str
+    port: int
+    secure: bool = False
+    path: str = ""
+
+    @classmethod
+    def of(cls, place: str) -> Address:
+        """Return the address that `place` names. Raises `ValueError`."""
+        wanted = f"expected rosbridge://HOST:PORT, as in rosbridge://localhost:{PORT}, or rosbridge:wss://HOST:PORT"
+        try:
+            parts = urlsplit(place if "//" in place else f"//{place}")
+            port = PORT if parts.port is None else parts.port
+        except ValueError as error:
+            raise ValueError(f"{shortened(place)!r}: {error}; {wanted}") from error
+        if not parts.hostname or parts.scheme not in {"", "ws", "wss"} or parts.query or parts.username or port == 0:
+            raise ValueError(f"{shortened(place)!r} is no place of a rosbridge; {wanted}")
+        return cls(parts.hostname, port, parts.scheme == "wss", parts.path)
+
+    @property
+    def url(self) -> str:
+        """The address as a URL of WebSocket."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{'wss' if self.secure else 'ws'}://{host}:{self.port}{self.path}"
+
+
+class Connection:
+    """A connection to a rosbridge. Raises `failed` when there is none, or when it is lost."""
+
+    def __init__(self, place: str, failed: type[Exception]) -> None:
+        self._failed = failed
+        try:
+            address = Address.of(place)
+        except ValueError as error:
+            raise failed(str(error)) from error
+        self.url = address.url
+        self.over = threading.Event()
+        self.complaint = ""
+        self._transport: Any = None
+        self.on_over: Callable[[], None] = lambda: None
+        ready = threading.Event()
+        _reach(address, failed)
+        self.roslibpy = _roslibpy(failed)
+        self.ros = _connect(self.roslibpy, self.url)
+        self.ros.on("close", self._on_close)
+        self.ros.factory.on_ready(partial(self._opened, ready))
+        until = time.monotonic() + CONNECT_S
+        while not ready.wait(0.02):
+            if self.over.is_set() or time.monotonic() > until:
+                self.abort()
+                secure = ", or this machine does not trust its certificate" if address.secure else ""
+                raise failed(f"what listens at {self.url} does not answer as a rosbridge does{secure}; {_START}")
+
+    def _opened(self, ready: threading.Event, protocol: Any) -> None:  # noqa: ANN401 - roslibpy is untyped
+        self._protocol, self._transport = protocol, protocol.transport
+        # roslibpy knows of these messages, but not what to do with them, and lets nobody else register for them.
+        protocol._message_handlers["status"] = self._on_status  # noqa: SLF001
+        ready.set()
+
+    def _on_status(self, message: Mapping[str, object]) -> None:
+        if message.get("level") == "error":
+            self.complaint = self.complaint or shortened(on_one_line(str(message.get("msg", ""))[:1000]))
+
+    def _on_close(self, *_: object) -> None:
+        self.over.set()
+        self.on_over()
+
+    def topic(self, name: str, kind: str) -> Any:  # noqa: ANN401 - roslibpy is untyped
+        """Return a topic to publish on, latched, or to listen to. Bridges of both ROS know types without a `/msg/`."""
+        return self.roslibpy.Topic(self.ros, name, kind.replace("/msg/", "/"), latch=True, reconnect_on_close=False)
+
+    def check(self) -> None:
+        """Raise `failed` if the connection is lost."""
+        if self.over.is_set():
+            raise self._failed(f"the rosbridge at {self.url} has closed the connection; see its log, and start again")
+
+    def drain(self) -> None:
+        """Wait until all that was sent has left. Raises `failed` if the server reads nothing, or is gone."""
+        left, since = self._buffered(), time.monotonic()
+        while left:
+            self.check()
+            if time.monotonic() - since > DRAIN_S:
+                raise self._failed(
+                    f"the rosbridge at {self.url} has read nothing for {DRAIN_S:g} s; see its log, and start again"
+                )
+            time.sleep(0.005)
+            now = self._buffered()
+            left, since = now, (time.monotonic() if now < left else since)
+        self.check()
+
+    def is_ahead(self) -> bool:
+        """Return whether more is on its way than `_BUFFERED` bytes."""
+        return self._buffered() > _BUFFERED
+
+    def _buffered(self) -> int:
+        """Return how many bytes the server has not taken yet."""
+        size: Future[int] = Future()
+
+        def look() -> None:
+            size.set_result(self._transport.get_write_buffer_size())
+
+        self.ros.factory.manager.loop.call_soon_threadsafe(look)
+        try:
+            return size.result(DRAIN_S)
+        except TimeoutError:
+            raise self._failed(f"the connection to the rosbridge at {self.url} is stuck; start again") from None
+
+    def confirm(self) -> bool:
+        """Wait until the server has handled all that was sent; return whether it says so.
+
+        A server that closes forgets what it has read and not handled yet. It handles requests in their order, and
+        answers any call of a service, even of one that does not exist.
+        """
+        answered = threading.Event()
+        service = self.roslibpy.Service(self.ros, "/rosapi/get_time", "rosapi/GetTime")
+        service.call(self.roslibpy.ServiceRequest(), lambda _: answered.set(), lambda _: answered.set())
+        until = time.monotonic() + CONFIRM_S
+        while not answered.wait(0.01) and time.monotonic() < until:
+            self.check()
+        self.drain()
+        return answered.is_set()
+
+    def close(self) -> bool:
+        """End the connection and wait for its end; return whether the server agreed, and so has read everything."""
+        if not self.over.is_set():
+            self._protocol.send_close()
+            if not self.over.wait(CLOSE_S):
+                self.abort()
+        return bool(self._protocol.wasClean)
+
+    def abort(self) -> None:
+        """End the connection at once."""
+        factory = self.ros.factory
+        factory._stop = True  # noqa: SLF001 - it would go on trying
+        if self._transport is not None:
+            factory.manager.loop.call_soon_threadsafe(self._transport.abort)
+            self.over.wait(CLOSE_S)
+
+
+def _reach(address: Address, failed: type[Exception]) -> None:
+    """Raise `failed` if nothing listens at `address`, with the reason. roslibpy would not give it."""
+    try:
+        socket.create_connection((address.host, address.port), CONNECT_S).close()
+    except OSError as error:
+        why = error.strerror or str(error) or type(error).__name__
+        raise failed(f"no rosbridge listens at {address.url} ({why}); {_START}") from error
+    except UnicodeError as error:
+        raise failed(f"{shortened(address.host)!r} is no name of a host") from error
+
+
+def _roslibpy(failed: type[Exception]) -> Any:  # noqa: ANN401 - it is untyped
+    """Return roslibpy, which is an extra. Its log is switched off: what goes wrong is raised here."""
+    try:
+        roslibpy = importlib.import_module("roslibpy")
+        importlib.import_module("roslibpy.comm").select_factory("asyncio")
+    except ModuleNotFoundError as missing:
+        raise failed(f"rosbridge needs {missing.name}; say: pip install 'robochoc[rosbridge]'") from missing
+    except (AttributeError, RuntimeError, TypeError, ValueError) as error:
+        raise failed(f"rosbridge needs roslibpy 2.1 or later, over asyncio: {error}") from error
+    for name in ("roslibpy", "autobahn"):
+        logging.getLogger(name).addHandler(logging.NullHandler())
+        logging.getLogger(name).propagate = False
+    logging.getLogger("asyncio").addFilter(_is_worth_logging)
+    return roslibpy
+
+
+def _is_worth_logging(record: logging.LogRecord) -> bool:
+    """Return whether a record is not one of those that asyncio writes for each message to a lost server."""
+    return record.msg != "socket.send() raised exception."
+
+
+def _connect(roslibpy: Any, url: str) -> Any:  # noqa: ANN401 - roslibpy is untyped
+    """Return a connection that is being made. It is not made again when it is lost."""
+
+    class Once(roslibpy.Ros):  # type: ignore[misc]  # untyped
+        """Takes short messages only, and none compressed, as these may become long. It does not reconnect."""
+
+        def connect(self) -> None:
+            if not self.is_connecting:
+                self.factory.maxRetries = 0
+                self.factory.setProtocolOptions(
+                    maxFramePayloadSize=MESSAGE_BYTES_MAX,
+                    maxMessagePayloadSize=MESSAGE_BYTES_MAX,
+                    perMessageCompressionOffers=[],
+                    perMessageCompressionAccept=lambda _: None,
+                )
+            super().connect()
+
+    # The loop's thread is a daemon, and stays for the next connection of this process. It is asyncio's: Twisted's would
+    # be no other, but has thread pools, handlers of its own, and a log.
+    connection = Once(url, transport="asyncio")
+    connection.factory.manager.loop.set_exception_handler(lambda *_: None)
+    return connection
