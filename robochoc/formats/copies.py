@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, 
 from itertools import product
 
 from robochoc.formats.diagnostics import Diagnostic, shortened
-from robochoc.formats.team_members import Members
+from robochoc.formats.team_members import TeamMembers
 from robochoc.model.expression import Apply, Constant, Expression, Name, UndefinedValueError, compile_expression
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Domain, Relation, Robot
 
@@ -20,7 +20,7 @@ MAX_COMPARED = 1_000_000
 """So many tuples are tried at most to find a difference."""
 
 
-def differing_copies(members: Members, misplaced: Collection[str]) -> Iterator[Diagnostic]:
+def differing_copies(members: TeamMembers, misplaced: Collection[str]) -> Iterator[Diagnostic]:
     """Copies that the child does not have, or has differently; children whose files are in `misplaced` are left out."""
     domains = {variable.name: variable.domain for robot in members.robots for variable in robot.variables}
     for file in members.files.values():

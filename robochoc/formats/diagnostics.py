@@ -38,7 +38,7 @@ class InvalidInputError(Exception):
 
 
 class MistakeError(Exception):
-    """A mistake in one element, on its way to the `Report` that knows the file and the line."""
+    """A mistake in one element, on its way to the `DiagnosticCollector` that knows the file and the line."""
 
     def __init__(self, message: str, hint: str, line: int = 0) -> None:
         super().__init__(message)
@@ -47,7 +47,7 @@ class MistakeError(Exception):
         self.line = line
 
 
-class Report:
+class DiagnosticCollector:
     """The mistakes of one file, collected while it is read."""
 
     def __init__(self, file: str) -> None:

@@ -11,13 +11,20 @@ from lxml import etree
 
 from robochoc.formats.constraints import Context, read_private, read_shared
 from robochoc.formats.definitions import check_semantics, refuse_predefined
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, Report, shortened, suggestion
+from robochoc.formats.diagnostics import (
+    Diagnostic,
+    DiagnosticCollector,
+    InvalidInputError,
+    MistakeError,
+    shortened,
+    suggestion,
+)
 from robochoc.formats.extension import check_count, read_domain, read_relation
 from robochoc.formats.intension import read_predicate, read_topic
-from robochoc.formats.locations import FilePlaces
+from robochoc.formats.locations import FileLocations
 from robochoc.formats.names import check_robot_name, check_unique
-from robochoc.formats.rules import NEIGHBOURS_ONCE, check_told, refuse_nothing_to_decide, repeated
-from robochoc.formats.team_members import Member
+from robochoc.formats.rules import NEIGHBOURS_ONCE, check_shown_variables, refuse_nothing_to_decide, repeated_neighbours
+from robochoc.formats.team_members import TeamMember
 from robochoc.formats.xml import attribute, line, parsed_xml, read_xml
 from robochoc.model.problem import (
     Child,
@@ -36,7 +43,7 @@ from robochoc.model.problem import (
 
 
 @dataclass(frozen=True, kw_only=True)
-class RobotFile(Member):
+class RobotFile(TeamMember):
     """A robot, and what its file says beyond it: that is the team's to check, and then no longer needed."""
 
     context: Context
@@ -81,7 +88,7 @@ class _Reader:
     def __init__(self, path: Path, instance: etree._Element) -> None:
         self._name = path.stem
         self._instance = instance
-        self._report = Report(str(path))
+        self._report = DiagnosticCollector(str(path))
         self._own: dict[str, int] = {}
 
     def whole(self) -> RobotFile:
@@ -103,7 +110,7 @@ class _Reader:
         unsaid = frozenset(
             attribute(agent, "name") for agent in self._agents("agents_children") if agent.get("variable") is None
         )
-        places = FilePlaces(file, line(presentation), self._own)
+        places = FileLocations(file, line(presentation), self._own)
         return RobotFile(robot, places, copies, unsaid, context=context)
 
     def _elements(self, section: str, tag: str, count: str) -> Iterator[etree._Element]:
@@ -210,9 +217,9 @@ class _Reader:
             if agent.get("variable") is not None:
                 told = tuple((agent.get("variable") or "").split())
                 with self._report.at(line(agent)):
-                    check_told(told, self._own)
+                    check_shown_variables(told, self._own)
             yield Child(name, told, parts, line(agent), kept)
 
     def _check_neighbours(self, parents: tuple[Parent, ...], children: tuple[Child, ...]) -> None:
-        for neighbour, message in repeated(self._name, parents, children):
+        for neighbour, message in repeated_neighbours(self._name, parents, children):
             self._report.add(neighbour.line, message, NEIGHBOURS_ONCE)

@@ -10,9 +10,9 @@ from pathlib import Path
 from lxml import etree
 
 from robochoc.formats.constraints import Context, read_shared
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, Report, shortened
+from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, MistakeError, shortened
 from robochoc.formats.robot import RobotFile, read_robot_file
-from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
+from robochoc.formats.rules import NOBODY_LEFT, check_added_constraint, check_constraint_of_added_robot
 from robochoc.formats.xml import attribute, line, read_xml
 from robochoc.model.change import ChangeError, apply_changes
 from robochoc.model.problem import (
@@ -60,7 +60,7 @@ class _Reader:
         self._path = folder / SCENARIO
         self._team = team
         self._contexts: dict[str, Context] = {name: file.context for name, file in files.items()}
-        self._report = Report(str(self._path))
+        self._report = DiagnosticCollector(str(self._path))
         self._elsewhere: list[Diagnostic] = []
         """Mistakes in the files of added robots."""
         self._unread = False
@@ -146,7 +146,7 @@ class _Reader:
                 self._missed.add(attribute(child, "name"))
                 constraint = read_shared(child, context)
                 if constraint:
-                    check_brought(constraint)
+                    check_added_constraint(constraint)
                     self._missed.discard(constraint.name)
                     yield line(child), AddConstraint(agent, parent, constraint)
 
@@ -191,10 +191,10 @@ def _change(element: etree._Element) -> Change:
 
 def _refuse_parts(robot: Robot) -> None:
     """Raise `InvalidInputError` where an added robot brings its part of partially known constraints."""
-    report = Report(robot.file)
+    report = DiagnosticCollector(robot.file)
     for constraint in robot.shared:
         with report.at(constraint.line):
-            check_newcomers_constraint(constraint)
+            check_constraint_of_added_robot(constraint)
     report.finish()
 
 

@@ -10,7 +10,7 @@ from typing import Protocol, cast
 
 from lxml import etree
 
-from robochoc.formats.diagnostics import Report, shortened
+from robochoc.formats.diagnostics import DiagnosticCollector, shortened
 
 _SCHEMAS = {"instance": "robot.xsd", "scenario": "scenario.xsd"}
 _OPTIONAL = {"topics", "relations", "predicates", "constraints"}
@@ -85,7 +85,7 @@ def check_schema(tree: etree._Element, file: str, schema: etree.XMLSchema) -> No
         return
     import difflib  # noqa: PLC0415 - start-up: only mistakes need it
 
-    report = Report(file)
+    report = DiagnosticCollector(file)
     unknown: dict[str | None, list[str]] = {}
     for entry in entries(schema.error_log):
         parts = _parts(entry)

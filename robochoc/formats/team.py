@@ -10,8 +10,8 @@ from pathlib import Path
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
 from robochoc.formats.robot import RobotFile, read_robot_file
 from robochoc.formats.scenario import SCENARIO, has_scenario, read_scenario
-from robochoc.formats.team_members import Members
-from robochoc.formats.validation import between, note_valid
+from robochoc.formats.team_members import TeamMembers
+from robochoc.formats.validation import check_between_robots, note_valid
 from robochoc.model.priorities import natural_key, priority_order
 from robochoc.model.problem import Robot, Team
 
@@ -46,8 +46,8 @@ def read_team(folder: Path | str) -> Team:
             files[path.stem] = read_robot_file(path)
         except InvalidInputError as invalid:
             found.extend(invalid.diagnostics)
-    members = Members(files, frozenset(path.stem for path in paths) - files.keys())
-    found.extend(between(members))
+    members = TeamMembers(files, frozenset(path.stem for path in paths) - files.keys())
+    found.extend(check_between_robots(members))
     team = None if found else _whole(folder, members)
     if has_scenario(folder):
         try:
@@ -73,12 +73,12 @@ def robot_names(folder: Path | str) -> tuple[str, ...]:
     return names
 
 
-def _whole(folder: Path, members: Members) -> Team:
+def _whole(folder: Path, members: TeamMembers) -> Team:
     order = priority_order(members.agreed)
     return Team(encodable(folder.resolve().name), tuple(_informed(members, name) for name in order))
 
 
-def _informed(members: Members, name: str) -> Robot:
+def _informed(members: TeamMembers, name: str) -> Robot:
     """The robot `name`; where its file does not say what a child must be told, the constraints do."""
     file = members.files[name]
     children = []

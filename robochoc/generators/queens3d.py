@@ -24,7 +24,7 @@ from robochoc.formats import PREDEFINED
 from robochoc.model.expression import Constant, Name, Type, parse
 from robochoc.model.problem import Child, Constraint, Domain, Parent, Predicate, Robot, Team, Topic, Variable
 
-LARGEST_N = 64
+MAX_N = 64
 """4,096 robots; beyond that a folder of files is no longer a sensible form."""
 
 Cell = tuple[int, int]
@@ -58,10 +58,10 @@ def queens3d(
 ) -> Team:
     """The team for an n x n x n cube, in lexicographic priority order; a robot flies a cell's drone, or a row's.
 
-    Raises `ValueError` unless 1 <= n <= `LARGEST_N` and the model and the robots are known.
+    Raises `ValueError` unless 1 <= n <= `MAX_N` and the model and the robots are known.
     """
-    if not 1 <= n <= LARGEST_N:
-        raise ValueError(f"n is {n}; it must be from 1 to {LARGEST_N}")
+    if not 1 <= n <= MAX_N:
+        raise ValueError(f"n is {n}; it must be from 1 to {MAX_N}")
     model = QueensModel(model)
     levels = Domain("D1", (range(1, n + 1),))
     numbers = range(1, n + 1)

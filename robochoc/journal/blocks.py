@@ -15,14 +15,14 @@ MAGIC = b"\x89RJL\r\n\x1a\n"
 """The first bytes of a journal; transfers that take it for text destroy them, as PNG's (RFC 2083)."""
 FORMAT = 1
 """The version of the frame, and of the columns within."""
-LARGEST_BLOCK = 64 * 2**20
+MAX_BLOCK_BYTES = 64 * 2**20
 """No block holds more bytes, uncompressed."""
 LEVEL = 4
 """zlib's. Level 1 packs ABT's messages 7 to 13 % worse, level 6 3 to 7 % better, at about half and twice the cost."""
 _PREAMBLE = struct.Struct("<8sHH")
 _FRAME = struct.Struct("<II16s")
 _DIGEST = 16
-_LARGEST_PACKED = LARGEST_BLOCK + LARGEST_BLOCK // 1000 + 64
+_LARGEST_PACKED = MAX_BLOCK_BYTES + MAX_BLOCK_BYTES // 1000 + 64
 """More than zlib makes of the largest block."""
 
 PREAMBLE = _PREAMBLE.pack(MAGIC, FORMAT, 0)
@@ -46,8 +46,8 @@ BEGINNING = blake2b(PREAMBLE, digest_size=_DIGEST).digest()
 """What stands for the checksum before the first block's."""
 
 
-def framed(content: bytes, before: bytes) -> tuple[bytes, bytes]:
-    """The block that holds `content`, whose length is at most `LARGEST_BLOCK`, and its checksum.
+def frame_block(content: bytes, before: bytes) -> tuple[bytes, bytes]:
+    """The block that holds `content`, whose length is at most `MAX_BLOCK_BYTES`, and its checksum.
 
     `before` is the checksum of the block before it, `BEGINNING` for the first.
     """
@@ -56,7 +56,7 @@ def framed(content: bytes, before: bytes) -> tuple[bytes, bytes]:
     return _FRAME.pack(len(packed), len(content), digest) + packed, digest
 
 
-class Unframer:
+class BlockReader:
     """Takes a journal apart, as its bytes come."""
 
     def __init__(self) -> None:
@@ -90,7 +90,7 @@ class Unframer:
         if len(buffer) < _FRAME.size:
             return None
         length, size, digest = _FRAME.unpack_from(buffer)
-        if size > LARGEST_BLOCK or length > _LARGEST_PACKED:
+        if size > MAX_BLOCK_BYTES or length > _LARGEST_PACKED:
             raise JournalDamagedError(f"{self.place}: a block claims to have {max(size, length):,} bytes")
         end = _FRAME.size + length
         if len(buffer) < end:

@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from robochoc.journal.entries import Line
+from robochoc.journal.entries import JournalEntry
 from robochoc.journal.events import Decided, Received, Sent, Settled
 
 SENT, RECEIVED, SETTLED, DECIDED, OTHER = range(5)
@@ -53,7 +53,7 @@ class _Block(msgspec.Struct, array_like=True, forbid_unknown_fields=True, frozen
     sizes: list[int]
     checks: list[int]
     assignments: list[dict[str, int]]
-    others: list[Line]
+    others: list[JournalEntry]
 
 
 class _Numbers(dict[Any, int]):
@@ -68,7 +68,7 @@ _encode = msgspec.msgpack.Encoder().encode
 _json = msgspec.json.Encoder().encode
 
 
-def columns_of(entries: Iterable[Line], *, exact: bool) -> bytes:
+def columns_of(entries: Iterable[JournalEntry], *, exact: bool) -> bytes:
     """What a block of `entries` holds. Unless `exact`, times are rounded to the nanosecond: clocks know no more.
 
     Raises `TypeError`, `ValueError`, `OverflowError` or `RecursionError` for what `entries_of` would not read again:
@@ -96,9 +96,9 @@ class _Columns:
         self.checks: list[int] = []
         self.checked: list[int] = []
         self.assignments: list[dict[str, int]] = []
-        self.others: list[Line] = []
+        self.others: list[JournalEntry] = []
 
-    def take(self, entries: Iterable[Line]) -> None:
+    def take(self, entries: Iterable[JournalEntry]) -> None:
         """Add `entries`. This loop is what a journal costs the run, so it asks for exact types, and calls little."""
         kinds, times, clocks, actors = self.kinds.append, self.times.append, self.clocks.append, self.actors.append
         partners, says, words, shapes = self.partners.append, self.says.append, self.words, self.shapes
@@ -188,7 +188,7 @@ def _steps(numbers: Iterable[int]) -> list[int]:
 _decode = msgspec.msgpack.Decoder(_Block).decode
 
 
-def entries_of(content: bytes) -> list[Line]:
+def entries_of(content: bytes) -> list[JournalEntry]:
     """The entries of a block that holds `content`. Raises `BlockError` where that is anything but what is written."""
     try:
         block = _decode(content)
@@ -220,7 +220,7 @@ class _Entries:
         _fit(self._times, timed)
         _finite((*self._times, *(entry.t for entry in block.others)))
 
-    def __iter__(self) -> Iterator[Line]:
+    def __iter__(self) -> Iterator[JournalEntry]:
         block, shapes, words = self._block, self._shapes, self._block.words
         times, clocks = iter(self._times), iter(self._clocks)
         actors, partners, says = iter(block.actors), iter(block.partners), iter(block.says)

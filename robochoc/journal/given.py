@@ -20,7 +20,7 @@ from robochoc.model.problem import INFINITE, Constraint, Domain, Relation, Robot
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.explanation import Invalidated
 
-NOTHING_VOID = Invalidated(frozenset(), frozenset())
+NOTHING_INVALIDATED = Invalidated(frozenset(), frozenset())
 _STAND_IN = (range(1),)
 """What is written for an empty domain, as a file has none."""
 
@@ -40,7 +40,7 @@ class TeamWriter:
         self,
         team: Team,
         brief: RunParameters = DEFAULT_PARAMETERS,
-        void: Invalidated = NOTHING_VOID,
+        void: Invalidated = NOTHING_INVALIDATED,
         *,
         fresh: Collection[str] = (),
         quiet: bool = True,
@@ -105,12 +105,12 @@ class TeamReader:
         return team
 
 
-def brief_of(given: Given) -> RunParameters:
+def run_parameters_of(given: Given) -> RunParameters:
     """What all robots were told beside the problem."""
     return RunParameters(given.seed, given.settings, given.aside)
 
 
-def void_of(given: Given) -> Invalidated:
+def invalidated_of(given: Given) -> Invalidated:
     """What of the epoch before does not stand."""
     return Invalidated(frozenset(given.void_keys), frozenset(given.void_agents))
 

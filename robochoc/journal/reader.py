@@ -15,9 +15,9 @@ from typing import BinaryIO, Protocol, cast
 
 import msgspec
 
-from robochoc.journal.blocks import MAGIC, JournalDamagedError, JournalTruncatedError, Unframer
+from robochoc.journal.blocks import MAGIC, BlockReader, JournalDamagedError, JournalTruncatedError
 from robochoc.journal.columns import BlockError, entries_of
-from robochoc.journal.entries import READ, Ended, Header, JournalError, Line
+from robochoc.journal.entries import READ, Ended, Header, JournalEntry, JournalError
 from robochoc.journal.events import AnyEvent, Began
 from robochoc.model.outcome import Outcome
 
@@ -74,10 +74,10 @@ def read_journal(content: bytes) -> Journal:
             raise JournalError("it has no header")
         outcome = last.outcome if isinstance(last, Ended) else None
         events = cast("list[AnyEvent]", lines[1:-1] if outcome else lines[1:])  # so has it here
-        return Journal(first, tuple(in_order(events)), outcome, damage, truncated)
+        return Journal(first, tuple(sorted_by_time(events)), outcome, damage, truncated)
 
 
-def in_order(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
+def sorted_by_time(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
     """Events of a journal, as they were written; each run's come in the order of their times, `Began` first."""
     events = list(events)
     begun = [place for place, event in enumerate(events) if type(event) is Began]
@@ -115,13 +115,13 @@ class Follower:
         self._form: _Form | None = None
         self._began = self._over = False
 
-    def read(self, most: int | None = None) -> list[Line]:
+    def read(self, most: int | None = None) -> list[JournalEntry]:
         """The entries that have become whole since the last call, in the file's order; the first is the `Header`.
 
         Stops after the block with which there are more than `most`. Raises `JournalError` when it turns out that the
         file is no journal.
         """
-        lines: list[Line] = []
+        lines: list[JournalEntry] = []
         while self.damage is None and (most is None or len(lines) <= most):
             found = self._next()
             if found is None:
@@ -129,11 +129,11 @@ class Follower:
             lines += found
         return lines
 
-    def finish(self) -> tuple[list[Line], str | None]:
+    def finish(self) -> tuple[list[JournalEntry], str | None]:
         """No more will be written: what is left, and the damage, if any. Raises `JournalError`."""
         if self._form is None:
             raise JournalError("it is empty")
-        lines: list[Line] = []
+        lines: list[JournalEntry] = []
         if self.damage is None:
             try:
                 lines += self._fitting(self._form.rest())
@@ -148,7 +148,7 @@ class Follower:
         """Whether the journal says how the run ended: nothing will follow."""
         return self._over
 
-    def _next(self) -> Sequence[Line] | None:
+    def _next(self) -> Sequence[JournalEntry] | None:
         """The next entries; None: there are none yet."""
         while True:
             try:
@@ -174,7 +174,7 @@ class Follower:
     def _place(self) -> str:
         return self._form.place if self._form else ""
 
-    def _fitting(self, lines: Sequence[Line]) -> Sequence[Line]:
+    def _fitting(self, lines: Sequence[JournalEntry]) -> Sequence[JournalEntry]:
         """`lines`, if they may follow those before: a header, events, an end.
 
         Raises `JournalError`, `JournalDamagedError`.
@@ -221,10 +221,10 @@ class _Form(Protocol):
     def feed(self, piece: bytes) -> None:
         """Here are the next bytes."""
 
-    def next(self) -> Sequence[Line] | None:
+    def next(self) -> Sequence[JournalEntry] | None:
         """The next entries; None: they are not whole yet. Raises `JournalError`, `JournalDamagedError`."""
 
-    def rest(self) -> Sequence[Line]:
+    def rest(self) -> Sequence[JournalEntry]:
         """The entries that are whole if nothing follows. Raises `JournalError`, `JournalDamagedError`."""
 
     @property
@@ -236,11 +236,11 @@ class _Blocks:
     """The binary form."""
 
     def __init__(self) -> None:
-        self._unframer = Unframer()
+        self._unframer = BlockReader()
         self.feed = self._unframer.feed
         self.place = ""
 
-    def next(self) -> Sequence[Line] | None:
+    def next(self) -> Sequence[JournalEntry] | None:
         self.place = self._unframer.place
         content = self._unframer.next()
         if content is None:
@@ -250,7 +250,7 @@ class _Blocks:
         except BlockError as bad:
             raise JournalDamagedError(f"{self.place}: a block holds no entries: {bad}") from bad
 
-    def rest(self) -> Sequence[Line]:
+    def rest(self) -> Sequence[JournalEntry]:
         if self._unframer.rest:
             raise JournalTruncatedError(self._unframer.rest)
         return ()
@@ -262,7 +262,7 @@ class _Text:
     def __init__(self) -> None:
         self._buffer = bytearray()
         self._searched = self._lines = 0
-        self._decode = msgspec.json.Decoder(Line).decode
+        self._decode = msgspec.json.Decoder(JournalEntry).decode
 
     @property
     def place(self) -> str:
@@ -271,7 +271,7 @@ class _Text:
     def feed(self, piece: bytes) -> None:
         self._buffer += piece
 
-    def next(self) -> Sequence[Line] | None:
+    def next(self) -> Sequence[JournalEntry] | None:
         end = self._buffer.find(b"\n", self._searched)
         if end < 0:
             self._searched = len(self._buffer)
@@ -283,13 +283,13 @@ class _Text:
         self._searched = 0
         return self._decoded(line)
 
-    def rest(self) -> Sequence[Line]:
+    def rest(self) -> Sequence[JournalEntry]:
         try:
             return self._decoded(self._buffer) if self._buffer else ()
         except JournalDamagedError as cut:
             raise JournalTruncatedError(str(cut)) from cut
 
-    def _decoded(self, line: bytearray) -> Sequence[Line]:
+    def _decoded(self, line: bytearray) -> Sequence[JournalEntry]:
         self._lines += 1
         try:
             entry = self._decode(line)

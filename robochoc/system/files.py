@@ -30,7 +30,7 @@ def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
     os.close(_replaced(resolved(path), content, mode))
 
 
-class Growing:
+class AppendableFile:
     """A file that takes the place of `path` once its `beginning` is written, and then grows.
 
     Whoever looks sees the old file, or the beginning and whatever was appended since. Otherwise as
@@ -83,7 +83,7 @@ class Growing:
         os.close(self._descriptor)
 
 
-class Unfinished:
+class PendingFile:
     """A file that takes the place of `path` when it is complete: write to `stream`, then `keep` or `discard` it.
 
     Whoever looks meanwhile sees the old file. Where Linux allows it the new one has no name until then, so that not
