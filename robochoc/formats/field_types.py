@@ -36,7 +36,7 @@ class FieldTypeError(TypeError):
 
     @property
     def told(self) -> str:
-        """What is wrong, and where in the object."""
+        """Return what is wrong, and where in the object."""
         where = self.path.lstrip(".")
         return f"{where}: {self}" if where else str(self)
 
@@ -65,7 +65,7 @@ def _check(hint: Any) -> _Check:  # noqa: ANN401 - an annotation
 
 
 def _exactly(expected: str, *kinds: type) -> _Check:
-    """Numbers: True is an `int`, and is written as no number is."""
+    """Return a check for numbers. It refuses True: that is an `int`, but is not written as a number."""
 
     def check(value: object) -> None:
         if type(value) not in kinds:

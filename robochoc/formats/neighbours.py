@@ -11,7 +11,7 @@ from robochoc.model.priorities import CycleError, priority_order
 
 
 def missing_robots(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Neighbours that are not there."""
+    """Yield neighbours that are not there."""
     known = dict.fromkeys([*members.files, *sorted(members.broken)])
     for entry in members.entries.values():
         if entry.other not in known:
@@ -22,7 +22,7 @@ def missing_robots(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def disagreements(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Pairs of robots of which each should call the other the opposite of what it is called itself."""
+    """Yield pairs of robots of which each should call the other the opposite of what it is called itself."""
     for entry in members.entries.values():
         name, other = entry.robot.name, entry.other
         answer = members.entries.get((other, name))
@@ -36,7 +36,7 @@ def disagreements(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def cycles(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Cycles of parents, each without a link in common with those before it."""
+    """Yield cycles of parents, each without a link in common with those before it."""
     parents = {name: set(agreed) for name, agreed in members.agreed.items()}
     while True:
         try:
@@ -54,7 +54,7 @@ def cycles(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def mixed_kinds(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Robots that differ from most others in being a DisCSP or a DisWCSP."""
+    """Yield robots that differ from most others in being a DisCSP or a DisWCSP."""
     usual = Counter(robot.kind for robot in members.robots).most_common(1)
     for robot in members.robots:
         if robot.kind is not usual[0][0]:
@@ -65,7 +65,7 @@ def mixed_kinds(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def shared_variables(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Variables that more than one robot calls its own."""
+    """Yield variables that more than one robot calls its own."""
     for variable, (first, *others) in members.owners.items():
         for other in others:
             message = f"the variable '{shortened(variable)}' is also one of '{first}'"
@@ -74,7 +74,7 @@ def shared_variables(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def out_of_order(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Robots that stand before one of their parents, where the team says an order of its own."""
+    """Yield robots that stand before one of their parents, where the team says an order of its own."""
     rank = {name: place for place, name in enumerate(members.order)}
     if not members.ranks:
         return  # the links themselves have a mistake

@@ -172,7 +172,7 @@ class Objects:
         return right
 
     def _defined(self, thing: Definition, places: ObjectLocations) -> bool:
-        """Whether a domain or a definition is right; the first who has it is told what is wrong."""
+        """Return whether a domain or a definition is right; the first who has it is told what is wrong."""
         known = self._known.get(id(thing))
         if known is None:
             known = self._known[id(thing)] = (thing, self._is_right(thing, places))
@@ -216,7 +216,7 @@ def _check_defined(thing: Definition) -> None:
 
 
 def repeated_robots(robots: Iterable[Robot]) -> Iterator[Diagnostic]:
-    """Robots of one name."""
+    """Yield robots of one name."""
     seen: set[str] = set()
     for robot in robots:
         if robot.name in seen:

@@ -12,7 +12,7 @@ _MISSING_SHOWN = 10
 
 
 def read_order(path: Path, team: Team) -> tuple[str, ...]:
-    """The order in the file `path`, of all robots of `team`. Raises `InvalidInputError` with every mistake."""
+    """Return the order in the file `path`, of all robots of `team`. Raises `InvalidInputError` with every mistake."""
     report = DiagnosticCollector(str(path))
     lines = _text(path).splitlines()
     known = frozenset(team.order)

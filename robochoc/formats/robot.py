@@ -51,7 +51,7 @@ class RobotFile(TeamMember):
 
 
 def read_robot(path: Path | str) -> Robot:
-    """The robot in the XML file `path`, named after the file's stem.
+    """Return the robot in the XML file `path`, named after the file's stem.
 
     Its neighbours are not looked at: `read_team` does that. Raises `InvalidInputError` with all mistakes of the file.
     """
@@ -59,13 +59,13 @@ def read_robot(path: Path | str) -> Robot:
 
 
 def read_robot_file(path: Path) -> RobotFile:
-    """The robot in the XML file `path`, with what the team has to check. Raises `InvalidInputError`."""
+    """Return the robot in the XML file `path`, with what the team has to check. Raises `InvalidInputError`."""
     _check_name(path.stem, path)
     return _Reader(path, read_xml(path, "instance")).whole()
 
 
 def robot_in(content: bytes, name: str) -> Robot:
-    """The robot called `name`, whose XML file has this `content`. Nobody need have written such a file.
+    """Return the robot called `name`, whose XML file has this `content`. Nobody need have written such a file.
 
     The same limits hold as for a file. Raises `InvalidInputError`, which tells of the file `NAME.xml`.
     """
@@ -114,7 +114,7 @@ class _Reader:
         return RobotFile(robot, places, copies, unsaid, context=context)
 
     def _elements(self, section: str, tag: str, count: str) -> Iterator[etree._Element]:
-        """The elements of a section of the instance, whose count is checked."""
+        """Yield the elements of a section of the instance, whose count is checked."""
         for container in self._instance.iterchildren(section):
             with self._report.at(line(container)):
                 check_count(container, count, len(container))
@@ -204,7 +204,7 @@ class _Reader:
             yield Parent(attribute(agent, "name"), self._constraints(agent, context, read_shared), line(agent))
 
     def _children(self, context: Context, copies: dict[str, tuple[Constraint, ...]]) -> Iterator[Child]:
-        """The children, with this robot's part of PKCs only; what it repeats of TKCs goes into `copies`."""
+        """Yield the children, with this robot's part of PKCs only; what it repeats of TKCs goes into `copies`."""
         for agent in self._agents("agents_children"):
             name = attribute(agent, "name")
             held = self._constraints(agent, context, read_shared)

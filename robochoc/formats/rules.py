@@ -134,7 +134,7 @@ def check_shown_variables(told: Sequence[str], own: Collection[str]) -> None:
 def repeated_neighbours(
     name: str, parents: Sequence[Parent], children: Sequence[Child]
 ) -> Iterator[tuple[Parent | Child, str]]:
-    """Neighbours of the robot `name` that are listed before, or are itself; and what is wrong with each."""
+    """Yield neighbours of the robot `name` that are listed before, or are itself; and what is wrong with each."""
     seen = {name: "the robot itself"}
     for role, neighbours in (("parent", parents), ("child", children)):
         for neighbour in neighbours:

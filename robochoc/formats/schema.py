@@ -64,13 +64,13 @@ class LogEntry(Protocol):
 
 
 def entries(error_log: object) -> list[LogEntry]:
-    """The messages in an lxml `error_log`, which the stubs leave opaque."""
+    """Return the messages in an lxml `error_log`, which the stubs leave opaque."""
     return list(cast("Iterable[LogEntry]", error_log))
 
 
 @cache
 def schema_for(root: str) -> etree.XMLSchema:
-    """The schema of files with that root element, compiled when the first of them is read.
+    """Return the schema of files with that root element, compiled when the first of them is read.
 
     Schemas lie in the wheel's package, or at the checkout's top.
     """
@@ -99,7 +99,7 @@ def check_schema(tree: etree._Element, file: str, schema: etree.XMLSchema) -> No
 
 
 def _parts(entry: LogEntry) -> dict[str, str]:
-    """The parts of one message, by the names that the phrases use."""
+    """Return the parts of one message, by the names that the phrases use."""
     parts = dict.fromkeys(("element", "attribute", "missing", "value", "rule", "expected"), "")
     for part in _PARTS:
         found = part.search(entry.message)

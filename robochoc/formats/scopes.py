@@ -10,7 +10,7 @@ from robochoc.model.problem import Constraint, ConstraintModel, Parent, Robot
 
 
 def misplaced_constraints(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Constraints with parents whose scopes do not fit the place where they stand."""
+    """Yield constraints with parents whose scopes do not fit the place where they stand."""
     for robot in members.robots:
         if members.has_all_parents(robot.name):
             near = {robot.name, *members.agreed[robot.name]}
@@ -22,7 +22,7 @@ def misplaced_constraints(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def _foreign(members: TeamMembers, near: set[str], parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
-    """A variable in the scope that belongs to no robot in `near` (itself and its parents), if there is one."""
+    """Return a variable in the scope that belongs to no robot in `near` (itself and its parents), if there is one."""
     for name in constraint.variables:
         owners = members.owners.get(name, [])
         if not owners and not members.broken:
@@ -37,7 +37,7 @@ def _foreign(members: TeamMembers, near: set[str], parent: Parent, constraint: C
 
 
 def _place(members: TeamMembers, robot: Robot, parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
-    """Why the constraint should not stand under `parent`, if so."""
+    """Return why the constraint should not stand under `parent`, if so."""
     found = [members.owners.get(name, []) for name in constraint.variables]
     if any(len(owners) != 1 for owners in found):
         return None  # the mistake is another one, and told elsewhere
@@ -56,7 +56,7 @@ def _place(members: TeamMembers, robot: Robot, parent: Parent, constraint: Const
 
 
 def misplaced_parts(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Parents' parts of PKC constraints over variables of others than the two, or that the child does not show."""
+    """Yield parents' parts of PKCs with variables of third robots, or with variables that the child does not show."""
     for robot in members.robots:
         for child in robot.children:
             if members.is_parent(robot.name, child.name):
@@ -76,7 +76,7 @@ def _foreign_to_both(members: TeamMembers, robot: Robot, child: str, part: Const
 
 
 def _unshown(members: TeamMembers, child: str, part: Constraint) -> tuple[str, str] | None:
-    """A variable of `child` in its parent's part that the child, by its own file, shows to nobody."""
+    """Return a variable of `child` in its parent's part that the child, by its own file, shows to nobody."""
     if members.broken:
         return None
     robot = members.files[child].robot
@@ -90,7 +90,7 @@ def _unshown(members: TeamMembers, child: str, part: Constraint) -> tuple[str, s
 
 
 def missing_shown_variables(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Variables that a child's constraints need, and that its parent's file does not name for it."""
+    """Yield variables that a child's constraints need, and that its parent's file does not name for it."""
     for robot in members.robots:
         for child in robot.children:
             if members.is_parent(robot.name, child.name) and child.name not in members.files[robot.name].unsaid:

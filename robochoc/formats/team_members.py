@@ -20,7 +20,7 @@ class NeighbourRole(StrEnum):
 
     @property
     def opposite(self) -> NeighbourRole:
-        """What the other says of the robot, if they agree."""
+        """Return what the other says of the robot, if they agree."""
         return NeighbourRole.CHILD if self is NeighbourRole.PARENT else NeighbourRole.PARENT
 
 
@@ -66,7 +66,7 @@ class TeamMembers:
 
     @cached_property
     def entries(self) -> dict[tuple[str, str], NeighbourEntry]:
-        """Who lists whom, by the names of the two."""
+        """Return who lists whom, by the names of the two."""
         return {
             (name, neighbour.name): NeighbourEntry(
                 member.robot, neighbour.name, role, member.places.neighbour(neighbour)
@@ -76,7 +76,7 @@ class TeamMembers:
         }
 
     def is_parent(self, parent: str, child: str) -> bool:
-        """Whether both could be read, and both say so."""
+        """Return whether both could be read, and both say so."""
         below, above = self.entries.get((parent, child)), self.entries.get((child, parent))
         return (
             below is not None
@@ -94,7 +94,7 @@ class TeamMembers:
         }
 
     def has_all_parents(self, name: str) -> bool:
-        """Whether every parent of `name` could be read and agrees."""
+        """Return whether every parent of `name` could be read and agrees."""
         return len(self.agreed[name]) == len(self.files[name].robot.parents)
 
     @cached_property
@@ -137,12 +137,12 @@ class TeamMembers:
         return used
 
     def needed(self, parent: str, child: str) -> dict[str, Constraint]:
-        """The variables of `parent` in constraints that `child` holds, with the constraint that needs each."""
+        """Return the variables of `parent` in constraints that `child` holds, with the constraint that needs each."""
         used = self._used[child]
         return {variable: used[variable] for variable in self.own[parent] if variable in used}
 
     def place(self, robot: str, variable: str = "") -> Location:
-        """Where a robot stands, or a variable of its, for a message about two robots."""
+        """Return where a robot stands, or a variable of its, for a message about two robots."""
         places = self.files[robot].places
         return places.variable(variable) if variable else places.robot()
 

@@ -31,9 +31,10 @@ from robochoc.formats.objects import Objects, repeated_robots
 from robochoc.formats.rules import NOBODY_LEFT, check_added_constraint, check_constraint_of_added_robot
 from robochoc.formats.scopes import misplaced_constraints, misplaced_parts, missing_shown_variables
 from robochoc.formats.team_members import TeamMember, TeamMembers
-from robochoc.model.change import ChangeError, apply_changes
+from robochoc.model.change import apply_changes
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, RemoveValue, Robot, ScenarioEvent, Team
+from robochoc.model.team_edits import ChangeError
 
 MAX_BETWEEN = 1000
 """So many mistakes between the robots of one team are told."""
@@ -126,7 +127,7 @@ def note_valid(team: Team) -> None:
 
 
 def is_known_valid(team: Team) -> bool:
-    """Whether this very object has been found valid before."""
+    """Return whether this very object has been found valid before."""
     known = _valid.get(id(team))
     return known is not None and known() is team
 
@@ -162,7 +163,7 @@ def _between(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def _of_the_whole(team: Team) -> list[Diagnostic]:
-    """What leaves nothing else to be asked: no robots, or objects that are none."""
+    """Return what leaves nothing else to be asked: no robots, or objects that are none."""
     given: object = team
     place = Location("the team")
     found = list(_of_the_shape(replace(given, robots=()) if isinstance(given, Team) else given, Team, place))
@@ -214,7 +215,7 @@ def _mistakes(team: Team) -> list[Diagnostic]:
 
 
 def _of_the_scenario(team: Team) -> Iterator[Diagnostic]:
-    """The first event that cannot be, with all that is wrong with it: what comes after would follow from it."""
+    """Yield the first event that cannot be, with all that is wrong with it: what comes after would follow from it."""
     now = replace(team, scenario=()) if team.scenario else team
     for number, event in enumerate(team.scenario, start=1):
         place = Location(f"event {number} of the scenario")
@@ -244,13 +245,13 @@ def _of_the_time(event: ScenarioEvent, place: Location) -> Iterator[Diagnostic]:
 
 
 def _robots(team: Team, event: ScenarioEvent = _NOTHING) -> dict[str, Robot]:
-    """Who is there, and who comes with `event`."""
+    """Return the robots of `team`, and those that `event` adds, by name."""
     coming = [change.robot for change in event.changes if isinstance(change, AddAgent)]
     return {robot.name: robot for robot in (*team.robots, *coming)}
 
 
 def _of_the_change(robots: Mapping[str, Robot], change: Change, place: Location) -> Iterator[Diagnostic]:
-    """What is wrong with a change whatever else the team is like."""
+    """Yield what is wrong with a change whatever else the team is like."""
     try:
         match change:
             case AddAgent(robot):

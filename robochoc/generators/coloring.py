@@ -15,7 +15,7 @@ from robochoc.model.problem import Constraint, ProblemKind, Team
 
 
 def coloring(agents: int, colors: int, degree: float, seed: int = 0, *, connected: bool = False) -> Team:
-    """The graph of `agents` robots with `degree` neighbours on the average, that `seed` stands for, to be coloured.
+    """Return the graph colouring problem of `agents` robots with `degree` neighbours on average that `seed` stands for.
 
     `Robot3` owns `V3`. With `connected`, graphs are drawn until one is connected. Raises `ValueError` for a graph that
     cannot be; its text says which number to change.

@@ -59,7 +59,7 @@ def random_csp(
     connected: bool = False,
     max_cost: int | None = None,
 ) -> Team:
-    """The team of the problem <agents, domain, density, tightness> that `seed` stands for.
+    """Return a team in which `Robot3` owns `V3`. The lower robot of an edge holds the edge's constraint.
 
     `Robot3` owns `V3` and holds its constraints with robots of smaller numbers. With `connected`, graphs are drawn
     until one is connected, so that each connected graph is as likely as any other. With `max_cost`, it is a DisWCSP.
@@ -92,7 +92,7 @@ def random_csp(
 def team_of_edges(
     name: str, agents: int, domain: int, constraints: Mapping[Edge, Constraint], kind: ProblemKind
 ) -> Team:
-    """The team of `Robot1`, `Robot2`, ..., where `Robot3` owns `V3`, and the lower one of an edge its constraint."""
+    """Return a team in which `Robot3` owns `V3`. The lower robot of an edge holds the edge's constraint."""
     values = Domain("D", (range(1, domain + 1),))
     above: dict[int, list[Parent]] = {number: [] for number in range(1, agents + 1)}
     below: dict[int, list[Child]] = {number: [] for number in above}
@@ -113,7 +113,7 @@ def team_of_edges(
 
 
 def _sizes(agents: int, domain: int, density: float, tightness: float) -> tuple[int, int]:
-    """How many pairs of robots there are, and how many pairs of values. Raises `ValueError`."""
+    """Return how many pairs of robots there are, and how many pairs of values. Raises `ValueError`."""
     for what, number, most in (("agents", agents, MAX_AGENTS), ("domain", domain, MAX_VALUES)):
         if not 1 <= number <= most:
             raise ValueError(f"{what} is {number}; it must be from 1 to {most}")
@@ -132,19 +132,22 @@ def _check_costs(max_cost: int, pairs: int) -> None:
 
 
 def random_graph(chance: Random, agents: int, count: int, *, connected: bool = False) -> list[Edge]:
-    """`count` pairs of robots, in ascending order, each choice as likely as any other; see `random_csp`."""
+    """Return `count` pairs of robots, in ascending order, each choice as likely as any other; see `random_csp`."""
     return _connected(chance, agents, count) if connected else _edges(chance, agents, count)
 
 
 def _edges(chance: Random, agents: int, count: int) -> list[Edge]:
-    """`count` pairs of robots, in ascending order."""
+    """Return `count` pairs of robots, in ascending order."""
     chosen = set(_some(chance, agents * (agents - 1) // 2, count))
     pairs = ((higher, lower) for higher in range(1, agents) for lower in range(higher + 1, agents + 1))
     return [pair for place, pair in enumerate(pairs) if place in chosen]
 
 
 def _connected(chance: Random, agents: int, count: int) -> list[Edge]:
-    """`count` pairs of robots that link them all: drawn until they do. Raises `ValueError` when that is in vain."""
+    """Return `count` pairs of robots that link them all: drawn until they do.
+
+    Raises `ValueError` when that is in vain.
+    """
     if count < agents - 1:
         raise ValueError(
             f"a connected graph of {agents} robots needs {agents - 1} constraints, and the density makes {count}"
@@ -180,7 +183,7 @@ def _forbidding(edge: Edge, forbidden: list[int], domain: int) -> Relation:
 
 
 def _charging(chance: Random, relation: Relation, domain: int, max_cost: int) -> Relation:
-    """`relation`, which forbids pairs of values, with a cost for all others."""
+    """Return `relation`, which forbids pairs of values, with a cost for all others."""
     priced: dict[tuple[int, ...], float] = dict.fromkeys(relation.tuples, INFINITE)
     for pair in itertools.product(range(1, domain + 1), repeat=2):
         if pair not in priced:
@@ -190,12 +193,12 @@ def _charging(chance: Random, relation: Relation, domain: int, max_cost: int) ->
 
 
 def _some(chance: Random, size: int, count: int) -> list[int]:
-    """`count` different numbers below `size`, in ascending order; each choice is as likely as any other."""
+    """Return `count` different numbers below `size`, in ascending order; each choice is as likely as any other."""
     return sorted(_drawn(chance, size, count))
 
 
 def _drawn(chance: Random, size: int, count: int) -> Iterator[int]:
-    """The first steps of Fisher and Yates's shuffle of all numbers below `size`, of which only what moved is kept."""
+    """Yield the first steps of the Fisher-Yates shuffle of all numbers below `size`. Only moved numbers are stored."""
     moved: dict[int, int] = {}
     for left in range(size, size - count, -1):
         place = int(chance.random() * left)

@@ -37,7 +37,7 @@ class JournalTruncatedError(JournalDamagedError):
 
 
 def _digest(before: bytes, packed: bytes, size: int) -> bytes:
-    """The checksum of a block: of the one before, its lengths, and what it holds."""
+    """Return the checksum of a block: of the one before, its lengths, and what it holds."""
     lengths = struct.pack("<II", len(packed), size)
     return blake2b(before + lengths + packed, digest_size=_DIGEST).digest()
 
@@ -47,7 +47,7 @@ BEGINNING = blake2b(PREAMBLE, digest_size=_DIGEST).digest()
 
 
 def frame_block(content: bytes, before: bytes) -> tuple[bytes, bytes]:
-    """The block that holds `content`, whose length is at most `MAX_BLOCK_BYTES`, and its checksum.
+    """Return the block that holds `content`, whose length is at most `MAX_BLOCK_BYTES`, and its checksum.
 
     `before` is the checksum of the block before it, `BEGINNING` for the first.
     """
@@ -65,21 +65,21 @@ class BlockReader:
         self._before = b""
 
     def feed(self, content: bytes) -> None:
-        """Here are the next bytes."""
+        """Append the next bytes."""
         self._buffer += content
 
     @property
     def rest(self) -> str:
-        """What is wrong if no more bytes come; empty: nothing."""
+        """Return what is wrong if no more bytes come; empty: nothing."""
         return f"byte {self._place:,}: it ends within a block" if self._buffer or not self._before else ""
 
     @property
     def place(self) -> str:
-        """Where the next block begins, in words."""
+        """Return where the next block begins, in words."""
         return f"byte {self._place:,}"
 
     def next(self) -> bytes | None:
-        """What the next block holds; None: it is not whole yet.
+        """Return what the next block holds; None: it is not whole yet.
 
         Raises `JournalError` where it is no journal of this version, `JournalDamagedError` where a block is not as it
         was written.
@@ -105,7 +105,7 @@ class BlockReader:
         return content
 
     def _begin(self) -> bool:
-        """Whether the preamble is there."""
+        """Return whether the preamble is there."""
         if len(self._buffer) < _PREAMBLE.size:
             if not MAGIC.startswith(self._buffer[: len(MAGIC)]):
                 raise JournalError("it is no journal")

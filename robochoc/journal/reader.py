@@ -45,7 +45,7 @@ class Journal:
 
 
 def is_journal(content: bytes) -> bool:
-    """Whether `content` begins as a journal does, in either form."""
+    """Return whether `content` begins as a journal does, in either form."""
     return content.startswith((MAGIC, _TEXT))
 
 
@@ -78,7 +78,7 @@ def read_journal(content: bytes) -> Journal:
 
 
 def sorted_by_time(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
-    """Events of a journal, as they were written; each run's come in the order of their times, `Began` first."""
+    """Yield events of a journal, as they were written; each run's come in the order of their times, `Began` first."""
     events = list(events)
     begun = [place for place, event in enumerate(events) if type(event) is Began]
     by_time = attrgetter("t")
@@ -89,7 +89,7 @@ def sorted_by_time(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
 
 
 def lines_of(journal: Journal) -> Iterator[bytes]:
-    """The text form of a journal: one JSON object a line."""
+    """Yield the text form of a journal: one JSON object a line."""
     encode = msgspec.json.Encoder().encode
     yield encode(journal.header) + b"\n"
     for event in journal.events:
@@ -116,7 +116,7 @@ class Follower:
         self._began = self._over = False
 
     def read(self, most: int | None = None) -> list[JournalEntry]:
-        """The entries that have become whole since the last call, in the file's order; the first is the `Header`.
+        """Return the entries that are complete since the last call, in the file's order. The first is the `Header`.
 
         Stops after the block with which there are more than `most`. Raises `JournalError` when it turns out that the
         file is no journal.
@@ -130,7 +130,10 @@ class Follower:
         return lines
 
     def finish(self) -> tuple[list[JournalEntry], str | None]:
-        """No more will be written: what is left, and the damage, if any. Raises `JournalError`."""
+        """Return the remaining entries, and the damage if there is any.
+
+        Nothing more is written. Raises `JournalError`.
+        """
         if self._form is None:
             raise JournalError("it is empty")
         lines: list[JournalEntry] = []
@@ -145,11 +148,11 @@ class Follower:
 
     @property
     def is_over(self) -> bool:
-        """Whether the journal says how the run ended: nothing will follow."""
+        """Return whether the journal says how the run ended: nothing will follow."""
         return self._over
 
     def _next(self) -> Sequence[JournalEntry] | None:
-        """The next entries; None: there are none yet."""
+        """Return the next entries; None: there are none yet."""
         while True:
             try:
                 if self._form and (lines := self._form.next()) is not None:
@@ -175,7 +178,7 @@ class Follower:
         return self._form.place if self._form else ""
 
     def _fitting(self, lines: Sequence[JournalEntry]) -> Sequence[JournalEntry]:
-        """`lines`, if they may follow those before: a header, events, an end.
+        """Return `lines`, if they may follow those before: a header, events, an end.
 
         Raises `JournalError`, `JournalDamagedError`.
         """
@@ -198,7 +201,7 @@ class Follower:
 
 
 def _source(file: BinaryIO) -> Callable[[], bytes]:
-    """What reads the next piece of `file`."""
+    """Return what reads the next piece of `file`."""
     place = 0
 
     def at_an_offset() -> bytes:
@@ -219,17 +222,17 @@ class _Form(Protocol):
     """One of the two forms of journals."""
 
     def feed(self, piece: bytes) -> None:
-        """Here are the next bytes."""
+        """Append the next bytes."""
 
     def next(self) -> Sequence[JournalEntry] | None:
-        """The next entries; None: they are not whole yet. Raises `JournalError`, `JournalDamagedError`."""
+        """Return the next entries; None: they are not whole yet. Raises `JournalError`, `JournalDamagedError`."""
 
     def rest(self) -> Sequence[JournalEntry]:
-        """The entries that are whole if nothing follows. Raises `JournalError`, `JournalDamagedError`."""
+        """Return the entries that are whole if nothing follows. Raises `JournalError`, `JournalDamagedError`."""
 
     @property
     def place(self) -> str:
-        """Where the last entries stood."""
+        """Return where the last entries stood."""
 
 
 class _Blocks:
@@ -304,7 +307,7 @@ class _Text:
 
 @contextmanager
 def _without_cycles() -> Iterator[None]:
-    """Millions of entries come into being, none goes: the collector would look at all of them again and again."""
+    """Pause the cyclic garbage collector: it would visit millions of new entries again and again, and free none."""
     if not gc.isenabled():
         yield
         return

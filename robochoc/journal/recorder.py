@@ -95,7 +95,7 @@ class JournalRecorder:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing has been told, and so nothing written: what stood in the file's place is still there."""
+        """Return whether nothing was recorded. Then nothing is written: the old file is still there."""
         return self._number == 0 and len(self._pending) <= 1
 
     def content(self) -> bytes:
@@ -105,7 +105,7 @@ class JournalRecorder:
 
     @property
     def failures(self) -> list[OSError]:
-        """Why sinks are asked no more."""
+        """Return why sinks are asked no more."""
         return [outlet.failure for outlet in self._outlets if outlet.failure]
 
     def _close_block(self) -> None:
@@ -135,7 +135,7 @@ class JournalRecorder:
         self._staged, self._number = [], number
 
     def _told(self, pending: list[JournalEntry]) -> tuple[Sequence[JournalEntry], list[AnyEvent] | None, list[Given]]:
-        """`pending`, and improvements where a run ends; and what may improve in the run that is open, if it minimises.
+        """Return `pending` with improvements where a run ends, and the events and problems of the open run.
 
         The third is all that robots have been given.
 
@@ -168,7 +168,7 @@ class JournalRecorder:
         yield from (event for event in improvements(events, self._objective()) if isinstance(event, Improved))
 
     def _packed(self, lines: Sequence[JournalEntry]) -> tuple[list[bytes], bytes]:
-        """Blocks of `lines`, and the checksum of the last."""
+        """Return blocks of `lines`, and the checksum of the last."""
         blocks, digest = [], self._digest
         for content in _contents(lines, exact=self._exact):
             block, digest = frame_block(content, digest)
@@ -203,7 +203,7 @@ class JournalFile:
             raise OSError(error.errno, error.strerror, str(self._path)) from error
 
     def close(self) -> None:
-        """Nothing more will come."""
+        """Close the file."""
         if self._file and not self._closed:
             self._file.close()
         self._closed = True
@@ -229,7 +229,7 @@ class _Outlet:
 
 
 def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[AnyEvent]:
-    """`events`, and an `Improved` after each that tells of something cheaper than ever.
+    """Yield `events`, and an `Improved` after each that tells of something cheaper than ever.
 
     What robots were given says which variables they show: `objective` may be of the team as the files have it.
     """
@@ -266,12 +266,12 @@ def _interfaces(reader: TeamReader, given: Given) -> dict[str, tuple[str, ...]]:
 
 
 def _readable(header: Header) -> Header:
-    """`header`, whose team may be named for a folder whose name is no text."""
+    """Return `header`, whose team may be named for a folder whose name is no text."""
     return msgspec.structs.replace(header, team=header.team.encode(errors="replace").decode())
 
 
 def _contents(lines: Sequence[JournalEntry], *, exact: bool) -> Iterator[bytes]:
-    """What the blocks of `lines` hold: one, or as many as it takes."""
+    """Yield what the blocks of `lines` hold: one, or as many as it takes."""
     try:
         content = columns_of(lines, exact=exact)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
@@ -291,7 +291,10 @@ def _contents(lines: Sequence[JournalEntry], *, exact: bool) -> Iterator[bytes]:
 
 
 def _instead(line: JournalEntry, why: str) -> JournalEntry:
-    """What is written for an entry that cannot be written as it is. Raises `ValueError` where there is nothing."""
+    """Return what is written for an entry that cannot be written as it is.
+
+    Raises `ValueError` where there is nothing.
+    """
     match line:
         case Sent():
             return msgspec.structs.replace(line, content={"left out": why})

@@ -12,9 +12,10 @@ from robochoc.communication.session import Epoch
 from robochoc.journal.events import Given, Lost
 from robochoc.journal.given import GivenProblemError, TeamReader, invalidated_of, run_parameters_of
 from robochoc.journal.journal import Header
-from robochoc.model.change import ChangeError, keep_interfaces, team_after_events, without_robots
+from robochoc.model.change import team_after_events
 from robochoc.model.orders import Order, OrderError, compute_order, with_priorities
 from robochoc.model.problem import Robot, Team
+from robochoc.model.team_edits import ChangeError, keep_interfaces, without_robots
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.replay.steps import RecordedRun
 from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_by_name

@@ -11,9 +11,9 @@ import pytest
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Given
 from robochoc.journal.given import GivenProblemError, TeamReader, TeamWriter, invalidated_of, run_parameters_of
-from robochoc.model.change import without_robots
 from robochoc.model.orders import Order, OrderError, with_order
 from robochoc.model.problem import Constraint, Domain, ProblemKind, Relation, Robot, Semantics, Team, Variable
+from robochoc.model.team_edits import without_robots
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.explanation import invalidated_by
 from tests.support.complex_changes import random_complex_changing_team

@@ -15,9 +15,9 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats import PREDEFINED
 from robochoc.journal.events import Began, Decided, Improved, Lost
 from robochoc.journal.journal import Header, JournalRecorder, read_journal
-from robochoc.model.change import keep_interfaces, without_robots
 from robochoc.model.orders import with_dom_deg_order, with_priorities
 from robochoc.model.problem import AddConstraint, Child, Constraint, Parent, Robot, ScenarioEvent, Team
+from robochoc.model.team_edits import keep_interfaces, without_robots
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.traits import Traits
 from robochoc.replay.rebuild import Rebuilder, ReplayOptions
