@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo demo-11 test test-slow fuzz lint type format bench journals clean
+.PHONY: demo demo-11 docs test test-slow fuzz lint type format bench journals clean
 
 $(READY): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
@@ -29,6 +29,15 @@ test: $(READY)
 
 test-slow: $(READY)
 	$(BIN)/pytest -n 2 --dist worksteal -m slow
+
+DOCS := $(VENV)/.docs
+$(DOCS): $(READY)
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@
+
+# --strict: a broken link, anchor or reference ends the build. The theme's notice of its end of life is known: mkdocs.yml.
+docs: $(DOCS)  ## the documentation site: out/site/index.html, readable without a network
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # Findings are kept in out/fuzz. A seed repeats what the loop did; a kept input is tried again by
 # .venv/bin/python -m tests.fuzz --target NAME FILE

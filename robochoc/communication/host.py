@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Self, cast
 
 import msgspec
@@ -18,28 +18,11 @@ from robochoc.journal.events import Concluded, Decided, Heard, Observer, Receive
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import DynamicProtocol, Protocol, Said, Settings
+from robochoc.protocols.protocol import DynamicProtocol, Protocol, Said
+from robochoc.protocols.settings import settings_of
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
-
-
-class SettingsError(ValueError):
-    """What was set is nothing that the protocol knows, or will not do; says which and why."""
-
-
-def settings_of(protocol: type[Protocol], given: Mapping[str, str]) -> Settings:
-    """The settings of `protocol`: its defaults, and what was `given` instead. Raises `SettingsError`."""
-    known = type(protocol.settings)
-    names = [field.name for field in msgspec.structs.fields(known)]
-    for name in given:
-        if name not in names:
-            there = f"it has {', '.join(names)}" if names else "it has no settings"
-            raise SettingsError(f"{name!r} is no setting of this protocol: {there}")
-    try:
-        return msgspec.convert(dict(given), known, strict=False)
-    except msgspec.ValidationError as error:
-        raise SettingsError(str(error)) from None
 
 
 class BadMessageError(Exception):

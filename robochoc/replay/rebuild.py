@@ -7,7 +7,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple
 
-from robochoc.communication.host import Host, SettingsError
+from robochoc.communication.host import Host
 from robochoc.communication.session import Epoch
 from robochoc.journal.events import Given, Lost
 from robochoc.journal.given import GivenProblemError, TeamReader, invalidated_of, run_parameters_of
@@ -17,6 +17,7 @@ from robochoc.model.orders import Order, OrderError, compute_order, with_priorit
 from robochoc.model.problem import Robot, Team
 from robochoc.model.team_edits import ChangeError, keep_interfaces, without_robots
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
+from robochoc.protocols.settings import SettingsError
 from robochoc.replay.steps import RecordedRun
 from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_by_name
 from robochoc.solver.ace import AceProcess

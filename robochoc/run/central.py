@@ -81,7 +81,7 @@ def _answer(solver: CentralSolver, team: Team, options: Options) -> Answer:
     """Return the solver's answer; as few robots as possible withdraw, if that is asked for and necessary."""
     price = None
     judgement = None
-    if options.withdraw is not Withdrawal.FEWEST or team.kind is ProblemKind.DISCSP:
+    if options.withdraw is not Withdrawal.MINIMUM or team.kind is ProblemKind.DISCSP:
         judgement = solver.judge(team)
     if judgement is None or (options.withdraw is not None and judgement.verdict is Verdict.NO_SOLUTION):
         price = int(withdrawal_cost(team))

@@ -1,210 +1,305 @@
-"""What a run refuses before any robot starts: one sentence that says what does not fit, and what would."""
+"""What goes together: problem, protocol, runtime and options. This is decided here, and nowhere else.
+
+There are three lists. Each rule has a condition, the reason, and what to do instead:
+
+- `OPTION_RULES`: options that do not go together, whatever the problem is;
+- `TEAM_RULES`: options that do not go with the problem, or with what the protocol can do (its traits);
+- the constraints that a protocol must be able to take (`protocols/requirements.py`, where robots on a network, whose
+  files nobody else sees, ask as well).
+
+The command line (`robochoc solve`, `robochoc master`), the API, and robots on a network ask here. Options are named as
+on the command line.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
-from robochoc.communication.host import SettingsError, settings_of
 from robochoc.model.change import team_after_events
-from robochoc.model.problem import ConstraintModel, ProblemKind, Team
+from robochoc.model.problem import ProblemKind, Team
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.requirements import unmet_requirement
+from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.traits import Traits
 from robochoc.run.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
-from robochoc.run.registry import offers
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.exact_costs import EXACT, check_exact
-from robochoc.solver.weighted import MAX_TOTAL_COST
 from robochoc.verification.objective import withdrawal_cost
 
-PAIR = 2
 LARGEST = 2**62
 """Costs that add up to more are refused: a message holds integers of 64 bits."""
+CENTRAL_TRAITS = Traits(partially_known=True, costs=True)
+"""What the central solver can take."""
 
 
-class _UnfitError(UnsupportedError):
-    """What does not fit is the protocol: another one may do. `complete`: if it proves what it finds."""
+class UnfitProtocolError(UnsupportedError):
+    """The protocol does not fit; another one may. `complete`: it must be one that proves its answers."""
 
     def __init__(self, why: str, *, complete: bool = False) -> None:
         super().__init__(why)
         self.complete = complete
 
 
-def refuse_unfit(team: Team, options: Options, protocol: type[Protocol]) -> None:
-    """Raise `UnsupportedError` for what the options ask for and the protocol, or this version, cannot do."""
+# Options that do not go together
+
+
+class OptionRule(NamedTuple):
+    """Options that are refused: the condition, the reason, and what to do instead."""
+
+    refuses: Callable[[Options], object]
+    why: str
+    instead: str = ""
+
+
+def _for_robots(option: str, given: Callable[[Options], object]) -> OptionRule:
+    """Return the rule that the central solver has no use for an option."""
+    why = f"{option} is for robots that solve it together, not for --protocol central"
+    return OptionRule(lambda o: o.protocol == CENTRAL and given(o), why)
+
+
+def _not_while_changing(option: str, given: Callable[[Options], object]) -> OptionRule:
+    """Return the rule that an option is not for problems that change with the robots' situation."""
+    return OptionRule(given, f"{option} is for problems that do not change; --situation changes this one")
+
+
+def _is_delayed(options: Options) -> bool:
+    """Return whether messages are delayed, or ordered, otherwise than by default."""
+    return bool(options.delay) or options.schedule is not ScheduleName.CONCURRENT
+
+
+OPTION_RULES = (
+    OptionRule(
+        lambda o: o.channel and o.runtime is not Runtime.SIMULATOR,
+        "--channel is the simulator's",
+        "add --runtime simulator",
+    ),
+    OptionRule(
+        lambda o: o.channel and _is_delayed(o),
+        "--channel says how long messages take",
+        "drop --delay and --schedule random",
+    ),
+    OptionRule(
+        lambda o: _is_delayed(o) and o.runtime is not Runtime.SIMULATOR,
+        "--delay and --schedule are the simulator's",
+        "add --runtime simulator",
+    ),
+    OptionRule(
+        lambda o: o.delay and o.schedule is ScheduleName.RANDOM,
+        "--delay is for --schedule concurrent: in a random one any message may take any time",
+    ),
+    OptionRule(
+        lambda o: o.protocol == CENTRAL and o.verify,
+        "--verify asks the central solver, which is --protocol central itself",
+    ),
+    OptionRule(
+        lambda o: o.patience is not None and (o.protocol == CENTRAL or o.runtime is Runtime.SIMULATOR),
+        "--patience is for robots with processes, which can be stopped",
+        "drop it",
+    ),
+    _for_robots("--messages", lambda o: o.messages),
+    _for_robots("--on-loss", lambda o: o.on_loss),
+    _for_robots("--spare", lambda o: o.spares),
+    _for_robots("--channel", lambda o: o.channel),
+    _for_robots("--filter", lambda o: o.filters),
+    _for_robots("--order", lambda o: o.order is not None),
+    _for_robots("--set", lambda o: o.settings),
+    OptionRule(
+        lambda o: o.protocol == CENTRAL and o.withdraw is Withdrawal.MAXIMAL,
+        "--withdraw maximal is settled by the robots, in priority order; the central solver finds a minimum",
+        "--withdraw minimum",
+    ),
+    OptionRule(lambda o: o.count and o.protocol != CENTRAL, "--count is for --protocol central"),
+    OptionRule(
+        lambda o: o.count and o.withdraw is not None,
+        "--count is of solutions for all robots; --withdraw asks who can do without",
+    ),
+    OptionRule(
+        lambda o: o.filters and o.runtime is not Runtime.NETWORK,
+        "--filter is for messages that cross a network",
+        "add --runtime network",
+    ),
+    OptionRule(
+        lambda o: o.spares and o.runtime is Runtime.NETWORK,
+        "--spare starts processes of this machine again",
+        "drop --runtime network",
+    ),
+    OptionRule(
+        lambda o: (o.on_loss or o.spares) and o.runtime is Runtime.SIMULATOR,
+        "--on-loss and --spare are for processes, which can die",
+        "drop --runtime simulator, or write a scenario.xml",
+    ),
+    OptionRule(
+        lambda o: o.spares and o.on_loss is OnLoss.FAIL,
+        "--spare brings robots back that died; --on-loss fail ends the run instead",
+    ),
+)
+"""What is refused whatever the problem is."""
+
+ENVIRONMENT_RULES = (
+    _not_while_changing("--protocol central", lambda o: o.protocol == CENTRAL),
+    _not_while_changing("--withdraw", lambda o: o.withdraw is not None),
+    _not_while_changing("--runtime network", lambda o: o.runtime is Runtime.NETWORK),
+)
+"""What is refused besides when an environment changes the problem."""
+
+
+def refuse_options(options: Options, *, environment: bool = False) -> None:
+    """Raise `UnsupportedError` for options that do not go together; `environment`: one changes the problem."""
+    for rule in (*ENVIRONMENT_RULES * environment, *OPTION_RULES):
+        if rule.refuses(options):
+            raise UnsupportedError("; ".join(filter(None, [rule.why, rule.instead])))
+
+
+def refuse_settings(name: str, protocol: type[Protocol], settings: Mapping[str, str]) -> None:
+    """Raise `UnsupportedError` for `settings` that the protocol called `name` does not have, or does not accept."""
     try:
-        settings_of(protocol, options.settings)
+        settings_of(protocol, settings)
     except SettingsError as wrong:
-        raise UnsupportedError(f"--set: {wrong} (protocol {options.protocol})") from None
-    try:
-        _check(team, options, protocol.traits)
-    except _UnfitError as unfit:
-        raise UnsupportedError(f"{unfit}{instead(team, options, complete=unfit.complete)}") from None
+        raise UnsupportedError(f"--set: {wrong} (protocol {name})") from None
 
 
-def instead(team: Team, options: Options, *, complete: bool = False, costs: bool = False) -> str:
-    """Who takes what the protocol of `options` has refused, or what else would help, to be put behind the reason.
+# Options that do not go with the team
 
-    Each protocol is asked as if it had been chosen. Only those count that are `complete`, or know `costs`, if need be.
+
+@dataclass(frozen=True)
+class Case:
+    """A team, the options, and the traits of the protocol."""
+
+    team: Team
+    options: Options
+    traits: Traits
+
+    @property
+    def has_costs(self) -> bool:
+        """Whether the problem has costs."""
+        return self.team.kind is ProblemKind.DISWCSP
+
+    @property
+    def is_distributed(self) -> bool:
+        """Whether robots solve it together."""
+        return self.options.protocol != CENTRAL
+
+    @property
+    def minimum_withdrawal(self) -> bool:
+        """Whether robots are to withdraw, as few as possible."""
+        return self.is_distributed and self.options.withdraw is Withdrawal.MINIMUM
+
+    @cached_property
+    def epochs(self) -> tuple[Team, ...]:
+        """The team after each event of its scenario, as far as that is known before."""
+        return tuple(team_after_events(self.team, events) for events in range(len(self.team.scenario) + 1))
+
+    @property
+    def max_total(self) -> float:
+        """What all costs could add up to in any epoch."""
+        return max(max_total(team, self.options) for team in self.epochs)
+
+
+def scenario_refusal(team: object, option: str) -> str:
+    """Return why `option` is refused for a team whose problem changes over time."""
+    return f"{team} has a scenario.xml; {option} is for problems that do not change"
+
+
+class TeamRule(NamedTuple):
+    """A case that is refused: the condition, the reason, and what to do instead.
+
+    In the reason, `{team}` and `{protocol}` stand for the names. With `other_protocol`, another one could do it; with
+    `complete`, one that proves its answers.
     """
-    names = [
-        offer.name
-        for offer in offers()
-        if offer.protocol
-        and offer.name != options.protocol
-        and offer.protocol.traits.complete >= complete
-        and offer.protocol.traits.costs >= costs
-        and _takes(team, replace(options, protocol=offer.name), offer.protocol.traits)
-    ]
-    if names:
-        return f"; these do: {', '.join(names)} (--protocol)"
-    if _judge_takes(team, options):
-        return f"; no protocol does, but the central judge (--protocol {CENTRAL})"
-    dear = _most(team, aside=options.withdraw is not None) >= EXACT
-    return f"; no protocol that is installed does{' (scale the costs down)' if dear else ''}"
+
+    refuses: Callable[[Case], object]
+    why: str
+    instead: str = ""
+    other_protocol: bool = False
+    complete: bool = False
 
 
-def _takes(team: Team, options: Options, traits: Traits) -> bool:
-    """Whether a protocol with these traits would take the team, in the search as well."""
-    try:
-        _check(team, options, traits)
-        if traits.tables:
-            check_exact(_most(team, aside=options.withdraw is not None))
-    except UnsupportedError:
-        return False
-    return True
+def _not_with_scenario(option: str, given: Callable[[Options], object]) -> TeamRule:
+    """Return the rule that an option is not for problems that change over time."""
+    return TeamRule(lambda c: c.team.dynamic and given(c.options), scenario_refusal("{team}", option))
 
 
-def _judge_takes(team: Team, options: Options) -> bool:
-    """Whether the central judge would, for sure."""
-    for_robots = (options.order, options.messages, options.channel, options.settings, options.filters)
-    elsewhere = options.runtime is not Runtime.PROCESSES or options.on_loss is not OnLoss.FAIL
-    if elsewhere or any((*for_robots, options.verify, options.patience)):
-        return False
-    try:
-        refuse_central(team, replace(options, protocol=CENTRAL))
-    except UnsupportedError:
-        return False
-    return _most(team, aside=options.withdraw is not None) <= MAX_TOTAL_COST
+TEAM_RULES = (
+    _not_with_scenario("--withdraw", lambda o: o.withdraw is not None),
+    _not_with_scenario("--count", lambda o: o.count),
+    _not_with_scenario("--runtime network", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.NETWORK),
+    TeamRule(
+        lambda c: c.options.count and c.has_costs,
+        "{team} is a DisWCSP, where every assignment that breaks nothing hard is a solution; --count is for problems"
+        " without costs",
+    ),
+    TeamRule(
+        lambda c: c.is_distributed and (c.traits.costs or c.minimum_withdrawal) and c.max_total >= LARGEST,
+        f"{{team}}'s costs could add up to {LARGEST:,} or more, which no message holds",
+        "scale them down",
+    ),
+    TeamRule(
+        lambda c: c.minimum_withdrawal and c.traits.costs and not c.traits.complete,
+        "--withdraw minimum has to be proven, and {protocol} proves nothing",
+        other_protocol=True,
+        complete=True,
+    ),
+    TeamRule(
+        lambda c: c.has_costs and not c.traits.costs and not c.minimum_withdrawal,
+        "{team} is a DisWCSP, and {protocol} does not minimise costs",
+        other_protocol=True,
+    ),
+    TeamRule(
+        lambda c: c.has_costs and c.options.withdraw is Withdrawal.MAXIMAL,
+        "{team} is a DisWCSP; --withdraw maximal knows no costs",
+        "--withdraw minimum does",
+    ),
+)
+"""What is refused of a problem, or of a protocol for it."""
 
 
-def _check(team: Team, options: Options, traits: Traits) -> None:
-    """Raise `_UnfitError` where another protocol could do it, and `UnsupportedError` where none could."""
-    _refuse_channel(options)
-    if options.withdraw is not None:
-        refuse_scenario(team, "--withdraw")
-    if traits.costs or options.withdraw is Withdrawal.FEWEST:
-        for events in range(len(team.scenario) + 1):
-            _refuse_dear(team_after_events(team, events), aside=options.withdraw is not None)
-    if options.withdraw is Withdrawal.FEWEST:
-        _refuse_fewest(team, options, traits)
-    else:
-        for events in range(len(team.scenario) + 1):
-            refuse(team_after_events(team, events), options.protocol, traits)
+def refuse_unfit(team: Team, options: Options, traits: Traits) -> None:
+    """Raise `UnsupportedError` for what does not go with the team, or with a protocol that has these `traits`.
+
+    Args:
+        team: the team with its scenario. Across machines: as far as the master sees it.
+        options: how to run.
+        traits: what the protocol of `options` can do; `CENTRAL_TRAITS` for the central solver.
+
+    Raises:
+        UnfitProtocolError: where another protocol could do it.
+    """
+    case = Case(team, options, traits)
+    for rule in TEAM_RULES:
+        if rule.refuses(case):
+            why = rule.why.format(team=team.name, protocol=options.protocol)
+            why = "; ".join(filter(None, [why, rule.instead]))
+            raise UnfitProtocolError(why, complete=rule.complete) if rule.other_protocol else UnsupportedError(why)
+    for epoch in case.epochs:
+        for name, able in _takers(case):
+            _refuse_constraints(epoch, name, able)
+
+
+def _takers(case: Case) -> Iterator[tuple[str, Traits]]:
+    """Yield all that must be able to take the constraints: the protocol, and what takes over from it."""
+    options, traits = case.options, case.traits
+    if not (case.minimum_withdrawal and case.has_costs):  # then soft constraints are left to what takes over
+        yield options.protocol, traits
+    if case.minimum_withdrawal:
+        yield "--withdraw minimum", Traits(costs=True, n_ary=traits.n_ary or not traits.costs)
     if options.withdraw is Withdrawal.MAXIMAL:
-        if team.kind is ProblemKind.DISWCSP:
-            raise UnsupportedError(
-                f"{team.name} is a DisWCSP; --withdraw maximal knows no costs, --withdraw fewest does"
-            )
-        refuse(team, "--withdraw maximal", FirstFit.traits)
+        yield "--withdraw maximal", FirstFit.traits
     if options.spares:
-        refuse(team, "--spare", Traits(costs=True))
-    _refuse_network(team, options)
+        yield "--spare", Traits(costs=True)
 
 
-def _refuse_network(team: Team, options: Options) -> None:
-    """What a run on a network cannot do, or only that can."""
-    if options.runtime is Runtime.NETWORK:
-        refuse_scenario(team, "--runtime network")
-        if options.spares:
-            raise UnsupportedError("--spare starts processes of this machine again; drop --runtime network")
-    elif options.filters:
-        raise UnsupportedError("--filter is for messages that cross a network; add --runtime network")
-
-
-def refuse_central(team: Team, options: Options) -> None:
-    """Raise `UnsupportedError` for what the options ask of the central judge and it does not do."""
-    refuse(team, options.protocol, Traits(partially_known=True, costs=True))
-    if options.count:
-        refuse_scenario(team, "--count")
-        if team.kind is ProblemKind.DISWCSP:
-            raise UnsupportedError(
-                f"{team.name} is a DisWCSP, where every assignment that breaks nothing hard is a solution; --count is"
-                " for problems without costs"
-            )
-        if options.withdraw is not None:
-            raise UnsupportedError("--count is of solutions for all robots; --withdraw asks who can do without")
-    if options.withdraw is not None:
-        refuse_scenario(team, "--withdraw")
-    if options.withdraw is Withdrawal.MAXIMAL:
-        raise UnsupportedError(
-            "--withdraw maximal is settled by the robots, in priority order; the central judge finds the fewest"
-            " (--withdraw fewest)"
-        )
-
-
-def refuse_field(team: Team, options: Options) -> None:
-    """Raise `UnsupportedError` for what cannot be had of a problem that changes with its robots' situation."""
-    asked = {
-        "--protocol central": options.protocol == CENTRAL,
-        "--withdraw": options.withdraw is not None,
-        "--runtime network": options.runtime is Runtime.NETWORK,
-    }
-    for option in (name for name, given in asked.items() if given):
-        raise UnsupportedError(
-            f"{team.name} is to change with its robots' situation; {option} is for problems that do not change so"
-        )
-
-
-def refuse_scenario(team: Team, option: str) -> None:
-    """Raise `UnsupportedError` when the problem changes over time."""
-    if team.dynamic:
-        raise UnsupportedError(f"{team.name} has a scenario.xml; {option} is for problems that do not change")
-
-
-def refuse(team: Team, name: str, traits: Traits) -> None:
-    """Raise `UnsupportedError` for what whoever is called `name` cannot take of `team`."""
-    if team.kind is ProblemKind.DISWCSP and not traits.costs:
-        raise _UnfitError(f"{team.name} is a DisWCSP, and {name} does not minimise costs")
+def _refuse_constraints(team: Team, name: str, traits: Traits) -> None:
+    """Raise `UnfitProtocolError` for constraints that the one called `name` cannot take."""
     for robot in team.robots:
-        parts = (part for child in robot.children for part in child.constraints)
-        for constraint in (*robot.shared, *parts):
-            if constraint.model is ConstraintModel.PKC and not traits.partially_known:
-                raise _UnfitError(
-                    f"{robot.name} shares a partially known constraint (PKC, {constraint.name}), which {name}"
-                    " does not support"
-                )
-            if not traits.n_ary and len({team.owner[variable] for variable in constraint.variables}) > PAIR:
-                raise _UnfitError(
-                    f"{robot.name} holds a constraint over more than two robots ({constraint.name}), which {name}"
-                    " does not support"
-                )
+        unmet = unmet_requirement(robot, traits, team.owner)
+        if unmet:
+            raise UnfitProtocolError(f"{unmet}, which {name} does not support")
 
 
-def _refuse_channel(options: Options) -> None:
-    """A channel model is another schedule of the simulator."""
-    if options.channel and options.runtime is not Runtime.SIMULATOR:
-        raise UnsupportedError("a channel model (--channel) is the simulator's; add --runtime simulator")
-    if options.channel and (options.delay or options.schedule is not ScheduleName.CONCURRENT):
-        raise UnsupportedError("a channel model (--channel) says how long messages take; drop --delay and --schedule")
-
-
-def _refuse_fewest(team: Team, options: Options, traits: Traits) -> None:
-    """Who steps aside is a question of costs: a protocol for these answers it alone, any other is asked first."""
-    if traits.costs and not traits.complete:
-        raise _UnfitError(f"--withdraw fewest has to be proven, and {options.protocol} proves nothing", complete=True)
-    if team.kind is ProblemKind.DISCSP:
-        refuse(team, options.protocol, traits)
-    refuse(team, "--withdraw fewest", Traits(costs=True, n_ary=traits.n_ary or not traits.costs))
-
-
-def _refuse_dear(team: Team, *, aside: bool) -> None:
-    """Costs, and what stepping aside costs, must fit into messages, however they add up."""
-    most = _most(team, aside=aside)
-    if most >= LARGEST:
-        raise UnsupportedError(f"{team.name}'s costs could add up to {most:,}, more than {LARGEST:,}; scale them down")
-
-
-def _most(team: Team, *, aside: bool) -> float:
-    """What costs could add up to, with those of stepping aside if robots may."""
-    return withdrawal_cost(team) * (sum(robot.weight for robot in team.robots) + 1 if aside else 1)
+def max_total(team: Team, options: Options) -> float:
+    """Return what all costs of `team` could add up to; withdrawal costs are included where robots may withdraw."""
+    times = sum(robot.weight for robot in team.robots) + 1 if options.withdraw is not None else 1
+    return withdrawal_cost(team) * times

@@ -1,4 +1,4 @@
-"""How to run: the options of `robochoc.run.orchestrator.solve`, and of the command line."""
+"""How to run: the options of `robochoc.run.solve`, and of the command line."""
 
 from __future__ import annotations
 
@@ -42,7 +42,6 @@ class Withdrawal(StrEnum):
 
     MINIMUM = "minimum"
     MAXIMAL = "maximal"
-    FEWEST = MINIMUM
 
     @classmethod
     def _missing_(cls, value: object) -> Self | None:
@@ -59,18 +58,29 @@ class OnLoss(StrEnum):
 
 @dataclass(frozen=True)
 class Options:
-    """How to run.
+    """How to run. What goes together is decided in `run/compatibility.py`.
 
-    `timeout` is in seconds of wall-clock time, `messages` a limit on their number. `seed`, `schedule` and `delay`
-    are the simulator's; `delay` is the longest a message takes, in constraint checks. A `channel`, instead of these
-    two, has the simulator count seconds of computing and radio. `order` is the robots' total priority order, by name
-    or as the list of them (None: the files'); `seed` is `Order.RANDOM`'s too. `local` limits the compilation of each
-    robot's domain; `cache` says whether solutions of local problems are kept in the user's cache folder. `count` is
-    for the central judge: the number of all solutions. `verify` asks for a second opinion on a `no-solution`, or on a
-    least cost. `settings` are the protocol's, as text; its chance is drawn from `seed` too. With `on_loss` set to
-    withdraw, robots whose processes end leave the problem; up to `spares` of them come back. `patience`, in seconds: a
-    robot whose process is stopped (on a network: that is out of reach) for longer is lost; None: stopped ones are
-    waited for. `filters` are the network's: the channel filters that messages go through.
+    Attributes:
+        protocol: The name of the protocol by which the robots solve the problem, or `CENTRAL`.
+        runtime: Where the robots live.
+        seed: The seed of the simulator, of `Order.RANDOM`, and of protocols that draw lots.
+        timeout: A limit on wall-clock time, in seconds (None: no limit).
+        withdraw: Which robots withdraw when the team has no solution (None: none).
+        schedule: How the simulator orders events.
+        delay: The longest delay of a message in the simulator, in constraint checks.
+        local: Limits on the compilation of each robot's domain.
+        cache: Whether solutions of local problems are kept in the user's cache folder.
+        count: Whether the central solver counts all solutions.
+        verify: Whether the central solver checks a `no-solution` or a minimum cost that robots have found.
+        order: The total priority order of the robots, by name or as their names (None: that of the files).
+        messages: A limit on the number of messages (None: no limit).
+        on_loss: What the loss of a robot means (None: the run fails, unless there are `spares`).
+        spares: How many robots that are lost come back.
+        patience: A robot whose process is stopped (on a network: that is out of reach) for so many seconds is lost
+            (None: it is waited for; on a network 10 seconds).
+        channel: A channel model: the simulator counts seconds of computing and radio.
+        settings: The protocol's settings, as text.
+        filters: The names of the channel filters that messages on a network go through, in this order.
     """
 
     protocol: str = SATISFIES
@@ -86,9 +96,14 @@ class Options:
     verify: bool = False
     order: Order | tuple[str, ...] | None = None
     messages: int | None = None
-    on_loss: OnLoss = OnLoss.FAIL
+    on_loss: OnLoss | None = None
     spares: int = 0
     patience: float | None = None
     channel: ChannelModel | None = None
     settings: Mapping[str, str] = field(default_factory=dict)
     filters: tuple[str, ...] = ()
+
+    @property
+    def survives_losses(self) -> bool:
+        """Whether the run goes on when a robot is lost."""
+        return self.on_loss is OnLoss.WITHDRAW or (self.on_loss is None and self.spares > 0)

@@ -11,7 +11,14 @@ from robochoc.journal.events import Observer
 from robochoc.model.orders import OrderError
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
-from robochoc.run.compatibility import instead, refuse_central, refuse_field, refuse_unfit
+from robochoc.run.alternatives import alternatives
+from robochoc.run.compatibility import (
+    CENTRAL_TRAITS,
+    UnfitProtocolError,
+    refuse_options,
+    refuse_settings,
+    refuse_unfit,
+)
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import solve_distributed
 from robochoc.run.options import CENTRAL, Options
@@ -61,9 +68,8 @@ def solve(
     """
     check_team(team)
     environment = environment and with_checked_events(environment)
+    refuse_options(options, environment=environment is not None)
     try:
-        if environment:
-            refuse_field(team, options)
         context = RunContext(options, observer, progress, solver)
         if options.protocol == CENTRAL:
             return _solve_centrally(team, context)
@@ -74,7 +80,7 @@ def solve(
 
 def _solve_centrally(team: Team, context: RunContext) -> Outcome:
     """Let the central solver decide. See `run/central.py`."""
-    refuse_central(team, context.options)
+    refuse_unfit(team, context.options, CENTRAL_TRAITS)
     from robochoc.run.central import solve_centrally  # noqa: PLC0415 - start-up: seldom asked for
 
     return solve_centrally(team, context, _header(team, context.options))
@@ -84,13 +90,17 @@ def _solve_distributed(team: Team, context: RunContext, environment: Environment
     """Let the robots solve their problem together. See `run/distributed.py`."""
     options = context.options
     protocol = protocol_named(options.protocol)
-    refuse_unfit(team, options, protocol)
+    refuse_settings(options.protocol, protocol, options.settings)
+    try:
+        refuse_unfit(team, options, protocol.traits)
+    except UnfitProtocolError as unfit:
+        raise UnsupportedError(f"{unfit}{alternatives(team, options, complete=unfit.complete)}") from None
     deployment = ThisMachine(team, context, environment)
     header = _header(team, options)
     try:
         return solve_distributed(deployment, protocol, header)
     except TooLargeError as refused:
-        raise UnsupportedError(f"{refused}{instead(team, options, complete=True, costs=True)}") from None
+        raise UnsupportedError(f"{refused}{alternatives(team, options, complete=True, costs=True)}") from None
     except (TooManySolutionsError, CompileTimeoutError, OutOfTimeError) as limit:
         return deployment.outcome(header, deployment.limit_reached(str(limit)))
 

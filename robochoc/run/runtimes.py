@@ -12,7 +12,7 @@ from robochoc.communication.run_result import Progress
 from robochoc.communication.session import Session
 from robochoc.journal.events import Observer
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName
+from robochoc.run.options import Options, Runtime, ScheduleName
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
@@ -44,7 +44,7 @@ def open_session(
         case Runtime.PROCESSES:
             from robochoc.communication.processes.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
 
-            survive = options.on_loss is OnLoss.WITHDRAW
+            survive = options.survives_losses
             return ProcessesRun(team, protocol, survive=survive, patience_s=options.patience, **rest)
         case Runtime.SIMULATOR:
             from robochoc.communication.simulator.simulator import Simulation  # noqa: PLC0415 - one runtime is enough
@@ -64,7 +64,7 @@ def _network(protocol: type[Protocol], team: CompiledTeam, options: Options, res
         raise UnsupportedError(
             f"--runtime network needs {missing.name}; say: pip install 'robochoc[network]'"
         ) from None
-    survive, patience_s = options.on_loss is OnLoss.WITHDRAW, options.patience or PATIENCE_S
+    survive, patience_s = options.survives_losses, options.patience or PATIENCE_S
     conditions = NetworkSettings(filters=options.filters, survive=survive, patience_s=patience_s)
     return LocalNetwork(team, protocol, settings=conditions, **rest)
 

@@ -1,6 +1,6 @@
 """The phases of a run: the search by the protocol asked for, and the one that decides which robots withdraw.
 
-A protocol that minimises costs decides itself which robots withdraw (`Withdrawal.FEWEST`): the run has one phase.
+A protocol that minimises costs decides itself which robots withdraw (`Withdrawal.MINIMUM`): the run has one phase.
 Otherwise another protocol takes over once the team is known to have no solution.
 """
 
@@ -45,7 +45,7 @@ def first_phase(options: Options, protocol: type[Protocol], withdrawal_cost: Cal
         protocol: the class of the protocol that `options` name.
         withdrawal_cost: returns what the withdrawal of a robot of weight 1 costs.
     """
-    withdrawal = options.withdraw is Withdrawal.FEWEST and protocol.traits.costs
+    withdrawal = options.withdraw is Withdrawal.MINIMUM and protocol.traits.costs
     cost = withdrawal_cost() if withdrawal else None
     return Phase(options.protocol, protocol, RunParameters(options.seed, options.settings, cost), withdrawal)
 
@@ -55,7 +55,7 @@ def second_phase(options: Options, withdrawal_cost: Callable[[], float]) -> Phas
 
     The protocol was not asked for, so it gets no settings. For the arguments see `first_phase`.
     """
-    name = MINIMISES if options.withdraw is Withdrawal.FEWEST else FIRST_FIT
+    name = MINIMISES if options.withdraw is Withdrawal.MINIMUM else FIRST_FIT
     protocol = protocol_by_name(name)
     cost = withdrawal_cost() if protocol.traits.costs else None
     return Phase(name, protocol, RunParameters(options.seed, withdrawal_cost=cost), withdrawal=True, takes_over=True)

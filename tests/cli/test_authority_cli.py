@@ -173,8 +173,8 @@ def test_without_the_extra_it_says_what_to_install(tmp_path: Path) -> None:
     assert done.stderr == "the Authority needs 'cryptography'; say: pip install 'robochoc[network]'\n"
 
 
-def test_the_readme_and_the_docs_know_it() -> None:
-    readme = (ROOT / "README.md").read_text()
+def test_the_docs_know_it() -> None:
+    security, machines = (ROOT / "docs" / "guides" / f"{page}.md" for page in ("security", "several-machines"))
     for command in ("init", "enrol", "list", "revoke"):
-        assert f"robochoc authority {command}" in readme
-        assert f"robochoc authority {command}" in (ROOT / "docs" / "guides" / "security.md").read_text()
+        assert f"robochoc authority {command}" in security.read_text()
+        assert f"robochoc authority {command}" in machines.read_text()

@@ -25,7 +25,7 @@ def test_a_file_has_all_fields(tmp_path: Path) -> None:
 def test_the_example_in_the_manual_is_a_channel(tmp_path: Path) -> None:
     text = (ROOT / "docs" / "guides" / "channels.md").read_text()
     path = tmp_path / "mesh.toml"
-    path.write_text(text.split("```toml\n")[1].split("```")[0])
+    path.write_text(text.split('```toml title="mesh.toml"\n')[1].split("```")[0])
     assert read_channel(path).name == "mesh"
     assert all(f"`{field}`" in text for field in ChannelModel.__struct_fields__)
 

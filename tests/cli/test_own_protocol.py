@@ -127,7 +127,7 @@ def test_the_guides_links_lead_somewhere() -> None:
     links = re.findall(r"\]\(([^)]+)\)", GUIDE)
     assert links
     assert all((ROOT / "docs" / "tutorials" / link).exists() for link in links)
-    assert "docs/tutorials/write-a-protocol.md" in (ROOT / "README.md").read_text()
+    assert "(write-a-protocol.md)" in (ROOT / "docs" / "tutorials" / "index.md").read_text()
 
 
 def _explained(head: str) -> set[str]:

@@ -1,4 +1,4 @@
-"""The example with costs: what the README says of it."""
+"""The example with costs: what the tutorial says of it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_the_example_has_soft_and_hard_constraints() -> None:
 
 
 @pytest.mark.parametrize("protocol", MINIMISING)
-def test_every_protocol_that_minimises_comes_to_the_readmes_answer(protocol: str) -> None:
+def test_every_protocol_that_minimises_comes_to_the_tutorials_answer(protocol: str) -> None:
     outcome = solve(read_team(PATROL), Options(protocol=protocol, runtime=Runtime.SIMULATOR))
     complete = protocol_named(protocol).traits.complete
     assert outcome.verdict is (Verdict.OPTIMAL if complete else Verdict.SOLUTION)

@@ -78,12 +78,12 @@ def test_going_on_costs_less_than_to_begin_anew() -> None:
     assert sum(went_on) < sum(anew)
 
 
-def test_the_report_of_the_readme_is_what_is_printed() -> None:
+def test_the_report_of_the_tutorial_is_what_is_printed() -> None:
     done = robochoc("solve", RESCUE, "--protocol", "dynabt", "--runtime", "simulator")
     *told, cost = done.stdout.splitlines()
-    readme = (ROOT / "README.md").read_text()
-    assert "\n".join(told) in readme
-    assert cost.rpartition(",")[0] in readme, "all but the time"
+    tutorial = (ROOT / "docs" / "tutorials" / "change.md").read_text()
+    assert "\n".join(told) in tutorial
+    assert cost.rpartition(",")[0] in tutorial, "all but the time"
 
 
 def test_the_scene_shows_the_robots_of_the_last_epoch(tmp_path: Path) -> None:

@@ -195,9 +195,9 @@ def test_a_team_without_topics_has_nothing_to_publish(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--situation", "flight", "--withdraw"), "--withdraw cannot go on with that"),
-        (("--situation", "flight", "--runtime", "network"), "--runtime network cannot go on with that"),
-        (("--situation", "flight", "--protocol", "central"), "--protocol central cannot go on with that"),
+        (("--situation", "flight", "--withdraw"), "--withdraw is for problems that do not change"),
+        (("--situation", "flight", "--runtime", "network"), "--runtime network is for problems that do not change"),
+        (("--situation", "flight", "--protocol", "central"), "--protocol central is for problems that do not change"),
         (("--ros", "mcap:a.mcap", "--count", "--protocol", "central"), "--count gives a number"),
         (("--obstacle", "1,1,1"), "--obstacle is for the simulated flight"),
         (("--fail", "Fin"), "--fail is for the simulated flight"),
@@ -206,7 +206,7 @@ def test_a_team_without_topics_has_nothing_to_publish(tmp_path: Path) -> None:
         (("--patience", "1", "--runtime", "simulator"), "--patience is for robots with processes"),
         (("--patience", "1", "--protocol", "central"), "--patience is for robots with processes"),
         (("--patience", "0"), "--patience"),
-        (("--battery", "0.1", "--situation", "flight"), "--battery is for robots that are listened to"),
+        (("--battery", "0.1", "--situation", "flight"), "--battery is for robots that report"),
         (("--frame", "hall"), "--frame is for what is published"),
         (("--scale", "2"), "--scale is for what is published"),
         (("--ros", "mcap:a", "--situation", "mcap:a"), "--situation mcap:a and --ros mcap:a are one place"),
@@ -225,7 +225,9 @@ def test_a_team_without_topics_has_nothing_to_publish(tmp_path: Path) -> None:
         (("--scale", "nan", "--ros", "mcap:a"), "--scale"),
         (("--scale", "inf", "--ros", "mcap:a"), "--scale"),
         (("--battery", "nan", "--situation", "mcap:a"), "--battery"),
-        (("--patience", "nan", "--situation", "mcap:a"), "--patience"),
+        (("--patience", "nan"), "--patience"),
+        (("--report-timeout", "nan", "--situation", "mcap:a"), "--report-timeout"),
+        (("--report-timeout", "1"), "--report-timeout is for robots that report"),
         ((str(SCOUTS), "--ros", "mcap:a"), "--ros and --situation are for one team; 2 were found"),
     ],
 )
@@ -239,9 +241,9 @@ def test_what_does_not_go_together(
     assert not list(tmp_path.iterdir())
 
 
-def test_patience_with_a_recording(run: tuple[Path, Result]) -> None:
+def test_a_report_timeout_with_a_recording(run: tuple[Path, Result]) -> None:
     folder, _ = run
-    result = solved(HANGAR, "--situation", f"mcap:{folder / 'run.mcap'}", "--patience", "3")
+    result = solved(HANGAR, "--situation", f"mcap:{folder / 'run.mcap'}", "--report-timeout", "3")
     assert result.exit_code == 2
     assert "run.mcap is a recording" in result.stderr
 

@@ -7,7 +7,6 @@ from random import Random
 
 import pytest
 
-from robochoc.communication.host import SettingsError, settings_of
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
@@ -18,6 +17,7 @@ from robochoc.protocols.findings import Trail
 from robochoc.protocols.maxsum import MaxSum
 from robochoc.protocols.mgm import MGM
 from robochoc.protocols.mgm2 import MGM2
+from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.incumbent import best_of
 from robochoc.run.registry import protocol_named

@@ -8,12 +8,12 @@ from random import Random
 import pytest
 
 import robochoc.protocols.dsa
-from robochoc.communication.host import SettingsError, settings_of
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.cycles import Value
 from robochoc.protocols.dsa import DSA, DSASettings
+from robochoc.protocols.settings import SettingsError, settings_of
 from tests.support.agents import replies, value
 from tests.support.cost_problems import random_cost_team
 from tests.support.local_search_runs import (

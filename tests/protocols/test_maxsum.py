@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import robochoc.protocols.maxsum
-from robochoc.communication.host import SettingsError, settings_of
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
@@ -18,6 +17,7 @@ from robochoc.protocols import maxsum_factor
 from robochoc.protocols.cycles import Domain
 from robochoc.protocols.maxsum import MaxSum, MaxSumSettings, Q, R
 from robochoc.protocols.maxsum_factor import Factor
+from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.solver import cost_table
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies, value

@@ -8,13 +8,13 @@ from random import Random
 import pytest
 
 import robochoc.protocols.mgm2
-from robochoc.communication.host import SettingsError, settings_of
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.cycles import Domain, Value
 from robochoc.protocols.mgm import MGM, Gain
 from robochoc.protocols.mgm2 import MGM2, Accept, Go, Offer, Reject
+from robochoc.protocols.settings import SettingsError, settings_of
 from tests.support.agents import replies, value
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.local_search_runs import (

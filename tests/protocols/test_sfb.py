@@ -10,7 +10,6 @@ from random import Random
 import pytest
 
 import robochoc.protocols.sfb
-from robochoc.communication.host import SettingsError, settings_of
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import Received, Sent
@@ -19,6 +18,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.interchangeable import one_by_one
+from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.sfb import LARGEST, SFB, SFBSettings
 from robochoc.protocols.sfb_messages import Above, Below, CPAs, Explored, Solution
 from robochoc.solver.agent_problem import RunParameters

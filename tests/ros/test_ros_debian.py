@@ -208,7 +208,7 @@ def test_reports_reach_us(core: Core, tmp_path: Path) -> None:
 def test_a_report_over_ros_changes_the_problem(core: Core) -> None:
     """A drone says so on a topic of a real ROS, and the others decide without it."""
     words = ["solve", str(ROOT / "docs" / "examples" / "hangar"), "--protocol", "dynabt", "--json"]
-    program = core.program("-m", "robochoc", *words, "--situation", "rospy", "--patience", "10")
+    program = core.program("-m", "robochoc", *words, "--situation", "rospy", "--report-timeout", "10")
     assert until(lambda: "/nose/out_of_order" in core.rostopic("list", "-s").stdout, 60)
     said = core.rostopic("pub", "-1", "/nose/out_of_order", "std_msgs/String", "data: 'motor 2'")
     assert said.returncode == 0

@@ -29,13 +29,14 @@ def robochoc(*words: object, folder: Path | None = None) -> subprocess.Completed
 def robochoc_within(*words: object) -> subprocess.CompletedProcess[str]:
     """Run the program in this process, which takes a twentieth of the time; what it does not catch, the test gets."""
     command = [PROGRAM, *map(str, words)]
-    output, errors = io.StringIO(), io.StringIO()
+    output, errors = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
     with patch.object(sys, "argv", command), redirect_stdout(output), redirect_stderr(errors):
         try:
             status = run()
         except SystemExit as leaving:
             status = leaving.code if isinstance(leaving.code, int) else 1
-    return subprocess.CompletedProcess(command, status, output.getvalue(), errors.getvalue())
+    printed, complaints = (stream.buffer.getvalue().decode() for stream in (output, errors))
+    return subprocess.CompletedProcess(command, status, printed, complaints)
 
 
 def on_a_terminal(*words: object) -> bytes:

@@ -23,7 +23,7 @@ from robochoc.cli.options.solve import (
     withdraw_option,
 )
 from robochoc.cli.reports.failures import LIMIT
-from robochoc.cli.reports.progress import progress_line
+from robochoc.cli.reports.progress import print_above, progress_line
 
 if TYPE_CHECKING:
     from robochoc.communication.network.journal_server import Publication
@@ -121,7 +121,9 @@ def master(
     if given["number"] and team:
         raise click.UsageError("--robots and --team both say who is expected; drop one")
     if team and (team / "scenario.xml").exists():
-        raise click.UsageError(f"{team} has a scenario.xml; across machines problems do not change")
+        from robochoc.run.compatibility import scenario_refusal
+
+        raise click.UsageError(scenario_refusal(team, "robochoc master"))
     for option in ("gather_s", "timeout"):
         if given[option] is not None and not given[option] > 0:
             raise click.UsageError(f"--{option.removesuffix('_s')} takes a number of seconds, more than 0")
@@ -196,7 +198,7 @@ def _led(plan: Plan, recorder: JournalRecorder | None, publication: Publication 
                 recorder(event)
 
         def listening() -> None:
-            click.echo(f"listening at {plan.place}; robots say: --master {_address(plan.place)}", err=True)
+            print_above(f"listening at {plan.place}; start robots with --master {_address(plan.place)}")
 
         def concluded(outcome: Outcome | None) -> None:
             if recorder:
@@ -252,7 +254,7 @@ def _tell_event(event: AnyEvent) -> None:
             line = f"refused: {who}, {what}: {why}"
         case _:
             return
-    click.echo(on_one_line(line), err=True)
+    print_above(on_one_line(line))
 
 
 def _address(place: Address) -> str:

@@ -10,16 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.channel import CHANNEL_NAME, channel_for
+from robochoc.cli.options.channel import CHANNEL_NAME
 from robochoc.cli.options.channel import NAMES as CHANNELS
-from robochoc.cli.options.local_problems import limits, local_options
+from robochoc.cli.options.local_problems import local_options
 from robochoc.cli.options.order import GIVEN, ORDER_NAME, order_for
 from robochoc.cli.options.order import NAMES as ORDERS
 from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import TeamFolder, refuse_same_places, teams_at
 from robochoc.cli.options.recording import journal_option, recording, shown_and_flushed
 from robochoc.cli.options.ros import (
-    check_ros_options,
     flight_options,
     ros_options,
     situation_options,
@@ -31,11 +30,11 @@ from robochoc.cli.options.solve import (
     Products,
     SolveCommand,
     Wanted,
-    check_settings,
+    check_products,
     filter_option,
     messages_option,
+    options_of,
     protocol_option,
-    protocol_settings,
     settings_option,
     withdraw_option,
 )
@@ -64,7 +63,7 @@ _SECTIONS: Sections = {
     "Messages on their way": ("--schedule", "--delay", "--channel", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
     "Output": ("--explain", "--serve", "--open"),
-    "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale", "--situation", "--battery"),
+    "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale", "--situation", "--report-timeout", "--battery"),
     "Simulated flight (--situation flight)": ("--fail", "--distance", "--wind", "--gusts", "--obstacle"),
 }  # fmt: skip
 
@@ -170,7 +169,7 @@ def solve(
     journal: Path | None,
     serve: bool,
     explain: bool,
-    **settings: Any,  # noqa: ANN401 - the options of `robochoc.run.orchestrator.Options`, by their names
+    **settings: Any,  # noqa: ANN401 - the other options
 ) -> None:
     """Solve all teams in the folders PATH and below; every solution is checked against all constraints.
 
@@ -178,49 +177,17 @@ def solve(
     robochoc solve instances/queens3d-4 --withdraw --html out/page.html
     robochoc solve instances/ --runtime simulator --protocol dpop --json
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
-
     ros = take_ros_options(settings)
-    check_settings(settings)
-    check_ros_options(ros, settings)
-    if explain and as_json:
-        raise click.UsageError("--explain is for people; the JSON result has the tree without it")
-    withdraw = settings.pop("withdraw")
-    protocol = settings.pop("protocol")
-    on_loss = settings.pop("on_loss") or ("withdraw" if settings["spares"] else "fail")
-    order = settings.pop("order")
-    named = {"--order": order, "--channel": settings["channel"]}
+    named = {"--order": settings["order"], "--channel": settings["channel"]}
     given = {option: value for option, value in named.items() if isinstance(value, Path)}
-    watched = watching(settings.pop("sniff"), open_browser=settings.pop("open_browser"))
-    with failures_told("--channel"):
-        channel = channel_for(settings.pop("channel"))
-    options = Options(
-        local=limits(
-            settings.pop("local_solutions"), settings.pop("local_timeout"), always_ace=settings.pop("always_ace")
-        ),
-        cache=not settings.pop("no_cache"),
-        settings=protocol_settings(settings.pop("settings_given")),
-        runtime=Runtime(settings.pop("runtime")),
-        schedule=ScheduleName(settings.pop("schedule")),
-        withdraw=Withdrawal(withdraw) if withdraw else None,
-        on_loss=OnLoss(on_loss),
-        channel=channel,
-        **settings,
-    )
+    options = options_of(settings, environment=bool(ros.situation))
+    wanted = Wanted(settings["protocol"], settings["order"], as_json=as_json, explain=explain, ros=ros)
+    products = Products(html, journal, serve, watching(settings["sniff"], open_browser=settings["open_browser"]))
     folders = teams_at(paths)
     refuse_same_places(
         {"--html": html, "--journal": journal}, given, teams=folders, sinks=ros.sinks, situation=ros.situation
     )
-    products = Products(html, journal, serve, watched)
-    if settings["count"] and products:
-        raise click.UsageError("--count gives a number: there is nothing for --html, --journal, --serve or --sniff")
-    if serve and products.watching:
-        raise click.UsageError("--serve and --sniff both stay until Ctrl-C; the page of --sniff shows the scene, too")
-    if ros and len(folders) > 1:
-        raise click.UsageError(f"--ros and --situation are for one team; {len(folders)} were found")
-    if products and len(folders) > 1:
-        raise click.UsageError(f"--html, --journal, --serve and --sniff are for one team; {len(folders)} were found")
-    wanted = Wanted(protocol, order, as_json=as_json, explain=explain, ros=ros)
+    check_products(products, wanted, options, teams=len(folders))
     context.exit(worst([_solve_one(folder, options, products, wanted) for folder in folders]))
 
 

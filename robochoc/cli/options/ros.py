@@ -81,9 +81,15 @@ situation_options = _optional(
         type=Finite(0, min_open=True),
         metavar="SECONDS",
         help=(
-            "A robot is lost after not answering for this long.  [default: no limit; on a network 10]  With"
-            " --situation: how long to wait for reports after each decision.  [default: 10]"
+            "A robot is lost after its process was stopped (on a network: out of reach) for this long.  [default: no"
+            " limit; on a network 10]"
         ),
+    ),
+    click.option(
+        "--report-timeout",
+        type=Finite(0, min_open=True),
+        metavar="SECONDS",
+        help="With --situation: how long to wait for a report after each decision.  [default: 10]",
     ),
     click.option(
         "--battery",
@@ -100,11 +106,11 @@ situation_options = _optional(
         help="An obstacle, in the problem's units. Repeatable.",
     ),
 )
-"""`--situation`, `--patience`, `--battery`, `--obstacle`."""
+"""`--situation`, `--patience`, `--report-timeout`, `--battery`, `--obstacle`."""
 
 CONDITIONS = {"failures": "--fail", "distance": "--distance", "wind": "--wind", "gusts": "--gusts"}
 _SIMULATED = {**CONDITIONS, "obstacles": "--obstacle"}
-_FROM_REPORTS = {"battery": "--battery"}
+_FROM_REPORTS = {"battery": "--battery", "report_timeout": "--report-timeout"}
 IN_FRAME = {"frame": "--frame", "scale": "--scale"}
 NOT_PUBLISHED = "is for what is published: add --ros SINK"
 
@@ -120,7 +126,7 @@ class RosOptions:
     situation: str | None
     frame: str
     scale: float | None
-    patience: float | None
+    report_timeout: float | None
     battery: float | None
     flight: Mapping[str, Any]
 
@@ -132,19 +138,16 @@ def take_ros_options(settings: dict[str, Any]) -> RosOptions:
     """Take the options of this file out of `settings`. Raises `click.UsageError` for one that would be ignored."""
     sinks, situation = settings.pop("sinks"), settings.pop("situation")
     given = {name: settings.pop(name) for name in (*_SIMULATED, *_FROM_REPORTS, *IN_FRAME)}
-    patience = settings["patience"]
     asked = {name for name, value in given.items() if value not in (None, ())}
     if situation != FLIGHT:
         refuse(_SIMULATED, asked, "is for the simulated flight: add --situation flight")
     if situation in {None, FLIGHT}:
         refuse(_FROM_REPORTS, asked, "is for robots that report: add --situation mcap:FILE, or another source")
-        if patience is not None and (settings["runtime"] == "simulator" or settings["protocol"] == "central"):
-            raise click.UsageError("--patience is for robots with processes, and for those that report")
     if not (sinks or situation):
         refuse(IN_FRAME, asked, NOT_PUBLISHED)
     flight = {name: given[name] for name in _SIMULATED if name in asked}
     frame = given["frame"] or FRAME
-    return RosOptions(sinks, situation, frame, given["scale"], patience, given["battery"], flight)
+    return RosOptions(sinks, situation, frame, given["scale"], given["report_timeout"], given["battery"], flight)
 
 
 def refuse(options: Mapping[str, str], asked: set[str], why: str) -> None:
@@ -152,20 +155,3 @@ def refuse(options: Mapping[str, str], asked: set[str], why: str) -> None:
     for name, option in options.items():
         if name in asked:
             raise click.UsageError(f"{option} {why}")
-
-
-def check_ros_options(ros: RosOptions, settings: Mapping[str, Any]) -> None:
-    """Raise `click.UsageError` for what does not go together with `settings`, the options of `robochoc solve`."""
-    if settings["count"] and ros:
-        raise click.UsageError("--count gives a number: there is nothing for --ros, and nothing that could change")
-    if not ros.situation:
-        return
-    asked = {
-        "--withdraw": settings["withdraw"],
-        "--runtime network": settings["runtime"] == "network",
-        "--protocol central": settings["protocol"] == "central",
-    }
-    for option in (name for name, value in asked.items() if value):
-        raise click.UsageError(
-            f"--situation changes the problem while robots solve it; {option} cannot go on with that"
-        )

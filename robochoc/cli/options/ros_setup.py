@@ -119,9 +119,9 @@ def _feedback(ros: RosOptions, drones: Sequence[Drone], seed: int, stack: ExitSt
     from robochoc.ros.source_feedback import PATIENCE_S, SourceFeedback
 
     source = stack.enter_context(open_source(ros.situation or ""))
-    if ros.patience is not None and not source.live:
-        raise click.UsageError(f"--patience is for a live source; {ros.situation} is a recording")
-    return SourceFeedback(source, ReportDecoder(drones, ros.frame), ros.patience or PATIENCE_S)
+    if ros.report_timeout is not None and not source.live:
+        raise click.UsageError(f"--report-timeout is for a live source; {ros.situation} is a recording")
+    return SourceFeedback(source, ReportDecoder(drones, ros.frame), ros.report_timeout or PATIENCE_S)
 
 
 @contextmanager

@@ -6,16 +6,22 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from robochoc.cli.options.channel import channel_for
+from robochoc.cli.options.local_problems import limits
 from robochoc.cli.options.names import ProtocolName
 from robochoc.cli.options.order import GIVEN
 from robochoc.cli.options.ros import RosOptions
 from robochoc.cli.options.sections import SectionedCommand
+from robochoc.cli.reports.failures import failures_told
 from robochoc.cli.reports.live_sniffer import Watching
 from robochoc.run.defaults import MINIMISES, SATISFIES
+
+if TYPE_CHECKING:
+    from robochoc.run.options import Options
 
 Command = TypeVar("Command", bound=Callable[..., object])
 WITHDRAWALS = ("minimum", "maximal")
@@ -70,6 +76,10 @@ filter_option = click.option(
     metavar="NAME",
     help="Network: pass all messages through this filter: signed, sealed or an installed one. Repeatable, in order.",
 )
+
+
+_SAME_NAMES = ("seed", "timeout", "delay", "count", "verify", "messages", "spares", "patience", "filters")
+"""Arguments of `robochoc solve` that are called as in `robochoc.run.Options`."""
 
 
 class SolveCommand(SectionedCommand):
@@ -151,55 +161,58 @@ def protocol_settings(given: Iterable[str]) -> dict[str, str]:
     return found
 
 
-def check_settings(settings: dict[str, Any]) -> None:
-    """Options that would be ignored are wrong usage."""
-    _check_simulated(settings)
-    if settings["timeout"] is not None and not settings["timeout"] > 0:
+def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
+    """Take the options of a run out of the arguments of `robochoc solve`.
+
+    Args:
+        arguments: the command's arguments; those that are used are taken out, but for protocol and order.
+        environment: whether the robots' situation changes the problem.
+
+    Raises:
+        click.UsageError: for options that do not go together (`robochoc.run.compatibility`).
+        Failure: for a channel that cannot be read.
+    """
+    from robochoc.run.compatibility import refuse_options
+    from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
+    from robochoc.solver.encoding import UnsupportedError
+
+    if arguments["timeout"] is not None and not arguments["timeout"] > 0:
         raise click.UsageError("--timeout takes a number of seconds")
-    if settings["protocol"] == "central":
-        _check_central(settings)
-    elif settings["count"]:
-        raise click.UsageError("--count is for --protocol central")
-    _check_processes(settings)
+    with failures_told("--channel"):
+        channel = channel_for(arguments.pop("channel"))
+    withdraw, on_loss = arguments.pop("withdraw"), arguments.pop("on_loss")
+    options = Options(
+        protocol=arguments["protocol"] or SATISFIES,
+        order=None if arguments["order"] == GIVEN else (),  # which one, each team's robots say
+        local=limits(
+            arguments.pop("local_solutions"), arguments.pop("local_timeout"), always_ace=arguments.pop("always_ace")
+        ),
+        cache=not arguments.pop("no_cache"),
+        settings=protocol_settings(arguments.pop("settings_given")),
+        runtime=Runtime(arguments.pop("runtime")),
+        schedule=ScheduleName(arguments.pop("schedule")),
+        withdraw=Withdrawal(withdraw) if withdraw else None,
+        on_loss=OnLoss(on_loss) if on_loss else None,
+        channel=channel,
+        **{name: arguments.pop(name) for name in _SAME_NAMES},
+    )
+    try:
+        refuse_options(options, environment=environment)
+    except UnsupportedError as refused:
+        raise click.UsageError(str(refused)) from None
+    return options
 
 
-def _check_simulated(settings: dict[str, Any]) -> None:
-    """How long messages take is for the simulator alone, and to be said in one way."""
-    simulated = settings["runtime"] == "simulator"
-    scheduled = settings["delay"] or settings["schedule"] != "concurrent"
-    if settings["channel"] and not simulated:
-        raise click.UsageError("--channel is the simulator's; add --runtime simulator")
-    if settings["channel"] and scheduled:
-        raise click.UsageError("--channel says how long messages take; drop --delay and --schedule random")
-    if scheduled and not simulated:
-        raise click.UsageError("--delay and --schedule are the simulator's; add --runtime simulator")
-    if settings["delay"] and settings["schedule"] != "concurrent":
-        raise click.UsageError("--delay is for --schedule concurrent: in a random one any message may take any time")
-
-
-def _check_processes(settings: dict[str, Any]) -> None:
-    """What only robots with processes can do, or only those on a network."""
-    runtime = settings["runtime"]
-    if settings["filters"] and runtime != "network":
-        raise click.UsageError("--filter is for messages that cross a network; add --runtime network")
-    if settings["spares"] and runtime == "network":
-        raise click.UsageError("--spare starts processes of this machine again; drop --runtime network")
-    if (settings["on_loss"] or settings["spares"]) and runtime == "simulator":
-        raise click.UsageError(
-            "--on-loss and --spare are for processes, which can die; drop --runtime simulator, or write a scenario.xml"
-        )
-    if settings["spares"] and settings["on_loss"] == "fail":
-        raise click.UsageError("--spare brings robots back that died; --on-loss fail ends the run instead")
-
-
-def _check_central(settings: dict[str, Any]) -> None:
-    """There are no robots, and no second opinion."""
-    if settings["verify"]:
-        raise click.UsageError("--verify asks the central judge, which is --protocol central itself")
-    asked = {name: settings[name] for name in ("messages", "on_loss", "spares", "channel", "filters")}
-    asked["order"] = settings["order"] != GIVEN
-    asked["set"] = settings["settings_given"]
-    for name, value in asked.items():
-        if value:
-            option = "--" + name.removesuffix("s" if name in {"spares", "filters"} else "").replace("_", "-")
-            raise click.UsageError(f"{option} is for robots that solve it together, not for --protocol central")
+def check_products(products: Products, wanted: Wanted, options: Options, *, teams: int) -> None:
+    """Raise `click.UsageError` for products that nothing comes of, or that are for one team."""
+    if wanted.explain and wanted.as_json:
+        raise click.UsageError("--explain is for people; the JSON result has the tree without it")
+    if options.count and (products or wanted.ros):
+        nothing = "--ros" if wanted.ros else "--html, --journal, --serve or --sniff"
+        raise click.UsageError(f"--count gives a number: there is nothing for {nothing}")
+    if products.serve and products.watching:
+        raise click.UsageError("--serve and --sniff both stay until Ctrl-C; the page of --sniff shows the scene, too")
+    if wanted.ros and teams > 1:
+        raise click.UsageError(f"--ros and --situation are for one team; {teams} were found")
+    if products and teams > 1:
+        raise click.UsageError(f"--html, --journal, --serve and --sniff are for one team; {teams} were found")

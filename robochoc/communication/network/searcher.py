@@ -37,12 +37,11 @@ from robochoc.model.outcome import Metrics
 from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind
 from robochoc.protocols.findings import NOTHING, Findings
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.requirements import unmet_requirement
 from robochoc.solver.agent_problem import AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.explanation import KeyedConstraint, held_above
-
-PAIR = 2
 
 
 @dataclass(frozen=True)
@@ -127,17 +126,11 @@ class Searcher(RobotLoop):
     def _refuse_unfit(self, owners: Mapping[str, str]) -> None:
         """Raise `UnsupportedError` where the own file asks for more than the protocol can do."""
         robot, traits = self._robot, self._protocol.traits
-        refused = f", which {self._task.protocol} does not support"
+        unmet = unmet_requirement(robot, traits, owners)
         if robot.kind is ProblemKind.DISWCSP and not traits.costs:
-            raise UnsupportedError(f"{robot.name} is part of a DisWCSP{refused}")
-        parts = [part for child in robot.children for part in child.constraints]
-        for constraint in (*robot.shared, *parts):
-            if constraint.model is ConstraintModel.PKC and not traits.partially_known:
-                raise UnsupportedError(
-                    f"{robot.name} shares a partially known constraint (PKC, {constraint.name}){refused}"
-                )
-            if not traits.n_ary and len({owners.get(variable) for variable in constraint.variables}) > PAIR:
-                raise UnsupportedError(f"{robot.name} holds a constraint over more than two robots{refused}")
+            unmet = f"{robot.name} is part of a DisWCSP"
+        if unmet:
+            raise UnsupportedError(f"{unmet}, which {self._task.protocol} does not support")
 
     def learn(self, sender: str, content: bytes) -> None:
         """Take in constraints of `sender` over variables of this robot. Raises `UnsupportedError`."""

@@ -15,7 +15,6 @@ from typing import NamedTuple
 from robochoc.authority.authority import Authority
 from robochoc.authority.enrolment_server import EnrolmentServer
 from robochoc.authority.identity import Identity
-from robochoc.communication.host import SettingsError, settings_of
 from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
@@ -25,6 +24,7 @@ from robochoc.communication.run_result import Progress, RobotsLostError
 from robochoc.journal.events import Observer
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
+from robochoc.run.compatibility import refuse_options, refuse_settings, refuse_unfit
 from robochoc.run.defaults import MINIMISES, SATISFIES, default_protocol
 from robochoc.run.distributed import solve_distributed
 from robochoc.run.networked.address import LOOPBACK, Address
@@ -107,7 +107,7 @@ def lead(
     Raises `AuthorityError`, `HostNameError`, `RouterError`, `TeamIncompleteError`, `RobotsLostError`,
     `UnsupportedError`, `UnknownProtocolError`, `RefutedError`.
     """
-    _check_settings_early(plan)
+    _refuse_early(plan)
     authority = Authority.open(plan.authority)
     hosts = [*([] if plan.place.anywhere else [plan.place.host]), *plan.hosts]
     called = [host for host in hosts if ":" not in host]
@@ -161,30 +161,27 @@ def _solve(plan: Plan, master: Master, observer: Observer | None) -> Led:
     if not master.gather(None if plan.gather_s is None else time.monotonic() + plan.gather_s):
         names = listed(sorted(master.members.awaited)) or "more robots"
         raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; awaited: {names}")
-    protocol = plan.protocol or default_protocol(team_of(master, plan.name).kind)
-    _check_settings(protocol, plan.settings)
-    machines = Machines(master, plan.options(protocol), plan.name, observer)
-    header = Outcome(plan.name, protocol, Runtime.NETWORK, plan.seed, Verdict.UNKNOWN)
-    outcome = claimed(solve_distributed(machines, protocol_by_name(protocol), header))
+    team = team_of(master, plan.name)
+    name = plan.protocol or default_protocol(team.kind)
+    options, protocol = plan.options(name), protocol_by_name(name)
+    refuse_settings(name, protocol, options.settings)
+    refuse_unfit(team, options, protocol.traits)
+    machines = Machines(master, options, plan.name, observer)
+    header = Outcome(plan.name, name, Runtime.NETWORK, plan.seed, Verdict.UNKNOWN)
+    outcome = claimed(solve_distributed(machines, protocol, header))
     return Led(outcome, machines.team_seen())
 
 
-def _check_settings_early(plan: Plan) -> None:
-    """Before anybody comes: do not have a team gather for settings that no protocol of this plan has."""
-    if plan.protocol:
-        _check_settings(plan.protocol, plan.settings)
-        return
+def _refuse_early(plan: Plan) -> None:
+    """Refuse what can be refused before any robot has come. Raises `UnsupportedError`."""
+    refuse_options(plan.options(plan.protocol or SATISFIES))
     try:
-        _check_settings(SATISFIES, plan.settings)
+        name = plan.protocol or SATISFIES
+        refuse_settings(name, protocol_by_name(name), plan.settings)
     except UnsupportedError:
-        _check_settings(MINIMISES, plan.settings)
-
-
-def _check_settings(protocol: str, settings: Mapping[str, str]) -> None:
-    try:
-        settings_of(protocol_by_name(protocol), settings)
-    except SettingsError as wrong:
-        raise UnsupportedError(f"--set: {wrong} (protocol {protocol})") from None
+        if plan.protocol:
+            raise
+        refuse_settings(MINIMISES, protocol_by_name(MINIMISES), plan.settings)
 
 
 def _in_words(outcome: Outcome) -> str:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
+from robochoc.communication.simulator.channel import CHANNELS
 from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind, Relation, Semantics, Team
-from robochoc.run import compatibility as refusals
-from robochoc.run import solve
-from robochoc.run.options import Options, Runtime, Withdrawal
+from robochoc.run import alternatives, solve
+from robochoc.run.compatibility import refuse_options
+from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.run.registry import Offer, offers
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.exact_costs import EXACT
@@ -71,7 +73,7 @@ def test_what_both_refuse_is_told_of_by_both(monkeypatch: pytest.MonkeyPatch) ->
     def only_with_tables() -> list[Offer]:
         return [offer for offer in offers() if offer.name in {"dpop", "sfb"}]
 
-    monkeypatch.setattr(refusals, "offers", only_with_tables)
+    monkeypatch.setattr(alternatives, "offers", only_with_tables)
     for name in ("dpop", "sfb"):
         assert refused(dear(EXACT), options_for(name)).endswith(
             "; no protocol that is installed does (scale the costs down)"
@@ -99,3 +101,35 @@ def test_where_no_protocol_does_the_judge_may() -> None:
         said = refused(team, Options(protocol=asked))
         assert said.endswith("; no protocol does, but the central judge (--protocol central)")
     assert "central" not in refused(partly_known(2**31), Options(protocol="sfb"))
+
+
+WLAN = CHANNELS["wlan"]
+REFUSED_OPTIONS: list[tuple[dict[str, Any], str]] = [
+    ({"channel": WLAN, "runtime": Runtime.PROCESSES}, "add --runtime simulator"),
+    ({"channel": WLAN, "delay": 3}, "drop --delay and --schedule random"),
+    ({"delay": 3, "runtime": Runtime.PROCESSES}, "--delay and --schedule are the simulator's"),
+    ({"delay": 3, "schedule": ScheduleName.RANDOM}, "--delay is for --schedule concurrent"),
+    ({"protocol": "central", "verify": True}, "--verify asks the central solver"),
+    ({"patience": 1.0}, "--patience is for robots with processes"),
+    ({"protocol": "central", "messages": 5}, "--messages is for robots"),
+    ({"protocol": "central", "order": ("RA", "RB")}, "--order is for robots"),
+    ({"protocol": "central", "settings": {"cycles": "5"}}, "--set is for robots"),
+    ({"protocol": "central", "withdraw": Withdrawal.MAXIMAL}, "finds a minimum; --withdraw minimum"),
+    ({"count": True}, "--count is for --protocol central"),
+    ({"protocol": "central", "count": True, "withdraw": Withdrawal.MINIMUM}, "who can do without"),
+    ({"filters": ("signed",)}, "add --runtime network"),
+    ({"spares": 1, "runtime": Runtime.NETWORK}, "drop --runtime network"),
+    ({"on_loss": OnLoss.WITHDRAW}, "for processes, which can die"),
+    ({"spares": 1, "on_loss": OnLoss.FAIL, "runtime": Runtime.PROCESSES}, "--on-loss fail ends the run instead"),
+]
+
+
+@pytest.mark.parametrize(("options", "said"), REFUSED_OPTIONS, ids=[said for _, said in REFUSED_OPTIONS])
+def test_options_that_do_not_go_together_are_refused_in_python_too(options: dict[str, Any], said: str) -> None:
+    assert said in refused(dear(3), Options(**{"protocol": "sfb", "runtime": Runtime.SIMULATOR, **options}))
+
+
+def test_no_rule_refuses_the_defaults() -> None:
+    for runtime in Runtime:
+        refuse_options(Options(runtime=runtime), environment=runtime is not Runtime.NETWORK)
+    refuse_options(Options(protocol="central", count=True))

@@ -70,5 +70,5 @@ def test_judge_and_checker_see_the_files(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(CentralSolver, "judge", judged)
     assert solve(team, replace(SIMULATED, order=Order.DFS, verify=True)).verified
-    solve(team, replace(SIMULATED, order=Order.RANDOM, seed=1, protocol="central"))
+    solve(team, replace(SIMULATED, seed=1, protocol="central"))
     assert [one is team for one in seen] == [True, True]

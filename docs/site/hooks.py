@@ -1,0 +1,171 @@
+"""Pages of the site that are generated, and links that leave the folder of the documentation.
+
+MkDocs calls the functions whose names begin with `on_` (https://www.mkdocs.org/user-guide/configuration/#hooks). A page
+per protocol is made from the protocol's class and docstring, so a protocol that is installed has one; each example
+team gets a page with its files; the results of the benchmarks and the list of changes are taken as they are.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from msgspec import Struct
+
+from robochoc.model.message import Message
+from robochoc.run.registry import offers
+
+if TYPE_CHECKING:
+    from mkdocs.config.defaults import MkDocsConfig
+    from mkdocs.structure.files import Files
+    from mkdocs.structure.pages import Page
+
+    from robochoc.protocols.protocol import Protocol
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+LANGUAGES = {".xml": "xml", ".py": "python", ".toml": "toml"}
+PROTOCOLS = "reference/protocols/index.md"
+MOVED = {"benchmarks/RESULTS.md": "reference/results.md", "CHANGELOG.md": "reference/changes.md"}
+"""Files of the repository that are pages of the site, under these names."""
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Put the protocols' and the examples' pages into the navigation, beside their lists."""
+    protocols = [{Path(name).stem: name} for name in sorted({*protocol_pages()} - {PROTOCOLS})]
+    for section in config.nav or []:
+        for pages in section.values():
+            if isinstance(pages, list) and PROTOCOLS in pages:
+                pages[pages.index(PROTOCOLS)] = {"Protocols": [PROTOCOLS, *protocols]}
+                pages.append({"Examples": [*example_pages()]})
+    return config
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the generated pages, and the pictures of the benchmarks."""
+    from mkdocs.structure.files import File  # noqa: PLC0415 - this module is also read where MkDocs is not installed
+
+    pages = {**protocol_pages(), **example_pages()}
+    pages |= {name: with_links((ROOT / path).read_text(), path, name) for path, name in MOVED.items()}
+    for name, text in pages.items():
+        files.append(File.generated(config, name, content=text))
+    for picture in (ROOT / "benchmarks" / "plots").glob("*.svg"):
+        files.append(File.generated(config, f"reference/plots/{picture.name}", abs_src_path=str(picture)))
+    return files
+
+
+def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Return the page's text, its links to files outside of the site's source changed to their pages."""
+    del config, files
+    return with_links(markdown, f"docs/{page.file.src_uri}", page.file.src_uri)
+
+
+def with_links(text: str, path: str, name: str) -> str:
+    """Return `text`, the file `path` of the repository, with links as they have to be on the page `name`."""
+
+    def link(found: re.Match[str]) -> str:
+        target, hash_, anchor = found["target"].partition("#")
+        if not target or ":" in target:
+            return found[0]
+        to = page_of(os.path.normpath(os.path.join(os.path.dirname(path), target)))  # noqa: PTH118, PTH120 - not files
+        return f"]({os.path.relpath(to, os.path.dirname(name) or '.')}{hash_}{anchor})"  # noqa: PTH120
+
+    return re.sub(r"\]\((?P<target>[^)\s]+)\)", link, text)
+
+
+def page_of(path: str) -> str:
+    """Return the name of the site's page for a file or folder of the repository."""
+    if path in MOVED:
+        return MOVED[path]
+    if path.startswith("benchmarks/plots/"):
+        return path.replace("benchmarks", "reference", 1)
+    if re.fullmatch(r"docs/examples/[a-z]+", path):
+        return f"{path.removeprefix('docs/')}/index.md"
+    return path.removeprefix("docs/")
+
+
+# Protocols
+
+
+def protocol_pages() -> dict[str, str]:
+    """Return the text of the protocols' pages and of their list, by the pages' names."""
+    protocols = {offer.name: offer.protocol for offer in offers() if offer.protocol}
+    pages = {f"reference/protocols/{name}.md": protocol_page(name, kind) for name, kind in protocols.items()}
+    rows = [
+        f"| [`{name}`]({name}.md) | {title(kind)} | {purpose(kind)} | {kind.traits.paper} |"
+        for name, kind in protocols.items()
+    ]
+    listing = [
+        "# Protocols",
+        "",
+        "One page per protocol, from its docstring. See also [which protocol when](../../guides/which-protocol.md).",
+        "",
+        "| name | | for | paper |",
+        "| --- | --- | --- | --- |",
+        *rows,
+    ]
+    return {**pages, PROTOCOLS: "\n".join(listing)}
+
+
+def protocol_page(name: str, kind: type[Protocol]) -> str:
+    """Return the page of one protocol: its traits, its docstring, its settings and its messages."""
+    traits = kind.traits
+    facts = {
+        "name": f"`--protocol {name}`",
+        "for": purpose(kind),
+        "complete": "yes" if traits.complete else "no: it ends with a good answer, and proves nothing",
+        "constraints": ", ".join(["n-ary" if traits.n_ary else "binary", *["PKC"] * traits.partially_known]),
+        "problems that change": "goes on with what still holds" if traits.dynamic else "begins anew",
+        "hides": traits.privacy or "nothing",
+        "paper": traits.paper,
+    }
+    table = "\n".join(f"| {key} | {value} |" for key, value in facts.items())
+    listed = [
+        f"::: {item.__module__}.{item.__qualname__}\n    options: {{heading_level: 3}}\n" for item in structs(kind)
+    ]
+    whole = "{members: false, show_root_heading: false, show_root_toc_entry: false}"
+    parts = [
+        f"# {title(kind)}\n\n| | |\n| --- | --- |\n{table}\n",
+        f"::: {kind.__module__}\n    options: {whole}\n",
+        *(["## Messages and settings\n", *listed] if listed else []),
+    ]
+    return "\n".join(parts)
+
+
+def title(kind: type[Protocol]) -> str:
+    """Return the first line of the docstring of a protocol's module, which is its full name."""
+    module = inspect.getmodule(kind)
+    return (inspect.getdoc(module) or kind.__name__).splitlines()[0].rstrip(".")
+
+
+def purpose(kind: type[Protocol]) -> str:
+    """Return what a protocol is for, in a word."""
+    return "minimising costs" if kind.traits.costs else "satisfaction"
+
+
+def structs(kind: type[Protocol]) -> Iterator[type[Struct]]:
+    """Yield the messages and the settings that a protocol's module defines, in its order."""
+    for item in vars(inspect.getmodule(kind)).values():
+        own = isinstance(item, type) and issubclass(item, Struct) and item.__module__ == kind.__module__
+        if own and (issubclass(item, Message) or item.__name__.endswith("Settings")):
+            yield item
+
+
+# Examples
+
+
+def example_pages() -> dict[str, str]:
+    """Return a page for each example, with all its files."""
+    return {f"examples/{folder.name}/index.md": example_page(folder) for folder in sorted(DOCS.glob("examples/*"))}
+
+
+def example_page(folder: Path) -> str:
+    """Return the page of one example."""
+    sources = sorted(path for path in folder.rglob("*") if path.suffix in LANGUAGES and "__pycache__" not in path.parts)
+    shown = [f"## {path.relative_to(folder)}\n\n```{LANGUAGES[path.suffix]}\n{path.read_text().rstrip()}\n```\n"
+             for path in sources]  # fmt: skip
+    return f"# Example: {folder.name}\n\nThe files of `docs/examples/{folder.name}/`.\n\n" + "\n".join(shown)

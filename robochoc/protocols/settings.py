@@ -1,0 +1,27 @@
+"""The settings of a protocol, as text: which ones there are, and whether they have values that it accepts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import msgspec
+
+from robochoc.protocols.protocol import Protocol, Settings
+
+
+class SettingsError(ValueError):
+    """A setting that the protocol does not have, or a value that it does not accept."""
+
+
+def settings_of(protocol: type[Protocol], given: Mapping[str, str]) -> Settings:
+    """Return the settings of `protocol`: its defaults, and those that are `given` instead. Raises `SettingsError`."""
+    known = type(protocol.settings)
+    names = [field.name for field in msgspec.structs.fields(known)]
+    for name in given:
+        if name not in names:
+            there = f"it has {', '.join(names)}" if names else "it has no settings"
+            raise SettingsError(f"{name!r} is no setting of this protocol: {there}")
+    try:
+        return msgspec.convert(dict(given), known, strict=False)
+    except msgspec.ValidationError as error:
+        raise SettingsError(str(error)) from None

@@ -1,0 +1,1 @@
+"""Tests of the documentation: its commands and code, its links, its site."""

@@ -1,0 +1,56 @@
+"""Links of the pages, as files of the repository: what they name is there, and so is the heading."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.support.program import ROOT
+
+PAGES = sorted(
+    path
+    for folder in (ROOT / "docs", ROOT / "benchmarks")
+    for path in (*folder.rglob("*.md"), *(ROOT.glob("*.md") if folder.name == "docs" else ()))
+    if "examples" not in path.parts
+)
+GENERATED = re.compile(r"docs/reference/protocols/[a-z-]+\.md")
+"""Pages that only the site has: docs/site/hooks.py."""
+
+
+def links_of(page: Path) -> list[str]:
+    """Return the targets of a page's links, those in code left out."""
+    text = re.sub(r"^ *```.*?^ *```$|`[^`\n]*`", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    return re.findall(r"\]\(([^)\s]+)\)", text)
+
+
+def anchors_of(page: Path) -> set[str]:
+    """Return the anchors of a page's headings, as MkDocs and code hosts make them."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    plain = (re.sub(r"[`*]|\]\([^)]*\)|\[", "", heading) for heading in re.findall(r"^#+ +(.*)$", text, re.MULTILINE))
+    return {re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", heading.strip().lower())) for heading in plain}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_to_what_is_there(page: Path) -> None:
+    for link in links_of(page):
+        target, _, anchor = link.partition("#")
+        if re.match(r"[a-z]+:", target):
+            continue
+        there = (page.parent / target).resolve() if target else page
+        if GENERATED.fullmatch(str(there.relative_to(ROOT))):
+            continue
+        assert there.exists(), f"{link}: no such file"
+        assert not anchor or anchor in anchors_of(there), f"{link}: no such heading"
+
+
+def test_there_are_links() -> None:
+    assert sum(len(links_of(page)) for page in PAGES) > 100
+
+
+def test_every_page_of_the_navigation_is_there_and_every_page_is_in_it() -> None:
+    named = {*re.findall(r"^ +- (?:\w+: )?([\w/-]+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE)}
+    only_there = {"reference/protocols/index.md", "reference/results.md", "reference/changes.md"}
+    pages = {str(page.relative_to(ROOT / "docs")) for page in PAGES if page.is_relative_to(ROOT / "docs")}
+    assert named - only_there == pages
