@@ -103,6 +103,8 @@ def _solve_distributed(team: Team, context: RunContext, environment: Environment
         raise UnsupportedError(f"{refused}{alternatives(team, options, complete=True, costs=True)}") from None
     except (TooManySolutionsError, CompileTimeoutError, OutOfTimeError) as limit:
         return deployment.outcome(header, deployment.limit_reached(str(limit)))
+    finally:
+        context.kills.warn_of_pending()
 
 
 def _header(team: Team, options: Options) -> Outcome:

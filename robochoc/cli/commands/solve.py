@@ -32,6 +32,7 @@ from robochoc.cli.options.solve import (
     Wanted,
     check_products,
     filter_option,
+    kill_option,
     messages_option,
     options_of,
     protocol_option,
@@ -59,7 +60,7 @@ _SECTIONS: Sections = {
         "--json", "--html", "--journal", "--sniff", "--help",
     ),
     "Search": ("--order", "--set", "--messages", "--count"),
-    "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience"),
+    "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
     "Messages on their way": ("--schedule", "--delay", "--channel", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
     "Output": ("--explain", "--serve", "--open"),
@@ -140,6 +141,7 @@ _SECTIONS: Sections = {
     metavar="[=N]",
     help="Restart up to N lost robots (1 without a number). Implies --on-loss withdraw.",
 )
+@kill_option
 @filter_option
 @click.option("--explain", is_flag=True, help="Print the pseudo-tree, if the robots have built one.")
 @click.option("--count", is_flag=True, help="With --protocol central: count all solutions.")

@@ -166,6 +166,11 @@ class LocalNetwork(Session):
                 self._end_processes()
                 self._master.__exit__(None, None, None)
 
+    def kill(self, name: str) -> None:
+        """Kill the robot's process, if it has one."""
+        if name in self._processes:
+            self._processes[name].kill()
+
     def _launch(self) -> None:
         """Start the robots' processes, and somebody who watches for their ends."""
         waiting, self._waiting = self._waiting, []
