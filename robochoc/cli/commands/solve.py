@@ -45,7 +45,7 @@ from robochoc.cli.reports.live_sniffer import Watch, check_chosen, watching
 from robochoc.run.defaults import default_protocol
 
 if TYPE_CHECKING:
-    from robochoc.journal.journal import Header, Recorder
+    from robochoc.journal.journal import Header, JournalRecorder
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
     from robochoc.ros.closed_loop import ClosedLoop
@@ -244,7 +244,7 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     return LIMIT
 
 
-def _run(team: Team, options: Options, recorder: Recorder | None, loop: ClosedLoop | None) -> Outcome:
+def _run(team: Team, options: Options, recorder: JournalRecorder | None, loop: ClosedLoop | None) -> Outcome:
     """Run with whatever watches, a journal, a line on the terminal, and where decisions go."""
     from robochoc.cli.reports.progress import progress_line, waiting
     from robochoc.run.options import CENTRAL

@@ -33,8 +33,8 @@ from robochoc.communication.resources import require_descriptors, signals_held
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.journal.events import Observer
-from robochoc.model.change import keep_interfaces
 from robochoc.model.problem import Team
+from robochoc.model.team_edits import keep_interfaces
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
