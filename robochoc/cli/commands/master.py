@@ -23,12 +23,12 @@ from robochoc.cli.options.solve import (
     withdraw_option,
 )
 from robochoc.cli.reports.failures import LIMIT
-from robochoc.cli.reports.progress import progress_line
+from robochoc.cli.reports.progress import print_above, progress_line
 
 if TYPE_CHECKING:
     from robochoc.communication.network.journal_server import Publication
     from robochoc.journal.events import AnyEvent
-    from robochoc.journal.journal import Header, Recorder
+    from robochoc.journal.journal import Header, JournalRecorder
     from robochoc.model.outcome import Outcome
     from robochoc.run.networked.address import Address
     from robochoc.run.networked.lead import Led, Plan
@@ -183,7 +183,7 @@ def _publication(*, sniffable: bool) -> Iterator[Publication | None]:
         yield publication
 
 
-def _led(plan: Plan, recorder: Recorder | None, publication: Publication | None) -> Led:
+def _led(plan: Plan, recorder: JournalRecorder | None, publication: Publication | None) -> Led:
     """The run, with whatever watches it."""
     from robochoc.run.networked.lead import lead
 
@@ -198,7 +198,7 @@ def _led(plan: Plan, recorder: Recorder | None, publication: Publication | None)
                 recorder(event)
 
         def listening() -> None:
-            click.echo(f"listening at {plan.place}; robots say: --master {_address(plan.place)}", err=True)
+            print_above(f"listening at {plan.place}; start robots with --master {_address(plan.place)}")
 
         def concluded(outcome: Outcome | None) -> None:
             if recorder:
@@ -254,7 +254,7 @@ def _tell_event(event: AnyEvent) -> None:
             line = f"refused: {who}, {what}: {why}"
         case _:
             return
-    click.echo(on_one_line(line), err=True)
+    print_above(on_one_line(line))
 
 
 def _address(place: Address) -> str:
