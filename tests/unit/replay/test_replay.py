@@ -92,7 +92,9 @@ def test_what_was_recorded_is_said_again(protocol: str, numbers: range, warm: Ac
 @pytest.mark.parametrize("protocol", protocol_names()[::4])
 def test_what_was_recorded_in_processes_is_said_again(protocol: str, warm: AceProcess) -> None:
     team, options = random_run(protocol, Random(f"processes {protocol}"), 0)
-    journal = recorded(team, replace(options, runtime=Runtime.PROCESSES, delay=0, schedule=ScheduleName.CONCURRENT), warm)
+    journal = recorded(
+        team, replace(options, runtime=Runtime.PROCESSES, delay=0, schedule=ScheduleName.CONCURRENT), warm
+    )
     assert identical(replay(journal, ReplayOptions(solver=warm)))
 
 
