@@ -1,15 +1,16 @@
 """The simulated flight: quadrotors fly a mission's legs, in wind, with motors that fail and obstacles in the way.
 
-A drone stands at its home with its motors off until its plan takes it into the air, and stops them when it has landed.
-What may happen on the way:
+A drone stands at its home with its motors off until its route takes it into the air. It stops its motors when it has
+landed. On the way this may happen:
 
-- A motor stops: the drone tumbles, its other motors are switched off once it is 60 degrees over (as autopilots' failure
-  detectors do), and it lies where it falls. It never flies again; later plans keep their distance from it.
-- An obstacle, a point, is where nobody expected it: nearer than `KEEP_M` to somebody's goal (or than the planned
-  distance, if that is more). Of these the planner knows nothing before one is seen; all others it avoids. Whoever is
-  about to come so near to one sees it from `SIGHT_M` away at the latest: what is to be kept, the way on which the
-  common clock stops (`quadrotor/trajectory.py`), and `_LOOK_M` for tracking and for looking only at samples.
-- Somebody cannot follow: no leg waits for it longer than `SETTLING_S` after its plan is over.
+- A motor stops. The drone tumbles; its other motors are switched off once it is tilted by 60 degrees (as autopilots'
+  failure detectors do), and it lies where it falls. It never flies again. Later routes keep their distance from it.
+- An obstacle, a point, is nearer than `CLEARANCE_M` to a goal (or than the planned distance, if that is more). The
+  planner knows nothing of such an obstacle before a drone sees it; it avoids all others. A drone whose route leads too
+  near to one sees it from `SIGHT_M` away at the latest, or from further away if it needs more room to stop: the
+  clearance, the way on which the common clock stops (`quadrotor/trajectory.py`), and `_LOOK_M` for tracking errors and
+  for looking at samples only.
+- A drone cannot follow its setpoints. No leg waits for it longer than `SETTLING_S` after the planned end.
 """
 
 from __future__ import annotations
@@ -24,15 +25,16 @@ import numpy.typing as npt
 from robochoc.flight.log import SAMPLE_RATE_HZ, ClosestApproach, FlightEvent, FlightLog, LegTimes
 from robochoc.flight.mission import Goal, Mission
 from robochoc.flight.quadrotor.airframe import Array
-from robochoc.flight.quadrotor.bounds import check_homes, check_length, check_near, check_ways, origin_of
-from robochoc.flight.quadrotor.conditions import LEAST_M, FlightConditions, MotorFailure
+from robochoc.flight.quadrotor.bounds import check_homes, check_length, check_near, check_paths, origin_of
+from robochoc.flight.quadrotor.conditions import DISTANCE_MIN_M, FlightConditions, MotorFailure
 from robochoc.flight.quadrotor.free_points import nearest_distances, nearest_two
 from robochoc.flight.quadrotor.goals import Hazards, LegGoals, check_separation, start_delays
 from robochoc.flight.quadrotor.obstacles import ObstacleEncounter, encounters
+from robochoc.flight.quadrotor.rigid_bodies import Mask
 from robochoc.flight.quadrotor.simulation import DT, QuadrotorSimulation
 from robochoc.flight.quadrotor.trajectory import STOP_S, Trajectory
 from robochoc.flight.reports import Blocked, OutOfOrder, Report
-from robochoc.flight.routes.motion import MotionLimits
+from robochoc.flight.routes.motion import MotionLimits, RoutePlan
 from robochoc.flight.routes.timetable import NoRouteError, TooCloseError, plan_routes
 
 __all__ = [
@@ -47,32 +49,38 @@ __all__ = [
 ]
 
 DISTANCE_M = 0.5
-"""Between drones' middles, where nothing else is said and nobody's place is nearer to another's."""
+"""The default distance between drones' centres."""
 _SHARE = 0.8
-"""Of the nearest two homes or goals, where these are nearer."""
+"""Where two homes or goals are nearer than `DISTANCE_M`, this share of their distance is kept."""
 LIMITS = MotionLimits()
-KEEP_M = 0.5
+CLEARANCE_M = 0.5
 SIGHT_M = 1.5
 _LOOK_M = 0.2
 SETTLING_S = 5.0
 _LATE_S = 1.5
-"""Who is to land and is not right above its spot after that time lands where it is."""
+"""A drone that is to land, and after that time is still not right above its landing point, lands where it is."""
 _STILL_S = 1.0
-"""Before the first leg all stand, and after the last one all hover."""
-_NEAR_M = 0.005
+"""All drones stand still before the first leg, and hover after the last one."""
+_CLOSE_M = 0.005
 _SLOW_M_S = 0.02
 _FAR_M = 0.05
-"""Who is further from where it is wanted has not finished the leg."""
+"""A drone further from its setpoint has not finished the leg."""
 
 
 class Flight:
-    """Drones with these names that stand at `homes` (N, 3). Legs are flown as they are asked for.
+    """Drones that stand at their homes, and fly legs one after the other.
 
-    They are flown around an origin of their own where homes are far away: floating point is fine there, too. `progress`
-    hears what is being done, in words, every simulated moment that is kept.
+    They are flown around an origin of their own where homes are far away, as floating point is finer there.
 
-    Raises `ValueError` where there are no drones or too many (`quadrotor/bounds.py`), the conditions name others, or
-    homes are too near for them.
+    Args:
+        names: The drones' names.
+        homes: Where they stand in the beginning, in metres: (N, 3).
+        conditions: Distance, wind, failures and obstacles.
+        progress: Called with what is being done, in words, at every simulated moment that is logged.
+
+    Raises:
+        ValueError: There are no drones, or too many (`quadrotor/bounds.py`); the conditions name others; or homes are
+            nearer to each other than the distance.
     """
 
     def __init__(
@@ -106,11 +114,17 @@ class Flight:
         self._hovers = False
 
     def fly(self, title: str, goals: Mapping[int, Goal], *, stop_on_report: bool = False) -> tuple[Report, ...]:
-        """One leg, from where everybody is, to these goals by drones' numbers; who has none stays.
+        """Fly one leg, from where all drones are, and return what they report.
 
-        With `stop_on_report` everybody stops and hovers as soon as somebody has something to report; this is returned,
-        and the goals are not reached. Raises `ValueError` where two goals are nearer to each other than the distance to
-        keep, somebody has too far to fly, or what lies there leaves no way.
+        Args:
+            title: The leg's title in the log.
+            goals: Goals by the drones' numbers. A drone without one stays where it is.
+            stop_on_report: Whether all drones stop and hover as soon as one has something to report. The goals are then
+                not reached. Without it, nothing is returned.
+
+        Raises:
+            ValueError: Two goals are nearer to each other than the distance, a drone has too far to fly, or obstacles
+                leave no way.
         """
         began = time.perf_counter()
         with np.errstate(all="ignore"):  # the simulation looks for numbers that are none
@@ -125,7 +139,7 @@ class Flight:
         return reports
 
     def flown(self) -> FlightLog:
-        """All that was flown until now, and a second of hovering."""
+        """Return the log of all that was flown until now, and of a second of hovering."""
         began = time.perf_counter()
         if not self._hovers:
             with np.errstate(all="ignore"):
@@ -154,7 +168,7 @@ class Flight:
         errors = np.zeros(len(self.names))
         for number, goal in self._asked.items():
             errors[number] = float(np.sqrt(np.square(self._simulation.places[number] - goal.at).sum()))
-        errors[self._simulation.lost] = np.nan
+        errors[self._simulation.failed] = np.nan
         return errors
 
     def _stay(self) -> None:
@@ -171,52 +185,64 @@ class Flight:
             self._distance = min(self._distance, _distance([places]))
         moved = [(x, y, z) for x, y, z in (places - self._origin).tolist()]
         goals = {number: replace(goal, at=at) for (number, goal), at in zip(goals.items(), moved, strict=True)}
-        leg_goals = LegGoals(self.names, goals, simulation.reference[:3].T, simulation.lost, self._distance)
+        leg_goals = LegGoals(self.names, goals, simulation.setpoints[:3].T, simulation.failed, self._distance)
         self._asked.update(goals)
         return leg_goals
 
     def _leg(self, leg_goals: LegGoals, *, stop_on_report: bool) -> tuple[Report, ...]:
         """Plan and fly; without `stop_on_report`, again and again as long as obstacles are found."""
         simulation = self._simulation
-        told = len(simulation.broken)
-        wishes = leg_goals.places.copy()
+        reported = len(simulation.failures)
+        preferred = leg_goals.places.copy()
         delays = start_delays(leg_goals.goals, self._homes)
         reports: list[Report] = []
         while True:
-            trajectory, watched = self._trajectory(leg_goals, wishes, delays)
-            seen = self._follow(trajectory, watched, told if stop_on_report else None)
+            trajectory, watched = self._trajectory(leg_goals, preferred, delays)
+            seen = self._follow(trajectory, watched, reported if stop_on_report else None)
             reports += seen
             if stop_on_report or not seen:
                 break
-            wishes = simulation.reference[:3].T.copy()
+            preferred = simulation.setpoints[:3].T.copy()
             delays = np.zeros_like(delays)
-        failed = [OutOfOrder(self.names[drone], why, at_s) for drone, why, at_s in simulation.broken[told:]]
+        failed = [OutOfOrder(self.names[drone], why, at_s) for drone, why, at_s in simulation.failures[reported:]]
         if not (stop_on_report and (reports or failed)):
             self._tell_unfinished()
         return tuple(sorted([*reports, *failed], key=lambda report: report.at_s)) if stop_on_report else ()
 
     def _trajectory(
-        self, leg_goals: LegGoals, wishes: Array, delays: Array
+        self, leg_goals: LegGoals, preferred: Array, delays: Array
     ) -> tuple[Trajectory, list[ObstacleEncounter]]:
-        """The plan from where everybody is wanted now, and whom it brings near to obstacles that nobody knows of."""
+        """Return the trajectory from the current setpoints, and the encounters with unknown obstacles on it."""
         simulation = self._simulation
-        starts = simulation.reference[:3].T.copy()
-        check_ways(self.names, starts, leg_goals.places)
-        keep = self._keep(leg_goals.planned(starts))
+        starts = simulation.setpoints[:3].T.copy()
+        check_paths(self.names, starts, leg_goals.places)
+        keep = max(CLEARANCE_M, leg_goals.planned(starts))
         ends = np.array([goal.at for goal in leg_goals.goals.values()]).reshape(-1, 3)
         known = self._known | (nearest_distances(self._obstacles, ends) >= keep)
-        fallen = simulation.places[simulation.lost & ~simulation.falling]
+        hazards = self._hazards(known, keep)
+        for drone, what in leg_goals.give_way(hazards, preferred, self._ground):
+            simulation.log_event(drone, what)
+        routes = self._routes(leg_goals, hazards, starts, delays)
+        check_length(len(self.names), simulation.now_s + routes.duration_s)
+        trajectory = Trajectory(routes, leg_goals.who, simulation.setpoints)
+        unknown = {int(number): self._obstacles[number] for number in np.flatnonzero(~known)}
+        return trajectory, encounters(trajectory, unknown, keep)
+
+    def _hazards(self, known: Mask, keep: float) -> Hazards:
+        """Return what routes avoid: fallen drones by the distance, known obstacles by `keep`."""
+        fallen = self._simulation.places[self._simulation.failed & ~self._simulation.falling]
         points = np.vstack((fallen, self._obstacles[known]))
         radii = np.concatenate((np.full(len(fallen), self._distance), np.full(int(known.sum()), keep)))
-        hazards = Hazards(points, radii)
-        for drone, what in leg_goals.give_way(hazards, wishes, self._ground):
-            simulation.log_event(drone, what)
+        return Hazards(points, radii)
+
+    def _routes(self, leg_goals: LegGoals, hazards: Hazards, starts: Array, delays: Array) -> RoutePlan:
+        """Plan the routes of a leg, from `starts` (N, 3)."""
         planned = leg_goals.planned(starts, hazards)
-        simulation.set_spare_distance(planned - self._distance)
+        self._simulation.set_spare_distance(planned - self._distance)
         who = leg_goals.who
-        self._progress(f"ways for {len(who)} drones are looked for")
+        self._progress(f"planning routes of {len(who)} drones")
         try:
-            way = plan_routes(
+            return plan_routes(
                 starts[who],
                 leg_goals.places[who],
                 distance=planned,
@@ -226,14 +252,10 @@ class Flight:
                 ground=self._ground,
             )
         except (TooCloseError, NoRouteError) as refused:
-            raise ValueError(self._told(refused, who)) from refused
-        check_length(len(self.names), simulation.now_s + way.duration_s)
-        trajectory = Trajectory(way, who, simulation.reference)
-        unknown = {int(number): self._obstacles[number] for number in np.flatnonzero(~known)}
-        return trajectory, encounters(trajectory, unknown, keep)
+            raise ValueError(self._refusal(refused, who)) from refused
 
-    def _told(self, refused: TooCloseError | NoRouteError, who: npt.NDArray[np.intp]) -> str:
-        """The same with the names of those that it is about: the plan knows only their places in `who`."""
+    def _refusal(self, refused: TooCloseError | NoRouteError, who: npt.NDArray[np.intp]) -> str:
+        """Return `refused` in words, with the drones' names. The planner knows only their places in `who`."""
         numbers = refused.drones if isinstance(refused, NoRouteError) else (refused.first, refused.second)
         named = [self.names[who[number]] if number < len(who) else "something that is in the way" for number in numbers]
         if isinstance(refused, NoRouteError):
@@ -241,14 +263,12 @@ class Flight:
         ends = "start" if refused.where == "start" else "are to end"
         return f"{' and '.join(named)} {ends} only {refused.distance_m:.3g} m from each other"
 
-    def _keep(self, planned: float) -> float:
-        """How far to stay from obstacles."""
-        return max(KEEP_M, planned)
+    def _follow(
+        self, trajectory: Trajectory, watched: Sequence[ObstacleEncounter], reported: int | None
+    ) -> list[Blocked]:
+        """Fly the trajectory to its end, or until it was stopped because of what is seen.
 
-    def _follow(self, trajectory: Trajectory, watched: Sequence[ObstacleEncounter], told: int | None) -> list[Blocked]:
-        """Fly the trajectory to its end, or to where it was stopped for what is seen.
-
-        Unless `told` is None, it is stopped as well once more than so many have broken down.
+        Unless `reported` is None, it is also stopped once there are more failures than that.
         """
         simulation = self._simulation
         reports: list[Blocked] = []
@@ -262,22 +282,22 @@ class Flight:
                 f"leg {len(self._legs) + 1}, {trajectory.s:.1f} s of {trajectory.plan.duration_s:.1f} s flown"
             )
             reports += self._look(trajectory, watched)
-            if reports or (told is not None and len(simulation.broken) > told):
+            if reports or (reported is not None and len(simulation.failures) > reported):
                 trajectory.stop()
             if trajectory.over:
                 trajectory.refer()
-                if reports and told is None:
+                if reports and reported is None:
                     return reports
-                if simulation.settled(_NEAR_M, _SLOW_M_S) or waited > SETTLING_S:
+                if simulation.settled(_CLOSE_M, _SLOW_M_S) or waited > SETTLING_S:
                     return reports
                 waited += 1 / SAMPLE_RATE_HZ
 
     def _look(self, trajectory: Trajectory, watched: Sequence[ObstacleEncounter]) -> list[Blocked]:
-        """Which obstacles are seen now that nobody knew of, and by whom."""
+        """Return which unknown obstacles are seen now, and by which drone."""
         simulation = self._simulation
         reports = []
         for number, drone, until, keep in watched:
-            if self._known[number] or simulation.lost[drone] or trajectory.s > until:
+            if self._known[number] or simulation.failed[drone] or trajectory.s > until:
                 continue
             gap = float(np.sqrt(np.square(simulation.places[drone] - self._obstacles[number]).sum()))
             if gap <= max(SIGHT_M, keep + LIMITS.speed * STOP_S / 2 + _LOOK_M):
@@ -298,11 +318,15 @@ class Flight:
 def fly(
     mission: Mission, conditions: FlightConditions | None = None, progress: Callable[[str], None] | None = None
 ) -> FlightLog:
-    """Fly all legs of `mission`, one after the other, in `conditions` (None: calm, and nothing happens).
+    """Fly all legs of `mission`, one after the other, and return the log.
 
-    `progress` is `Flight`'s.
+    Args:
+        mission: The drones and the legs.
+        conditions: Distance, wind, failures and obstacles; without them the air is calm, and nothing fails.
+        progress: See `Flight`.
 
-    Raises `ValueError` where there is nobody to fly, the conditions do not fit the mission, or its places are too near.
+    Raises:
+        ValueError: There are no drones, the conditions do not fit the mission, or its places are too near.
     """
     conditions = conditions or FlightConditions()
     names = [drone.name for drone in mission.drones]
@@ -320,5 +344,5 @@ def fly(
 
 
 def _distance(places: Sequence[Array]) -> float:
-    """What is kept where nobody says: `DISTANCE_M`, or less where two of the same (K, 3) are nearer to each other."""
-    return max(LEAST_M, min(DISTANCE_M, *(_SHARE * nearest_two(points) for points in places)))
+    """Return the default distance: `DISTANCE_M`, or less where two points of the same (K, 3) array are nearer."""
+    return max(DISTANCE_MIN_M, min(DISTANCE_M, *(_SHARE * nearest_two(points) for points in places)))

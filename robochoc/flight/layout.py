@@ -1,6 +1,6 @@
-"""Where drones stand, fly to and step aside: a crafts in a box of rows, columns and levels.
+"""The layout of a mission: where drones stand, fly to and land, in a box of rows, columns and levels.
 
-Lengths are in cells: a drone is a little narrower than one. An axis says which value of the problem a cell stands for.
+Lengths are in cells. A drone is a little narrower than a cell. An axis maps cells to values of the problem.
 """
 
 from __future__ import annotations
@@ -91,18 +91,18 @@ class Axis:
 
 @dataclass(frozen=True)
 class Layout:
-    """The box, and for each craft of a crafts the spot on the ground where it stands in the beginning."""
+    """The box, and for each craft its home: the point on the ground where it stands in the beginning."""
 
     axes: tuple[Axis, Axis, Axis]
     homes: tuple[Point, ...]
 
     @property
     def ground(self) -> float:
-        """The height on which drones stand: one cell below the lowest level."""
+        """The height of the ground: one cell below the lowest level."""
         return self.axes[2].ground
 
     def places(self, crafts: Sequence[Craft]) -> list[Point | None]:
-        """Where each of `crafts`, as many as have homes, flies to; nowhere without a level. No two meet."""
+        """Return where each of `crafts` flies to, in the order of `homes`; None without a level. No two meet."""
         taken = _Taken()
         around: dict[Point, Iterator[Point]] = {}
         found: list[Point | None] = []
@@ -119,7 +119,7 @@ class Layout:
         return found
 
     def edge(self, number: int) -> Iterator[Point]:
-        """Spots for `number` drones that step aside, in lines before the box."""
+        """Yield landing points for `number` drones that withdraw, in lines before the box."""
         rows, columns, _ = self.axes
         across = max(1, min(number, max(rows.cells, columns.cells) * 3 // 2))
         for x, y in _lines(rows.middle - (across - 1) / 2, across, columns.low - _GAP, -1):
@@ -127,7 +127,7 @@ class Layout:
 
 
 def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = ()) -> Layout:
-    """The field for `crafts`. Its axes also reach to `others`: where some of the crafts may be at another time."""
+    """Return the layout for `crafts`. Its axes also hold `others`: where crafts may be at another time."""
     others = [*others]
     cells = _cells(crafts)
     axes = _axes(crafts, others, [*cells, *(other.cell for other in others if other.cell)])
@@ -143,7 +143,7 @@ def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = ()) -> Layout:
 
 
 def _cells(crafts: Sequence[Craft]) -> list[Cell]:
-    """The crafts' cells; those that have none get a square grid, behind the others if there are others."""
+    """Return the crafts' cells. Those without one get a square grid, behind the others."""
     known = [craft.cell for craft in crafts if craft.cell]
     side = math.ceil(math.sqrt(len(crafts) - len(known)))
     x = min((x for x, _ in known), default=1)
@@ -172,23 +172,23 @@ def _axis_names(crafts: Sequence[Craft]) -> tuple[str, str, str]:
 
 
 def _lines(x: float, across: int, y: int, step: int) -> Iterator[tuple[float, float]]:
-    """Spots beside the box: lines of `across`, the first at `y`, each from `x` on, the next `step` behind it."""
+    """Yield points beside the box, in lines of `across`: the first line at `y`, the next `step` further."""
     for number in count():
         yield float(x + number % across), float(y + number // across * step)
 
 
 class _Taken:
-    """Points, sorted into boxes: who looks for those that are too close does not look at all."""
+    """Points that are taken, sorted into boxes, so that a look-up compares a few points only."""
 
     def __init__(self) -> None:
         self._boxes: dict[tuple[int, ...], list[Point]] = {}
 
     def add(self, point: Point) -> None:
-        """One more."""
+        """Add a point."""
         self._boxes.setdefault(self._box(point), []).append(point)
 
     def is_near(self, point: Point) -> bool:
-        """Whether one of them is too close to `point`."""
+        """Return whether one of the points is too close to `point`."""
         boxes = product(*((number - 1, number, number + 1) for number in self._box(point)))
         return any(math.dist(point, other) < _TOO_CLOSE for box in boxes for other in self._boxes.get(box, ()))
 
@@ -198,7 +198,7 @@ class _Taken:
 
 
 def _spiral(point: Point) -> Iterator[Point]:
-    """The point itself, then spots around it, further and further out, like a sunflower's seeds."""
+    """Yield the point itself, then points around it, further and further out, as seeds of a sunflower lie."""
     x, y, z = point
     for number in count():
         turn, radius = number * _GOLDEN_ANGLE, _TOO_CLOSE * math.sqrt(number)

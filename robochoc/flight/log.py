@@ -1,4 +1,4 @@
-"""What was flown: a pure record, for pictures, files and reports."""
+"""The flight log: what was flown, as data, for pictures, recordings and reports."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SAMPLE_RATE_HZ = 30
 
 @dataclass(frozen=True)
 class ClosestApproach:
-    """How near the drones with the numbers `first` and `second` came, and when."""
+    """The smallest distance between two drones, by their numbers, and when they had it."""
 
     distance_m: float
     first: int
@@ -26,7 +26,7 @@ class ClosestApproach:
 
 @dataclass(frozen=True)
 class LegTimes:
-    """A leg of the flight and its time, in seconds from the beginning."""
+    """A leg of the flight: its title, and its times in seconds from the beginning."""
 
     title: str
     begins_s: float
@@ -35,7 +35,7 @@ class LegTimes:
 
 @dataclass(frozen=True)
 class FlightEvent:
-    """Something worth telling: when, which drone (its number), and what it does or meets with."""
+    """An event of a drone, by its number: a motor stops, an obstacle is seen, the drone hits the ground."""
 
     at_s: float
     drone: int
@@ -44,14 +44,22 @@ class FlightEvent:
 
 @dataclass(frozen=True)
 class FlightLog:
-    """T samples of N drones, `SAMPLE_RATE_HZ`, in metres and seconds from the flight's beginning.
+    """T samples of N drones, at `SAMPLE_RATE_HZ`. Lengths are in metres, times in seconds from the flight's beginning.
 
-    `attitudes` are unit quaternions x, y, z, w, from the drone's frame to the world's. `errors_m` says how far
-    everybody was in the end from the goal that was asked for: 0 for who had none, nan for who has fallen. `nearest` is
-    the nearest that two drones came, flying or standing, at any step of the simulation; pairs with one that falls or
-    has fallen are counted in `nearest_fallen`. `distance` is the one that was to be kept. `wall_s` is how long the
-    simulation took, its planning included. `seen_s` says since when each of the `obstacles` is seen: 0 for those that
-    surprise nobody.
+    Attributes:
+        names: The drones' names.
+        times: (T,).
+        positions: (T, N, 3), of the drones' centres.
+        attitudes: (T, N, 4), unit quaternions x, y, z, w from the drone's frame to the world's.
+        legs: The legs that were flown.
+        events: What happened to drones.
+        errors_m: (N,), each drone's distance from its last goal at the end; 0 without a goal, nan if it has fallen.
+        nearest: The closest approach of two drones, in the air or on the ground, at any step of the simulation.
+        nearest_fallen: The same of pairs of which at least one has fallen, or falls.
+        distance: The distance that was to be kept.
+        obstacles: All obstacles.
+        wall_s: How long simulation and planning took.
+        seen_s: When each obstacle was seen first; 0 for one that the planner knew.
     """
 
     names: tuple[str, ...]
@@ -70,5 +78,5 @@ class FlightLog:
 
     @property
     def simulated_s(self) -> float:
-        """How long the flight was."""
+        """How long the flight was, in seconds."""
         return float(self.times[-1])

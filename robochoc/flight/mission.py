@@ -1,8 +1,8 @@
-"""What a team's decisions mean for its drones: who flies where, epoch by epoch.
+"""The mission: what a team's decisions ask of its drones, epoch by epoch.
 
-The paper's drones stand on the ground in the beginning (Figure 5) and are at the places that the solution says in the
-end (Figure 6). In between an epoch may have sent them elsewhere. Lengths are in metres, in a frame whose z is up; one
-unit of a topic's coordinates is `scale` metres.
+The paper's drones stand on the ground in the beginning (Figure 5), and are at the places of the solution in the end
+(Figure 6). In between, an epoch may have sent them elsewhere. Lengths are in metres, in a frame whose z is up. One unit
+of a topic's coordinates is `scale` metres.
 """
 
 from __future__ import annotations
@@ -17,32 +17,32 @@ from robochoc.model.priorities import natural_key
 from robochoc.model.problem import AddAgent, Assignment, Robot, Team, Topic
 
 UNIT_M = 1.0
-"""A unit of coordinates, where nobody says otherwise: drones are a little narrower."""
+"""The default length of a unit of coordinates: drones are a little narrower."""
 VAST_M = 40.0
-"""A field is no longer than that, where nobody says how long."""
+"""By default, a box is no longer than that."""
 _DENSE_M = 0.025
-"""A unit is no shorter, as long as a field that is `_FLOWN_M` long is not left: neighbours need some room."""
+"""A unit is no shorter, unless the box would be longer than `_FLOWN_M`: neighbours need some room."""
 _FLOWN_M = 1_000.0
 _FAR_BELOW = 40
-"""Levels."""
+"""Levels below all decided ones that are not shown."""
 
 
 @dataclass(frozen=True)
 class Drone:
-    """One that may fly. It stands at `home` in the beginning. Drones of a `group`, a row, look alike."""
+    """A drone of a mission. It stands at `home` in the beginning. Drones of a `group`, a row, have the same colour."""
 
     name: str
     robot: str
-    """Who decides about it; empty where only a variable is known."""
+    """The robot that decides about it; empty where only a variable is known."""
     topic: Topic | None
-    """Where its robot's decisions are published."""
+    """The topic of its waypoints."""
     home: Point
     group: int
 
 
 @dataclass(frozen=True)
 class Goal:
-    """Where a drone is to be: in the air, or on the ground, where it `lands`."""
+    """Where a drone is to be: in the air, or on the ground where it `lands`."""
 
     at: Point
     lands: bool = False
@@ -50,7 +50,7 @@ class Goal:
 
 @dataclass(frozen=True)
 class Leg:
-    """What an epoch asks of the drones, by their numbers; who is not named stays where it is."""
+    """What an epoch asks of the drones: goals by their numbers. A drone without a goal stays where it is."""
 
     opened_by: str
     verdict: Verdict
@@ -59,7 +59,7 @@ class Leg:
 
 @dataclass(frozen=True)
 class Mission:
-    """All that a run has decided. `axes` are those of the box around all places, in cells (`layout.py`)."""
+    """All legs of a run, and the drones that fly them. `axes` are the sides of the box around all places."""
 
     team: str
     drones: tuple[Drone, ...]
@@ -69,16 +69,20 @@ class Mission:
 
     @property
     def ground(self) -> float:
-        """The height on which drones stand."""
+        """The height of the ground."""
         return self.axes[2].value(self.axes[2].ground) * self.scale
 
 
 class MissionBuilder:
-    """The crafts of a run whose epochs come one after the other: who they are, where they stand, what each epoch asks.
+    """Builds the mission of a run whose epochs come one after the other.
 
-    `robots` are all that ever take part, those that come later among them; or, where nothing but names is known,
-    `names` of variables and of robots. `first` says where they go first, `leaving` how many of them will leave (None:
-    any may), and the box reaches to `others`.
+    Args:
+        robots: All robots that ever take part, those that join later among them.
+        first: Where they go first.
+        names: Names of variables and of robots, where nothing else is known.
+        others: Crafts at other times; the box holds them, too.
+        leaving: How many drones will leave; None: any may.
+        scale: Metres a unit; by default `UNIT_M`, or less where the box would be vast.
     """
 
     def __init__(
@@ -104,7 +108,7 @@ class MissionBuilder:
         self.drones = tuple(map(self._drone, crafts, self.layout.homes))
 
     def leg(self, epoch: EpochOutcome, withdrawn: Iterable[str] = ()) -> Leg:
-        """What `epoch`, the next one, asks of the drones. Who is not there any more lands at the edge."""
+        """Return what `epoch`, the next one, asks of the drones. A drone whose robot has left lands at the edge."""
         values: Assignment = {} if epoch.verdict is Verdict.NO_SOLUTION else epoch.assignment
         here = {*(epoch.robots if self._robots else values or self._seen)} - {*withdrawn}
         gone = (self._seen | {*withdrawn}) - here
@@ -124,11 +128,11 @@ class MissionBuilder:
         return Leg(epoch.opened_by, epoch.verdict, goals)
 
     def mission(self, team: str, legs: Iterable[Leg]) -> Mission:
-        """The whole of it."""
+        """Return the mission with these legs."""
         return Mission(team, self.drones, tuple(legs), self.layout.axes, self.scale)
 
     def _crafts(self, values: Assignment, here: Container[str] | None = None) -> Iterator[Craft]:
-        """The crafts of everybody, or of those that are `here`."""
+        """Yield the crafts of all robots, or of those that are `here`."""
         for name, robot in self._robots.items():
             if here is None or name in here:
                 yield from crafts_of(robot, values)
@@ -151,10 +155,12 @@ class MissionBuilder:
 
 
 def mission_of(outcome: Outcome, team: Team | None = None, scale: float | None = None) -> Mission:
-    """What `outcome` asks of the drones. Without its `team`, all that is known are names.
+    """Return what `outcome` asks of the drones.
 
-    `team` is as its files have it, before its scenario. `scale` is in metres a unit; without one, `UNIT_M`, or less
-    where the field would be vast.
+    Args:
+        outcome: What was decided.
+        team: The team as its files have it, before its scenario. Without it, only names are known.
+        scale: Metres a unit; by default `UNIT_M`, or less where the box would be vast.
     """
     epochs = outcome.epochs or (
         EpochOutcome(outcome.verdict, team.order if team else (), assignment=outcome.assignment),
@@ -176,13 +182,16 @@ def mission_of(outcome: Outcome, team: Team | None = None, scale: float | None =
 
 
 def all_robots(team: Team) -> list[Robot]:
-    """All robots that ever take part: those of the beginning, and those that the scenario adds."""
+    """Return all robots that ever take part: those of the beginning, and those that the scenario adds."""
     added = [change.robot for event in team.scenario for change in event.changes if isinstance(change, AddAgent)]
     return [*{robot.name: robot for robot in (*team.robots, *added)}.values()]
 
 
 def _lowest(robots: Iterable[Robot], decided: Iterable[Craft]) -> list[Craft]:
-    """The lowest that anybody could be, unless that is far below all `decided`: the ground is the same for all runs."""
+    """Return the lowest possible crafts, unless they are far below all `decided`.
+
+    They give all runs the same ground.
+    """
     possible = [craft for robot in robots for craft in possible_crafts(robot) if craft.level is not None]
     if not possible:
         return []
@@ -192,13 +201,13 @@ def _lowest(robots: Iterable[Robot], decided: Iterable[Craft]) -> list[Craft]:
 
 
 def _leaving(epochs: Sequence[EpochOutcome], outcome: Outcome) -> int:
-    """About how many leave before the end: a robot may fly several drones."""
+    """Return about how many drones leave before the end: a robot may fly several."""
     stay = {*epochs[-1].robots} - {*outcome.withdrawn}
     return len({*outcome.withdrawn, *(name for epoch in epochs for name in epoch.robots)} - stay)
 
 
 def _owner(craft: Craft) -> str:
-    """By what a craft is known to be there: its robot, or its own name."""
+    """Return the name by which a craft is known to take part: its robot's, or its own."""
     return craft.robot or craft.name
 
 

@@ -1,4 +1,4 @@
-"""Points in space, of which those near another one are found at once, however many there are."""
+"""An index of points in space that finds those near another one at once, however many there are."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from robochoc.flight.layout import Point
 
 _Cell = tuple[int, int, int]
 _A_HAIR_MORE = 1 + 1e-9
-"""What lies just beyond a cube's side may still be near: distances are rounded."""
+"""A point just beyond a cube's side may still be near: distances are rounded."""
 
 
 class PointIndex:
-    """Points, kept by the unit cube in which they lie. The same point may be there several times."""
+    """Points, kept by the unit cube in which they lie. The same point may be added several times."""
 
     def __init__(self) -> None:
         self._cubes: dict[_Cell, list[Point]] = {}
@@ -24,17 +24,17 @@ class PointIndex:
         return self._count
 
     def add(self, place: Point) -> None:
-        """Keep `place`."""
+        """Add a point."""
         x, y, z = map(math.floor, place)
         self._cubes.setdefault((x, y, z), []).append(place)
         self._count += 1
 
     def any_near(self, place: Point, within: float) -> bool:
-        """Whether one of them is no further than `within` from `place`."""
+        """Return whether a point is no further than `within` from `place`."""
         return any(math.dist(place, other) <= within for cube in self._around(place, within) for other in cube)
 
     def remove_near(self, place: Point, within: float) -> bool:
-        """Forget those no further than `within` from `place`; returns whether there were any."""
+        """Remove the points no further than `within` from `place`; return whether there were any."""
         before = self._count
         for cube in self._around(place, within):
             far = [other for other in cube if math.dist(place, other) > within]

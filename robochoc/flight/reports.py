@@ -1,6 +1,6 @@
 """What robots report of their situation: the paper's "read the robot situation" (Section 4.2). Pure data.
 
-Places are in metres, in the mission's frame; `at_s` is the time of the report, in seconds since any epoch that all
+Places are in metres, in the mission's frame. `at_s` is the time of the report, in seconds since an epoch that all
 reports of a source share.
 """
 
@@ -13,7 +13,7 @@ from robochoc.flight.layout import Point
 
 @dataclass(frozen=True)
 class Blocked:
-    """Something is in the way at `place`: nobody can be there."""
+    """An obstacle is at `place`: no drone can be there."""
 
     drone: str
     place: Point
@@ -22,7 +22,7 @@ class Blocked:
 
 @dataclass(frozen=True)
 class Cleared:
-    """What was in the way at `place` is gone."""
+    """The obstacle at `place` is gone."""
 
     drone: str
     place: Point
@@ -40,7 +40,7 @@ class OutOfOrder:
 
 @dataclass(frozen=True)
 class Battery:
-    """What is left in the drone's battery: 1 is full, 0 is empty."""
+    """The charge of the drone's battery: 1 is full, 0 is empty."""
 
     drone: str
     level: float

@@ -51,4 +51,4 @@ def _lost(outcome: Outcome) -> str:
 
 
 def _cost(outcome: Outcome) -> str:
-    return f", cost {outcome.cost:,g}" if outcome.cost else ""
+    return f", cost {int(outcome.cost):,}" if outcome.cost else ""

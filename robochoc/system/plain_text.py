@@ -16,7 +16,7 @@ def on_one_line(text: str, longest: int = LONGEST) -> str:
     """Return `text` as it may be shown: what does not print is escaped, and what is beyond `longest` left out.
 
     Controls, line breaks, marks that change the direction of writing, lone surrogates: none of them prints. Markup is
-    only text here: who shows it by means that know markup (rich, HTML) has to escape that as well.
+    only text here: who shows it by means that know markup (HTML) has to escape that as well.
     """
     shown = "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text[:longest])
     return shown if len(text) <= longest else f"{shown}... ({len(text) - longest:,} more characters)"

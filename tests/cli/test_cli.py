@@ -171,8 +171,8 @@ def test_solve_tells_people_what_happened(four: Path) -> None:
     words = robochoc("solve", four, "--withdraw", "--runtime", "simulator").stdout
     assert "no solution for the whole team (Robot" in words
     assert "has ruled everything out" in words
-    assert "as few as possible (proven) step aside" in words
-    assert "10 fly, 6 step aside" in words
+    assert "queens3d-4: 10 of 16 fly (proven maximum); " in words
+    assert "6 withdrawn:" in words
     assert "abt, then sfb, simulator, seed 0: " in words
     assert re.search(r"row\\column +1 +2 +3 +4", words)
 
@@ -319,5 +319,5 @@ def test_the_help_of_commands_imports_nothing_heavy() -> None:
     )
     modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert {f"robochoc.cli.commands.{name}" for name in COMMANDS} <= {*modules}
-    heavy = {"numpy", "meshcat", "lxml", "rich", "msgspec", "multiprocessing", "tornado", "pycsp3", "zenoh"}
+    heavy = {"numpy", "meshcat", "lxml", "msgspec", "multiprocessing", "tornado", "pycsp3", "zenoh"}
     assert not heavy & set(modules)

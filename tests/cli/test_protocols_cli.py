@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 
 from robochoc import __version__
 from robochoc.cli.group import cli
-from robochoc.cli.reports.protocols import print_table, rows
+from robochoc.cli.reports.protocols import print_protocols, rows
 from robochoc.protocols import abt
 from robochoc.run.registry import UnknownProtocolError, offer_named, offers, protocol_named, protocol_names
 from tests.support.program import robochoc
@@ -82,24 +82,38 @@ def row(table: str, name: str) -> str:
     return found
 
 
-def test_the_table_has_a_line_for_each_protocol_and_the_judge() -> None:
+def test_the_list_has_a_line_for_each_protocol_and_the_central_solver() -> None:
     done = robochoc("protocols")
     assert done.returncode == 0
     assert done.stderr == ""
     heading, *lines = done.stdout.splitlines()
-    assert heading.split() == ["name", "for", "complete", "synchronous", "constraints", "dynamic", "paper", "privacy"]
-    assert {*protocol_names(), "central"} <= {line.split()[0] for line in lines}
-    assert row(done.stdout, "abt").split()[1:7] == ["satisfaction", "yes", "no", "n-ary,", "PKC", "no"]
-    assert abt.ABT.traits.paper in row(done.stdout, "abt")
-    assert abt.ABT.traits.privacy in row(done.stdout, "abt")
-    assert "no protocol" in row(done.stdout, "central")
-    assert "n-ary, PKC" in row(done.stdout, "central")
+    assert heading.split() == ["name", "for", "complete", "use", "when"]
+    assert [line.split()[0] for line in lines] == [*protocol_names(), "central"]
+    assert row(done.stdout, "abt").split()[1:3] == ["satisfaction", "yes"]
+    assert row(done.stdout, "abt").endswith(abt.ABT.traits.use_when)
     assert "\x1b" not in done.stdout
+
+
+def test_the_list_is_narrow_and_every_protocol_of_ours_says_when_to_use_it() -> None:
+    assert max(map(len, robochoc("protocols").stdout.splitlines())) <= 100
+    for name in protocol_names():
+        assert 0 < len(protocol_named(name).traits.use_when) <= 60
+
+
+def test_the_long_list_has_all_traits() -> None:
+    told = robochoc("protocols", "--long").stdout
+    heading = ["name", "for", "complete", "synchronous", "constraints", "dynamic", "privacy", "paper"]
+    assert told.splitlines()[0].split() == heading
+    assert row(told, "abt").split()[1:7] == ["satisfaction", "yes", "no", "n-ary,", "PKC", "no"]
+    assert abt.ABT.traits.paper in row(told, "abt")
+    assert abt.ABT.traits.privacy in row(told, "abt")
+    assert "no protocol" in row(told, "central")
+    assert "n-ary, PKC" in row(told, "central")
 
 
 @pytest.mark.usefixtures("package")
 def test_other_packages_protocols_are_listed_beside_ours() -> None:
-    told = row(run().stdout, "zz-other")
+    told = row(run("--long").stdout, "zz-other")
     assert told.split()[1:7] == ["optimisation", "no", "yes", "binary,", "PKC", "yes"]
     assert r"[bold]Nobody[/bold] 1999\n" in told
     assert "decisions" in told
@@ -194,13 +208,14 @@ def test_solve_points_to_the_list() -> None:
     assert "robochoc protocols" in " ".join(robochoc("solve", "--help").stdout.split())
 
 
-def test_a_narrow_terminal_is_spared_the_long_columns(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("columns", [60, 80, 200])
+def test_the_list_is_wrapped_to_the_terminal(
+    columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    for columns, wide in ((80, False), (200, True)):
-        monkeypatch.setenv("COLUMNS", str(columns))
-        print_table(rows())
-        table = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out)
-        assert ("Meisels & Zivan 2007" in table) is wide
-        assert all(len(line) <= columns for line in table.splitlines())
+    monkeypatch.setenv("COLUMNS", str(columns))
+    print_protocols(rows())
+    *table, last = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
+    assert all(len(line) <= columns for line in table)
+    assert (len(table) == 1 + len(rows())) is (columns == 200)
+    assert last.startswith("next: robochoc protocols NAME")

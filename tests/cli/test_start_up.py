@@ -12,7 +12,7 @@ import pytest
 from tests.support.program import ROOT
 
 HEAVY = {
-    "numpy", "rich", "meshcat", "tornado", "zenoh", "cryptography", "pycsp3", "jpype", "importlib.metadata", "tomllib",
+    "numpy", "meshcat", "tornado", "zenoh", "cryptography", "pycsp3", "jpype", "importlib.metadata", "tomllib",
     "robochoc.solver.ace", "robochoc.solver.central", "robochoc.verification.second_opinion",
     "robochoc.communication.simulator.channel", "robochoc.sniffer", "robochoc.flight",
     "robochoc.communication.network", "robochoc.view", "robochoc.ros", "robochoc.replay",

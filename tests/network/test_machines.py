@@ -112,7 +112,9 @@ def test_robots_that_are_there_before_their_master(site: Deployment) -> None:
     master = site.master("--team", files)
     assert master.status() == 0, master.errors
     ended(robots)
-    assert master.output.startswith("files: solution, checked; on their owner's word alone: 1 of 1 constraint")
+    assert master.output.startswith(
+        "files: solution for all 2 robots, checked; by their owner alone: 1 of 1 constraint"
+    )
 
 
 # The directory
@@ -144,7 +146,7 @@ def test_whom_the_directory_knows_while_the_master_waits(site: Deployment) -> No
     assert words.output.startswith("((result")
     assert f"RA@{site.place}/robochoc" in words.output
     table = asked("--search", "topic=/nowhere")
-    assert (table.status(), table.output) == (0, "nobody that matches\n")
+    assert (table.status(), table.output) == (0, "no agent matches\n")
 
     watcher = asked("--watch", "--patience", 1)
     watcher.wait_to_print("RB@")

@@ -152,9 +152,8 @@ def test_a_verdict_after_all_were_quiet_blames_nobody_and_changes_nothing() -> N
 
 # What is said of that
 
-ALL = "all robots' word"
 CHECKED = "checked against every constraint"
-ASIDE = "t: no solution for the whole team (RB claims it; nobody could check);"
+WHOLE = "no solution for the whole team (RB claims it; nobody could check)"
 SAID = Outcome("t", "abt", "network", 0, Verdict.NO_SOLUTION, witness="RB")
 
 
@@ -165,28 +164,28 @@ SAID = Outcome("t", "abt", "network", 0, Verdict.NO_SOLUTION, witness="RB")
         (
             {"verdict": Verdict.SOLUTION, "verified": True, "assignment": VALUES},
             None,
-            "t: solution, checked against every constraint",
+            "t: solution for all 3 robots, checked against every constraint",
         ),
         (
             {"verdict": Verdict.SOLUTION, "verified": True, "assignment": VALUES, "checked": CheckCounts(1, 1)},
             None,
-            "t: solution, checked; on their owner's word alone: 1 of 2 constraints",
+            "t: solution for all 3 robots, checked; by their owner alone: 1 of 2 constraints",
         ),
-        ({"verdict": Verdict.SOLUTION, "reason": "so"}, ALL_ROBOTS, "t: solution, not checked: so"),
+        ({"verdict": Verdict.SOLUTION, "reason": "so"}, ALL_ROBOTS, "t: solution for all 3 robots, not checked: so"),
         (
             {"verdict": Verdict.OPTIMAL, "verified": True, "assignment": VALUES, "cost": 3},
             ALL_ROBOTS,
-            "t: optimal, checked against every constraint; that nothing costs less rests on all robots' word",
+            f"t: optimal solution for all 3 robots, cost 3, {CHECKED}; the minimum cost is what all robots report",
         ),
         (
             {"verdict": Verdict.OPTIMAL, "verified": True, "assignment": {"A": 1, "C": 2}, "withdrawn": ("RB",)},
             ALL_ROBOTS,
-            f"{ASIDE} as few as possible (proven) step aside, {CHECKED}; that no fewer could step aside rests on {ALL}",
+            f"t: 2 of 3 fly (proven maximum); {WHOLE}; {CHECKED}; the minimum withdrawal is what all robots report",
         ),
         (
             {"verdict": Verdict.SOLUTION, "verified": True, "assignment": {"A": 1, "C": 2}, "withdrawn": ("RB",)},
             "RB",
-            f"{ASIDE} some step aside, {CHECKED}",
+            f"t: 2 of 3 fly (not proven to be the maximum); {WHOLE}; {CHECKED}",
         ),
         ({"verdict": Verdict.UNKNOWN, "reason": "so", "bound": 5}, ALL_ROBOTS, "t: unknown: so"),
         ({"verdict": Verdict.UNKNOWN, "reason": "so"}, None, "t: unknown: so"),

@@ -85,7 +85,9 @@ def test_others_go_on_without_it(site: Deployment) -> None:
 def test_it_judges_its_own_constraint(site: Deployment) -> None:
     master, status = betrayed(site, "a wrong value", team=PAIR)
     assert status == 0, master.errors
-    assert master.output.startswith("files: solution, checked; on their owner's word alone: 1 of 1 constraint\n")
+    assert master.output.startswith(
+        "files: solution for all 2 robots, checked; by their owner alone: 1 of 1 constraint\n"
+    )
 
 
 @SLOW

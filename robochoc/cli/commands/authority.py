@@ -132,13 +132,13 @@ def list_members(folder: Path | None, *, as_json: bool) -> None:
     revoked    is refused
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     with _failures_told(), _opened(folder) as found:
-        from robochoc.cli.reports.authority import json_report, print_table
+        from robochoc.cli.reports.authority import members_json, print_members
 
         members, now = found.members(), found.clock()
     if as_json:
-        click.echo(json_report(members, now), nl=False)
+        click.echo(members_json(members, now), nl=False)
     elif members:
-        print_table(members, now)
+        print_members(members, now)
     else:
         click.echo("no names are enrolled; next: robochoc authority enrol NAME")
 

@@ -65,7 +65,7 @@ def _status(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_jso
 
 def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_json: bool) -> int:
     """Compile the team in `folder`, robots that reach a limit included, tell of it, and return the exit status."""
-    from robochoc.cli.reports.compile import json_report, print_table
+    from robochoc.cli.reports.compile import print_sizes, sizes_json
     from robochoc.cli.reports.progress import progress_line
     from robochoc.communication.run_result import Progress
     from robochoc.formats import on_one_line, read_team
@@ -85,9 +85,9 @@ def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_js
             except (TooManySolutionsError, CompileTimeoutError) as limit:
                 found.append(limit)
     if as_json:
-        click.echo(json_report(team, found, time.monotonic() - began))
+        click.echo(sizes_json(team, found, time.monotonic() - began))
     else:
-        print_table(team, found, time.monotonic() - began, folder)
+        print_sizes(team, found, time.monotonic() - began, folder)
     limited = [one for one in found if not isinstance(one, Compilation)]
     if not limited:
         return 0

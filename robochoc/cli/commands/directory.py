@@ -94,15 +94,13 @@ def _tell(answer: str, *, sl: bool, as_json: bool) -> None:
 
 
 def _print_table(agents: tuple[AgentDescription, ...]) -> None:
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
+    from robochoc.cli.reports.table import print_table
 
-    from robochoc.system.plain_text import on_one_line
-
-    table = Table("agent", "protocols", "variables", "topics")
+    if not agents:
+        click.echo("no agent matches")
+        return
+    rows = []
     for agent in agents:
         kinds = {kind: [one.name for one in agent.services if one.type == kind] for kind in ("variable", "topic")}
-        cells = (agent.name, *map(", ".join, (agent.protocols, kinds["variable"], kinds["topic"])))
-        table.add_row(*(escape(on_one_line(cell)) for cell in cells))
-    Console().print(table if agents else "nobody that matches")
+        rows.append((agent.name, *map(", ".join, (agent.protocols, kinds["variable"], kinds["topic"]))))
+    print_table(("agent", "protocols", "variables", "topics"), rows)

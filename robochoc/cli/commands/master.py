@@ -23,7 +23,7 @@ from robochoc.cli.options.solve import (
     withdraw_option,
 )
 from robochoc.cli.reports.failures import LIMIT
-from robochoc.cli.reports.progress import progress_line
+from robochoc.cli.reports.progress import print_above, progress_line
 
 if TYPE_CHECKING:
     from robochoc.communication.network.journal_server import Publication
@@ -198,7 +198,7 @@ def _led(plan: Plan, recorder: Recorder | None, publication: Publication | None)
                 recorder(event)
 
         def listening() -> None:
-            click.echo(f"listening at {plan.place}; robots say: --master {_address(plan.place)}", err=True)
+            print_above(f"listening at {plan.place}; start robots with --master {_address(plan.place)}")
 
         def concluded(outcome: Outcome | None) -> None:
             if recorder:
@@ -254,7 +254,7 @@ def _tell_event(event: AnyEvent) -> None:
             line = f"refused: {who}, {what}: {why}"
         case _:
             return
-    click.echo(on_one_line(line), err=True)
+    print_above(on_one_line(line))
 
 
 def _address(place: Address) -> str:

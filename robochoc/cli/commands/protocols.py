@@ -1,4 +1,4 @@
-"""`robochoc protocols`: what there is to solve with."""
+"""`robochoc protocols`: the installed protocols."""
 
 from __future__ import annotations
 
@@ -12,24 +12,26 @@ from robochoc.cli.reports.failures import USAGE, Failure
 
 @click.command()
 @click.argument("name", required=False, type=ProtocolName())
+@click.option("--long", is_flag=True, help="List more traits: constraints, privacy, paper.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per protocol.")
-def protocols(name: str | None, *, as_json: bool) -> None:
-    """List the protocols that are installed, of this package and of others, or explain the protocol NAME.
+def protocols(name: str | None, *, as_json: bool, long: bool) -> None:
+    """List the installed protocols, or explain the protocol NAME.
 
     \b
-    for           satisfaction: any solution; optimisation: the cheapest one
-    complete      it ends on every problem, with a solution or a proof that there is none
-    synchronous   one robot acts at a time
-    constraints   binary: between two robots; n-ary: between any number; PKC: partially known ones too
-    dynamic       it goes on when the problem changes
-    privacy       what neighbours do not come to know
+    for           satisfaction: any solution; optimisation: minimum cost
+    complete      ends on every problem, with a solution or a proof
+    use when      when to choose it
+    synchronous   one robot acts at a time (--long)
+    constraints   binary, n-ary; PKC: also partially known (--long)
+    dynamic       continues when the problem changes (--long)
+    privacy       what neighbours do not learn (--long)
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.cli.reports.protocols import Row, explained, json_report, print_table, rows
+    from robochoc.cli.reports.protocols import Row, explained, print_protocols, protocols_json, rows
     from robochoc.formats import on_one_line
 
     found = rows()
     if name is None:
-        click.echo(json_report(found), nl=False) if as_json else print_table(found)
+        click.echo(protocols_json(found), nl=False) if as_json else print_protocols(found, long=long)
         return
     row: Row | None = next((row for row in found if row.name == name), None)
     if row is None:
@@ -38,7 +40,7 @@ def protocols(name: str | None, *, as_json: bool) -> None:
         hint = f"; did you mean '{near[0]}'?" if near else ""
         raise Failure(USAGE, on_one_line(f"no protocol '{name}' is installed, only: {', '.join(known)}{hint}"))
     if as_json:
-        click.echo(json_report([row], explain=True), nl=False)
+        click.echo(protocols_json([row], explain=True), nl=False)
     elif row.broken:
         raise Failure(USAGE, on_one_line(f"{row.name}: {row.place} (package {row.package}) {row.broken}"))
     else:

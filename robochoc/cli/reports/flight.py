@@ -7,6 +7,7 @@ from math import isfinite, isnan
 
 import msgspec
 
+from robochoc.cli.reports.table import table_lines
 from robochoc.flight.flight import ClosestApproach, FlightLog
 from robochoc.flight.mission import Leg, Mission
 from robochoc.formats import on_one_line
@@ -57,16 +58,20 @@ def _verdict(mission: Mission, flown: FlightLog) -> str:
 
 
 def _legs(mission: Mission, flown: FlightLog) -> Iterator[str]:
-    rows = [("leg", "opened by", "verdict", "fly", "land", "from s", "to s")]
-    for number, (leg, times) in enumerate(zip(mission.legs, flown.legs, strict=True)):
-        opened = shortened(on_one_line(leg.opened_by))
-        span = f"{times.begins_s:.1f}", f"{times.ends_s:.1f}"
-        rows.append((f"{number}", opened, leg.verdict, *_movers(leg), *span))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    words = {1, 2}
-    for row in rows:
-        cells = (f"{cell:{'<' if place in words else '>'}{widths[place]}}" for place, cell in enumerate(row))
-        yield "  " + "  ".join(cells)
+    headings = ("leg", "opened by", "verdict", "fly", "land", "from s", "to s")
+    rows = [
+        (
+            str(number),
+            shortened(leg.opened_by),
+            leg.verdict,
+            *_movers(leg),
+            f"{times.begins_s:.1f}",
+            f"{times.ends_s:.1f}",
+        )
+        for number, (leg, times) in enumerate(zip(mission.legs, flown.legs, strict=True))
+    ]
+    for line in table_lines(headings, rows, right=("leg", "fly", "land", "from s", "to s")):
+        yield f"  {line}"
 
 
 def _movers(leg: Leg) -> tuple[str, str]:

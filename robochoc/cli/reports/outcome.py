@@ -1,61 +1,59 @@
-"""An outcome in words, for people."""
+"""The outcome of a run, for people."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 
+from robochoc.cli.reports.table import table_lines
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
 from robochoc.model.change import team_after_events
+from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import ALL_ROBOTS, Metrics, Outcome, Verdict
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import ProblemKind, Team
 
 WIDTH = 100
 _LARGE = 1 << 16
-"""Bytes: a message as large as that is worth a word."""
+"""Bytes: messages from this size on are mentioned."""
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 
 
 def report(team: Team, outcome: Outcome) -> str:
-    """The verdict, why, where everybody flies, and what it cost, in a few lines."""
+    """Return a few lines: what happened and why, the values, the withdrawn and lost robots, and the metrics."""
     lines = [f"{on_one_line(outcome.team)}: {_verdict(team, outcome)}", *_epochs(outcome)]
     team = team_after_events(team, outcome.events)
     if outcome.assignment:
         lines += _board(team, outcome.assignment) or _list(team, outcome.assignment)
     if outcome.aside:
-        flying, aside = len(team.robots) - len(outcome.withdrawn), len(outcome.aside)
-        fly, step = "flies" if flying == 1 else "fly", "steps" if aside == 1 else "step"
-        lines.append(f"  {flying} {fly}, {aside} {step} aside{_weight(team, outcome)}:")
-        lines += _wrapped(outcome.aside)
+        lines += [f"  {len(outcome.aside)} withdrawn{_weight(team, outcome)}:", *_wrapped(outcome.aside)]
     if outcome.lost:
         lost = sorted(outcome.lost, key=natural_key)
-        lines += [f"  {len(lost)} {'was' if len(lost) == 1 else 'were'} lost:", *_wrapped(lost)]
+        lines += [f"  {len(lost)} lost:", *_wrapped(lost)]
     order = f", order {outcome.order}" if outcome.order else ""
     lines.append(f"  {outcome.protocols}{order}, {_place(team, outcome)}: {_metrics(outcome)}{_simulated(outcome)}")
     return "\n".join(map(on_one_line, lines))
 
 
 def _epochs(outcome: Outcome) -> list[str]:
-    """A line for each epoch: what opened it, and how it ended."""
+    """Return a table of the epochs: what opened each, and how it ended."""
     if not outcome.epochs:
         return []
-    central = outcome.runtime == "central"
-    rows = [("epoch", "opened by", "robots", "verdict", *(("seconds",) if central else ("messages", "NCCCs")))]
+    counts = ("seconds",) if outcome.runtime == "central" else ("messages", "NCCCs")
+    rows = []
     for number, epoch in enumerate(outcome.epochs):
         verdict = f"{epoch.verdict}{', confirmed' * (epoch.verified and epoch.verdict is Verdict.NO_SOLUTION)}"
         spent = epoch.metrics
-        counts = (f"{sum(spent.messages.values()):,}", f"{spent.ncccs:,}")
-        cost = (f"{spent.wall_s:.2f}",) if central else counts
-        opened = shortened(on_one_line(epoch.opened_by))
-        rows.append((f"{number}", opened, f"{len(epoch.robots)}", verdict, *cost))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    numbers = {0, 2, 4, 5}
-    return [
-        "  " + "  ".join(f"{cell:{'>' if place in numbers else '<'}{widths[place]}}" for place, cell in enumerate(row))
-        for row in rows
-    ]
+        told = {
+            "seconds": f"{spent.wall_s:.2f}",
+            "messages": f"{sum(spent.messages.values()):,}",
+            "NCCCs": f"{spent.ncccs:,}",
+        }
+        cells = (str(number), shortened(epoch.opened_by), str(len(epoch.robots)), verdict)
+        rows.append((*cells, *(told[count] for count in counts)))
+    headings = ("epoch", "opened by", "robots", "verdict", *counts)
+    return [f"  {line}" for line in table_lines(headings, rows, right=("epoch", "robots", *counts))]
 
 
 def _place(team: Team, outcome: Outcome) -> str:
@@ -71,81 +69,74 @@ def _place(team: Team, outcome: Outcome) -> str:
 
 
 def _verdict(team: Team, outcome: Outcome) -> str:
-    why = outcome.ruled_out
-    if outcome.reason and not outcome.epochs:
-        why = outcome.reason
+    """Return what happened, in a few words, then why, and how it was checked."""
+    why = outcome.reason if outcome.reason and not outcome.epochs else outcome.ruled_out
+    because = f" ({why})" if why else ""
     confirmed = ", confirmed centrally" * outcome.confirmed
     left = " for the robots that are left" if outcome.lost else ""
+    weighted = bool(_weight(team, outcome))
+    headline = describe_outcome(outcome, len(team.robots), weighted=weighted)
     match outcome.verdict:
         case Verdict.NO_SOLUTION:
-            proof = f"no solution{left} ({why})" if why else f"no solution{left}"
-            return f"{proof}, confirmed centrally" if outcome.verified else proof
+            return f"no solution{left}{because}{', confirmed centrally' * outcome.verified}"
         case Verdict.UNKNOWN:
             return f"unknown: {outcome.reason or 'a limit was reached before a verdict'}{_so_far(team, outcome)}"
         case _ if outcome.count is not None:
             return f"{outcome.count:,} solution{'s' * (outcome.count != 1)}"
         case Verdict.SOLUTION | Verdict.OPTIMAL if not outcome.aside:
-            return f"{_proven(team, outcome)}{left}, {_checked(outcome)}{confirmed}{_trusted(outcome)}"
+            return f"{headline}{_not_proven(team, outcome)}, {_checked(outcome)}{confirmed}{_trusted(outcome)}"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
-            who = "some step" if outcome.assignment else "all step"
-            if outcome.verdict is Verdict.OPTIMAL:
-                by_weight = ", by weight" if _weight(team, outcome) else ""
-                who = f"as few as possible{by_weight} (proven) step"
-            whole = left or " for the whole team"
-            because = f" ({why})" if why else ""
-            return f"no solution{whole}{because}; {who} aside, {_checked(outcome)}{confirmed}{_trusted(outcome)}"
+            whole = f"no solution{left or ' for the whole team'}{because}"
+            return f"{headline}; {whole}; {_checked(outcome)}{confirmed}{_trusted(outcome)}"
 
 
 def _checked(outcome: Outcome) -> str:
-    """Return who checked the constraints, in words. Across machines that may be their owners alone."""
+    """Return how the constraints were checked. On several machines that may be by their owners alone."""
     if not outcome.verified:
         return f"not checked: {outcome.reason}"
     if outcome.checked is None or not outcome.checked.by_owner:
         return "checked against every constraint"
     alone, total = outcome.checked.by_owner, sum(outcome.checked)
-    return f"checked; on their owner's word alone: {alone:,} of {total:,} constraint{'s' * (total != 1)}"
+    return f"checked; by their owner alone: {alone:,} of {total:,} constraint{'s' * (total != 1)}"
 
 
 def _trusted(outcome: Outcome) -> str:
-    """Return, in words, which claim rests on all robots' word because nobody could check it."""
+    """Return which claim could not be checked, and rests on what all robots reported."""
     if outcome.claimed_by != ALL_ROBOTS or not outcome.verified or outcome.confirmed:
         return ""
-    what = "that no fewer could step aside" if outcome.aside else "that nothing costs less"
-    return f"; {what} rests on all robots' word"
+    what = "the minimum withdrawal" if outcome.aside else "the minimum cost"
+    return f"; {what} is what all robots report"
 
 
-def _proven(team: Team, outcome: Outcome) -> str:
-    """The verdict, and the cost where there are costs."""
-    if team.kind is ProblemKind.DISCSP:
-        return outcome.verdict
-    least = "" if outcome.verdict is Verdict.OPTIMAL else ", which may not be the least"
-    return f"{outcome.verdict}, cost {_number(outcome.cost)}{least}"
+def _not_proven(team: Team, outcome: Outcome) -> str:
+    known = team.kind is ProblemKind.DISCSP or outcome.verdict is Verdict.OPTIMAL
+    return "" if known else " (not proven to be the minimum)"
 
 
 def _weight(team: Team, outcome: Outcome) -> str:
-    """What those weigh that step aside, where robots are not all of weight 1."""
+    """Return the weight of the withdrawn robots, if robots differ in weight."""
     if all(robot.weight == 1 for robot in team.robots):
         return ""
     return f" (weight {sum(team[name].weight for name in outcome.aside)})"
 
 
 def _number(cost: float | None) -> str:
-    """Costs are integers, and may be larger than floats are exact."""
+    """Return a cost, which is an integer."""
     return "unknown" if cost is None else f"{int(cost):,}"
 
 
 def _so_far(team: Team, outcome: Outcome) -> str:
-    """The best that is known when a limit is reached, and what it could come to at best."""
+    """Return the incumbent and the lower bound when a limit is reached."""
     bound = outcome.bound
     if outcome.aside:
-        least = f"; at least {_number(bound)} have to" if bound else ""
-        step = "steps" if len(outcome.aside) == 1 else "step"
-        return f"; in the best answer so far {len(outcome.aside)} {step} aside{_weight(team, outcome)}{least}"
+        lower = f" (lower bound {_number(bound)})" if bound else ""
+        withdraw = "withdraws" if len(outcome.aside) == 1 else "withdraw"
+        return f"; in the best answer so far {len(outcome.aside)} {withdraw}{_weight(team, outcome)}{lower}"
     if team.kind is ProblemKind.DISCSP:
         return ""
     known = [f"the best so far costs {_number(outcome.cost)}"] if outcome.assignment else []
-    word = ", by all robots' word" if outcome.claimed_by else ""
-    known += [f"nothing costs less than {_number(bound)}{word}"] if bound else []
+    reported = ", as all robots report" if outcome.claimed_by else ""
+    known += [f"lower bound {_number(bound)}{reported}"] if bound else []
     return "; " + ", and ".join(known) if known else ""
 
 
@@ -163,12 +154,12 @@ def _metrics(outcome: Outcome) -> str:
 
 
 def _largest(spent: Metrics) -> str:
-    """The largest message, where it is a large one."""
+    """Return the size of the largest message, if it is large."""
     return f" (the largest message {spent.largest:,})" if spent.largest >= _LARGE else ""
 
 
 def _local(spent: Metrics) -> str:
-    """What compiling and keeping local solutions cost, where there were any."""
+    """Return the time and memory of local problems, if there were any."""
     if not spent.compile_s:
         return ""
     memory = f", {spent.memory / 2**20:.1f} MiB in the largest process" if spent.memory else ""
@@ -176,7 +167,7 @@ def _local(spent: Metrics) -> str:
 
 
 def _simulated(outcome: Outcome) -> str:
-    """What it would have taken by radio, where a channel model was asked for."""
+    """Return the simulated time, if a channel model was used."""
     if outcome.channel is None:
         return ""
     seconds = outcome.metrics.simulated_s
@@ -184,7 +175,7 @@ def _simulated(outcome: Outcome) -> str:
 
 
 def _board(team: Team, assignment: Mapping[str, int]) -> list[str]:
-    """A table of rows and columns, if variables are named for cells (`V3.1`) and the board is not too wide."""
+    """Return a board, if variables are named for cells (`V3.1`) and it is not too wide."""
     cells = {}
     for name in team.variables:
         match = _CELL.fullmatch(name)
@@ -207,7 +198,7 @@ def _list(team: Team, assignment: Mapping[str, int]) -> list[str]:
 
 
 def _wrapped(words: tuple[str, ...] | list[str]) -> list[str]:
-    """Words in columns, as many as fit."""
+    """Return words in columns, as many as fit."""
     width = 2 + max(len(word) for word in words)
     per_line = max(1, WIDTH // width)
     return [

@@ -1,21 +1,27 @@
-"""Progress of a run: one line on a terminal, silence elsewhere."""
+"""Progress of a run: one line on a terminal, nothing elsewhere."""
 
 from __future__ import annotations
 
+import os
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+import click
+
 if TYPE_CHECKING:
     from robochoc.communication.run_result import Progress
 
 REFRESH_S = 0.1
+_ERASE = "\r\x1b[K"
+"""Go to the beginning of the line, and erase it (ECMA-48)."""
 
 
 def waiting(show: Callable[[Progress], None]) -> Callable[[], None]:
-    """What tells of time that goes by while the robots have nothing to report: for whoever waits to call."""
+    """Return a function that shows the time that passes while the robots have nothing to report."""
     from robochoc.communication.run_result import Progress
 
     began = time.monotonic()
@@ -24,37 +30,44 @@ def waiting(show: Callable[[Progress], None]) -> Callable[[], None]:
 
 @contextmanager
 def progress_line(team: str) -> Iterator[Callable[[Progress], None] | None]:
-    """A function that shows how far the run has come, while it lasts; None where stderr is no terminal.
+    """Give a function that shows the progress of a run on the last line of a terminal; None if stderr is none.
 
-    Refreshed by calls only: a thread in the background and the forks of a run do not go together.
+    The line is refreshed by calls only: a thread in the background and the forks of a run do not go together.
     """
-    if not sys.stderr.isatty():
+    if not _on_a_terminal():
         yield None
         return
-    from rich.console import Console
-    from rich.live import Live
-    from rich.text import Text
-
     from robochoc.system.plain_text import on_one_line
 
     last = 0.0
-    with Live(console=Console(stderr=True), auto_refresh=False, transient=True) as live:
 
-        def show(progress: Progress) -> None:
-            nonlocal last
-            if time.monotonic() - last < REFRESH_S:
-                return
-            last = time.monotonic()
-            stage = progress.stage or f"{progress.messages:,} messages"
-            line = f"{team}: {stage}, {progress.elapsed_s:.1f} s"
-            live.update(Text(on_one_line(line), style="dim"), refresh=True)
+    def show(progress: Progress) -> None:
+        nonlocal last
+        if time.monotonic() - last < REFRESH_S:
+            return
+        last = time.monotonic()
+        stage = progress.stage or f"{progress.messages:,} messages"
+        line = on_one_line(f"{team}: {stage}, {progress.elapsed_s:.1f} s")[: shutil.get_terminal_size().columns - 1]
+        click.echo(f"{_ERASE}{click.style(line, dim=True)}", nl=False, err=True)
 
+    try:
         yield show
+    finally:
+        click.echo(_ERASE, nl=False, err=True)
+
+
+def print_above(line: str) -> None:
+    """Print `line` on standard error, where a progress line may stand."""
+    click.echo(f"{_ERASE}{line}" if _on_a_terminal() else line, err=True)
+
+
+def _on_a_terminal() -> bool:
+    return sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
 
 
 @contextmanager
 def stages(team: str) -> Iterator[Callable[[str], None] | None]:
-    """Like `progress_line`, of work whose stages have words and nothing to count."""
+    """Do as `progress_line` for work that has stages, and no messages to count."""
     from robochoc.communication.run_result import Progress
 
     began = time.monotonic()

@@ -1,19 +1,17 @@
-"""What `robochoc protocols` tells: a row a protocol, for people or for machines."""
+"""The installed protocols, for people and for machines."""
 
 from __future__ import annotations
 
 import inspect
-import shutil
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
+import click
 import msgspec
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from robochoc import __version__
+from robochoc.cli.reports.table import print_table
 from robochoc.formats import on_one_line
 from robochoc.protocols.protocol import NO_SETTINGS, Settings
 from robochoc.protocols.traits import Traits
@@ -21,17 +19,13 @@ from robochoc.run.options import CENTRAL
 from robochoc.run.registry import Offer, offers
 from robochoc.solver import central
 
-WIDE = 150
-"""A terminal of fewer columns is not told of papers and privacy: their words would be broken into pieces."""
-UNBROKEN = 1000
-"""Where no terminal reads it, a protocol has a line of its own."""
 _KEYS = {"shared_scopes": "everywhere", "writes_to_non_neighbours": "beyond"}
 """Traits whose keys in `--json` keep their first names."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One protocol, or the judge, which is none. `traits` is None where it is `broken`."""
+    """One protocol, or the central solver. `traits` is None where it is `broken`."""
 
     name: str
     place: str
@@ -45,38 +39,38 @@ class Row:
 
 
 def rows() -> list[Row]:
-    """All that `robochoc solve --protocol` takes, and what it cannot take, with the reason."""
-    return [*map(_row, offers()), _judge()]
+    """Return all that `robochoc solve --protocol` accepts, and what is broken, with the reason."""
+    return [*map(_row, offers()), _central_solver()]
 
 
-def json_report(found: Sequence[Row], *, explain: bool = False) -> bytes:
-    """A line each: one JSON object. `explain` adds the docstring."""
+def protocols_json(found: Sequence[Row], *, explain: bool = False) -> bytes:
+    """Return one JSON object per line. `explain` adds the docstring."""
     encode = msgspec.json.Encoder().encode
     return b"".join(encode(_object(row, explain=explain)) + b"\n" for row in found)
 
 
-def print_table(found: Sequence[Row]) -> None:
-    """The table, on standard output, and below it what is wrong with what is broken."""
-    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else UNBROKEN
-    console = Console(width=columns, highlight=False, soft_wrap=True)
-    console.print(_table(found, wide=columns >= WIDE))
+def print_protocols(found: Sequence[Row], *, long: bool = False) -> None:
+    """Print name, purpose, completeness and use of each protocol, or with `long` all traits; then what is broken."""
+    headings = ["name", "for", "complete", "use when"]
+    if long:
+        headings = ["name", "for", "complete", "synchronous", "constraints", "dynamic", "privacy", "paper"]
+    print_table(headings, [[row.name, *_cells(row, headings[1:])] for row in found], prose=headings[-1])
     for row in found:
         if row.broken:
-            console.print(on_one_line(f"{row.name}: {row.place} (package {row.package}) {row.broken}"), markup=False)
-    if columns < WIDE:
-        console.print("the paper and what stays private: robochoc protocols NAME, or a wider terminal", markup=False)
-    console.print("next: robochoc protocols NAME explains one; robochoc solve TEAM --protocol NAME", markup=False)
+            click.echo(on_one_line(f"{row.name}: {row.place} (package {row.package}) {row.broken}"))
+    if not long and sys.stdout.isatty():
+        click.echo("next: robochoc protocols NAME explains one; --long shows papers, privacy and more")
 
 
 def explained(row: Row) -> str:
-    """What the protocol is in a line, where it comes from, and what its author says of it."""
+    """Return the protocol's traits, its place, its parameters and its docstring."""
     head = f"{row.name}: {_in_a_line(row.traits)}" if row.traits else row.name
     place = f"{row.place}, from the package {row.package}"
     return f"{head}\n{place}\n{_settings(row)}\n{_docstring(row) or 'Its module has no docstring.'}"
 
 
 def _settings(row: Row) -> str:
-    """What can be set, each with its default, and what it means; empty where there is nothing."""
+    """Return the parameters with their defaults and meanings; empty if there are none."""
     there = msgspec.structs.asdict(row.settings)
     if not there:
         return ""
@@ -93,6 +87,7 @@ def _in_a_line(traits: Traits) -> str:
         "constraints between any number of robots" if traits.n_ary else "constraints between two robots",
         *(["partially known ones too"] if traits.partially_known else []),
         *(["goes on when the problem changes"] if traits.dynamic else []),
+        *([f"use when: {traits.use_when}"] if traits.use_when else []),
         *([f"keeps private: {traits.privacy}"] if traits.privacy else []),
         *([traits.paper] if traits.paper else []),
     ]
@@ -113,9 +108,15 @@ def _row(offer: Offer) -> Row:
     )
 
 
-def _judge() -> Row:
-    """The central judge, with the traits that a protocol of its powers would have."""
-    traits = Traits(paper="no protocol: ACE decides all files merged", costs=True, partially_known=True, privacy="none")
+def _central_solver() -> Row:
+    """Return the central solver, with the traits of a protocol that could do the same."""
+    traits = Traits(
+        paper="no protocol: ACE decides all files merged",
+        costs=True,
+        partially_known=True,
+        privacy="none",
+        use_when="to check an answer or to count solutions, without robots",
+    )
     return Row(
         CENTRAL,
         f"{central.CentralSolver.__module__}:CentralSolver",
@@ -137,40 +138,27 @@ def _object(row: Row, *, explain: bool) -> dict[str, object]:
 
 
 def _docstring(row: Row) -> str:
-    """Of its module; empty where there is none."""
+    """Return the docstring of its module; empty if there is none."""
     module = sys.modules.get(row.module)
     return inspect.cleandoc(module.__doc__ or "") if module else ""
 
 
-def _table(found: Sequence[Row], *, wide: bool) -> Table:
-    table = Table(box=None, header_style="bold")
-    headings = ("name", "for", "complete", "synchronous", "constraints", "dynamic")
-    for heading in headings:
-        table.add_column(heading, no_wrap=True)
-    if wide:
-        table.add_column("paper")
-        table.add_column("privacy")
-    for row in found:
-        cells = [on_one_line(row.name), *_cells(row)]
-        table.add_row(*map(escape, cells if wide else cells[: len(headings)]))
-    return table
-
-
-def _cells(row: Row) -> list[str]:
+def _cells(row: Row, headings: Sequence[str]) -> list[str]:
     traits = row.traits
     if traits is None:
-        return ["broken: see below", *["-"] * 4, "", ""]
-    constraints = ("n-ary" if traits.n_ary else "binary") + (", PKC" if traits.partially_known else "")
-    return [
-        "optimisation" if traits.costs else "satisfaction",
-        _yes(said=traits.complete),
-        "-" if row.name == CENTRAL else _yes(said=traits.synchronous),
-        constraints,
-        _yes(said=traits.dynamic),
-        on_one_line(traits.paper),
-        on_one_line(traits.privacy),
-    ]
+        return ["broken", *("-" for _ in headings[1:])]
+    cells = {
+        "for": "optimisation" if traits.costs else "satisfaction",
+        "complete": _yes(holds=traits.complete),
+        "synchronous": "-" if row.name == CENTRAL else _yes(holds=traits.synchronous),
+        "constraints": ("n-ary" if traits.n_ary else "binary") + (", PKC" if traits.partially_known else ""),
+        "dynamic": _yes(holds=traits.dynamic),
+        "privacy": traits.privacy,
+        "paper": traits.paper,
+        "use when": traits.use_when,
+    }
+    return [cells[heading] for heading in headings]
 
 
-def _yes(*, said: bool) -> str:
-    return "yes" if said else "no"
+def _yes(*, holds: bool) -> str:
+    return "yes" if holds else "no"

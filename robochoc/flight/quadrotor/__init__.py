@@ -1,1 +1,1 @@
-"""Simulated quadrotors: bodies, motors, control, wind, and what they meet. `robochoc.flight.flight` flies them."""
+"""Simulated quadrotors: rigid bodies, motors, control, wind and obstacles. `robochoc.flight.flight` flies them."""

@@ -1,13 +1,13 @@
-"""The quadrotor that flies: figures, and where each is from.
+"""The airframe of the simulated quadrotor: its parameters, and their sources.
 
 The airframe is an AscTec Hummingbird as RotorS has it: Furrer, Burri, Achtelik, Siegwart, "RotorS - A Modular Gazebo
 MAV Simulator Framework", 2016, and its `hummingbird.xacro`. Its arms lie along the body's x and y axes; z is up. From
 tip to tip of its rotors it measures 0.54 m.
 
-RotorS: the masses of body and rotors, the arm, the inertia of the body, thrust and moment per rotor speed, the highest
-speed, the time constants, the drag coefficient. Ours: the rotors' masses are points at the ends of the arms; the lag is
-one of the thrust, where RotorS has it in the speed; drag is linear, the same in all directions, and as it is in hover,
-where RotorS has it grow with the rotors' speed and act across their axes only.
+From RotorS: the masses of body and rotors, the arm, the inertia of the body, thrust and moment per rotor speed, the
+highest speed, the time constants, the drag coefficient. Ours: the rotors' masses are points at the ends of the arms;
+the lag is one of the thrust (in RotorS, of the speed); drag is linear, the same in all directions, and as in hover (in
+RotorS it grows with the rotors' speed, and acts across their axes only).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _ROTOR_KG = 0.009
 _BODY_INERTIA = (0.007, 0.007, 0.012)
 _ARM_M = 0.17
 _THRUST_PER_SPEED_SQUARED = 8.54858e-6
-_FASTEST = 838.0
+_SPEED_MAX = 838.0
 _MOMENT_PER_THRUST_M = 0.016
 _DRAG_PER_ROTOR = 8.06428e-5
 
@@ -42,20 +42,20 @@ class Airframe:
     inertia: tuple[float, float, float]
     """kg m^2, about the body's axes"""
     arm: float
-    """m, from the middle to a rotor's axis"""
+    """m, from the centre to a rotor's axis"""
     moment: float
-    """m: a rotor's drag torque, by its thrust"""
-    strongest: float
-    """N: a rotor's greatest thrust"""
+    """m: a rotor's drag torque, per thrust"""
+    thrust_max: float
+    """N, of a rotor"""
     lag_up: float
-    """s: time constant with which a rotor's thrust grows"""
+    """s: time constant of a rotor's thrust when it grows"""
     lag_down: float
-    """s: and falls"""
+    """s: and when it falls"""
     drag: float
-    """N by m/s: linear drag against the air"""
+    """N per m/s: linear drag against the air"""
 
     def mixing(self) -> Array:
-        """(4, 4): from the rotors' thrusts to the whole thrust and the torques about x, y and z."""
+        """Return the matrix (4, 4) from the rotors' thrusts to the total thrust and the torques about x, y and z."""
         arm, moment = self.arm, self.moment
         return np.array(
             [[1, 1, 1, 1], [0, arm, 0, -arm], [-arm, 0, arm, 0], [moment, -moment, moment, -moment]], dtype=np.float64
@@ -72,7 +72,7 @@ def _hummingbird() -> Airframe:
         inertia=(across + 2 * at_ends, along + 2 * at_ends, up + 4 * at_ends),
         arm=_ARM_M,
         moment=_MOMENT_PER_THRUST_M,
-        strongest=_THRUST_PER_SPEED_SQUARED * _FASTEST**2,
+        thrust_max=_THRUST_PER_SPEED_SQUARED * _SPEED_MAX**2,
         lag_up=0.0125,
         lag_down=0.025,
         drag=ROTORS * _DRAG_PER_ROTOR * hover,

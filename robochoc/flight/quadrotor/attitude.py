@@ -8,9 +8,9 @@ from robochoc.flight.quadrotor.airframe import Array
 
 
 def quaternions(axes: Array) -> Array:
-    """(..., 4) x y z w of rotations (..., 3, 3), of which `[..., k, :]` is the turned axis k.
+    """Return unit quaternions x, y, z, w (..., 4) of rotations (..., 3, 3); `[..., k, :]` is the turned axis k.
 
-    By Shepperd, "Quaternion from rotation matrix", 1978: of four ways the one without cancellation.
+    After Shepperd, "Quaternion from rotation matrix", 1978: of four ways, the one without cancellation.
     """
     xx, yy, zz = axes[..., 0, 0], axes[..., 1, 1], axes[..., 2, 2]
     squares = np.stack([1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz], axis=-1)

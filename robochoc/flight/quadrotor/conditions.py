@@ -1,4 +1,4 @@
-"""What a flight meets with: the distance to keep, wind, motors that stop, obstacles."""
+"""The conditions of a flight: the distance to keep, wind, motor failures, obstacles."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from robochoc.flight.layout import Point
 from robochoc.flight.quadrotor.airframe import ROTORS
 
-FASTEST_M_S = 200.0
+WIND_MAX_M_S = 200.0
 """No wind on the ground is faster."""
-LEAST_M = 0.01
-"""No distance between drones is less: plans look at steps of time that are short enough for it."""
+DISTANCE_MIN_M = 0.01
+"""The planner's time steps are short enough for this distance."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,19 @@ class MotorFailure:
 
 @dataclass(frozen=True)
 class FlightConditions:
-    """Of a whole flight. The same conditions give the same flight.
+    """The conditions of a whole flight. The same conditions give the same flight.
 
-    `distance`, in metres between drones' middles, is kept by all plans; None: 0.5, or less where homes or goals are
-    nearer to each other. `wind` is its mean velocity and `gusts` the standard deviation of each of its components, in
-    m/s; `seed` is that of the gusts. `obstacles` are points; see `robochoc.flight.flight`. Raises `ValueError`.
+    Attributes:
+        distance: Metres between drones' centres that all routes keep; None: 0.5, or less where homes or goals are
+            nearer to each other.
+        wind: The mean velocity of the wind, in m/s.
+        gusts: The standard deviation of each component of the wind, in m/s.
+        seed: The seed of the gusts.
+        failures: The motors that stop.
+        obstacles: Points; see `robochoc.flight.flight`.
+
+    Raises:
+        ValueError: A value is out of range.
     """
 
     distance: float | None = None
@@ -41,14 +49,14 @@ class FlightConditions:
     obstacles: tuple[Point, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.distance is not None and not LEAST_M <= self.distance < math.inf:
-            told = f"a positive number of metres, {LEAST_M:g} at least, not {self.distance}"
+        if self.distance is not None and not DISTANCE_MIN_M <= self.distance < math.inf:
+            told = f"a positive number of metres, {DISTANCE_MIN_M:g} at least, not {self.distance}"
             raise ValueError(f"the distance between drones has to be {told}")
-        if not 0 <= self.gusts <= FASTEST_M_S:
-            raise ValueError(f"gusts have to be a number from 0 to {FASTEST_M_S:g} m/s, not {self.gusts}")
-        if max(map(abs, self.wind), default=0) > FASTEST_M_S:
+        if not 0 <= self.gusts <= WIND_MAX_M_S:
+            raise ValueError(f"gusts have to be a number from 0 to {WIND_MAX_M_S:g} m/s, not {self.gusts}")
+        if max(map(abs, self.wind), default=0) > WIND_MAX_M_S:
             told = ", ".join(f"{part:g}" for part in self.wind)
-            raise ValueError(f"a wind of ({told}) is faster than {FASTEST_M_S:g} m/s")
+            raise ValueError(f"a wind of ({told}) is faster than {WIND_MAX_M_S:g} m/s")
         if self.seed < 0:
             raise ValueError(f"a seed has to be a number from 0 on, not {self.seed}")
         for what, point in (("wind", self.wind), *(("obstacle", place) for place in self.obstacles)):
@@ -61,7 +69,7 @@ class FlightConditions:
                 raise ValueError(f"a motor can stop from second 0 on, not at {failure.at_s}")
 
     def check(self, names: Collection[str]) -> None:
-        """That all whose motors stop are among `names`. Raises `ValueError`."""
+        """Raise `ValueError` if a drone of `failures` is not among `names`."""
         for failure in self.failures:
             if failure.drone not in names:
                 raise ValueError(f"no drone is called {failure.drone!r}; there are: {', '.join(names)}")

@@ -1,4 +1,4 @@
-"""Places among others: how near any two are, and which are free."""
+"""Points among others: how near any two are, and which are free."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy as np
 from robochoc.flight.quadrotor.airframe import Array
 
 _STEPS = 8
-"""Steps of half a distance, in each direction, in which free places are looked for."""
+"""Free points are searched for in so many steps of half a distance, in each direction."""
 
 
 def nearest_two(points: Array) -> float:
-    """How near two of `points` (K, 3) are; infinite if there are not two."""
+    """Return the distance of the nearest two of `points` (K, 3); infinite for fewer than two."""
     if len(points) < 2:  # noqa: PLR2004 - a pair
         return float("inf")
     apart = _distances(points, points)
@@ -20,14 +20,14 @@ def nearest_two(points: Array) -> float:
 
 
 def nearest_distances(points: Array, others: Array) -> Array:
-    """(K,): how near the nearest of `others` (M, 3) is to each of `points` (K, 3); infinite without others."""
+    """Return the distance (K,) of each of `points` (K, 3) to the nearest of `others` (M, 3); infinite without any."""
     return np.asarray(_distances(points, others).min(axis=1, initial=np.inf))
 
 
 def free_point(wish: Array, taken: Array, radii: Array, ground: float, *, low: bool) -> Array:
-    """A place that is `radii` (M,) from `taken` (M, 3): `wish`, or the nearest to it of those on a grid.
+    """Return `wish`, or the nearest point to it on a grid, that is `radii` (M,) away from `taken` (M, 3).
 
-    On the ground if it is to be `low`, else not much lower than `wish`.
+    It is on the ground if `low`, else not much lower than `wish`.
     """
     step = float(radii.max(initial=0.5)) / 2
     steps = np.arange(-_STEPS, _STEPS + 1) * step

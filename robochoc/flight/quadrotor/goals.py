@@ -1,4 +1,4 @@
-"""Where drones fly in a leg: to what was asked for, or, where something lies or hangs there, near it."""
+"""The goals of a leg: the points that were asked for, or free points near them where an obstacle is in the way."""
 
 from __future__ import annotations
 
@@ -12,45 +12,47 @@ import numpy as np
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Goal
 from robochoc.flight.quadrotor.airframe import Array
-from robochoc.flight.quadrotor.conditions import LEAST_M
+from robochoc.flight.quadrotor.conditions import DISTANCE_MIN_M
 from robochoc.flight.quadrotor.free_points import free_point, nearest_distances, nearest_two
 from robochoc.flight.quadrotor.rigid_bodies import Mask
 from robochoc.flight.routes.spacing import SLACK_M
 
 MARGIN_M = 0.1
-"""Plans keep so much more than the distance. Tracking takes 1 cm of it in calm air, and 6 cm where a drone takes off
-into a wind of 5 m/s (`tests/unit/flight/test_rigid_bodies.py`); two drones may use it up towards each other."""
+"""Routes keep so much more than the distance. Tracking errors take 1 cm of it in calm air, and 6 cm where a drone takes
+off into a wind of 5 m/s (`tests/unit/flight/test_rigid_bodies.py`). Two drones may use it up towards each other.
+"""
 _ALL_BUT = 0.999
-"""Of what starts and goals leave: rounding must not make a plan impossible."""
+"""Of the distance between starts or goals: rounding must not make a route impossible."""
 _STAGGER_S = 2.0
-"""Between the first row's start and the last one's, at most."""
+"""The time between the first row's start and the last one's, at most."""
 _ROW_S = 0.25
 _LOW_M = 1e-6
 
 
 @dataclass(frozen=True)
 class Hazards:
-    """Points (M, 3) to keep away from, and how far (M,)."""
+    """Points (M, 3) to keep away from, and their radii (M,)."""
 
     points: Array
     radii: Array
 
     def meet(self, place: Array) -> bool:
-        """Whether `place` is too near to one of them."""
+        """Return whether `place` is too near to one of them."""
         return bool((np.sqrt(np.square(self.points - place).sum(1)) < self.radii).any())
 
 
 class LegGoals:
-    """The `places` (N, 3) to fly to: the `goals`, or where drones are (`starts`) that have none.
+    """The `places` (N, 3) to fly to: the `goals`, or the `starts` of drones without a goal. Failed drones do not count.
 
-    Two goals that are nearer to each other than `distance` raise `ValueError`. Those that are lost do not count.
+    Raises:
+        ValueError: Two goals are nearer to each other than `distance`.
     """
 
     def __init__(
-        self, names: Sequence[str], goals: Mapping[int, Goal], starts: Array, lost: Mask, distance: float
+        self, names: Sequence[str], goals: Mapping[int, Goal], starts: Array, failed: Mask, distance: float
     ) -> None:
-        self.who = np.flatnonzero(~lost)
-        self.goals = {number: goal for number, goal in goals.items() if not lost[number]}
+        self.who = np.flatnonzero(~failed)
+        self.goals = {number: goal for number, goal in goals.items() if not failed[number]}
         self.places = np.array(starts)
         for number, goal in self.goals.items():
             self.places[number] = goal.at
@@ -58,18 +60,18 @@ class LegGoals:
         check_separation("goals", names, {number: goal.at for number, goal in self.goals.items()}, distance)
 
     def planned(self, starts: Array, hazards: Hazards | None = None) -> float:
-        """The distance that a plan from `starts` (N, 3) keeps: with a margin, or as much of it as all places leave."""
+        """Return the distance that routes from `starts` (N, 3) keep: with the margin, or what places leave of it."""
         leave = min(nearest_two(starts[self.who]), nearest_two(self.places[self.who]))
         if hazards is not None:
             apart = nearest_distances(hazards.points, self._ends(starts))
             leave = min(leave, float(apart[apart >= self._distance].min(initial=np.inf)))
         return max(self._distance, min(self._distance + MARGIN_M, _ALL_BUT * leave))
 
-    def give_way(self, hazards: Hazards, wishes: Array, ground: float) -> list[tuple[int, str]]:
-        """Choose other places for those that cannot have theirs; says who, and what it does instead.
+    def give_way(self, hazards: Hazards, preferred: Array, ground: float) -> list[tuple[int, str]]:
+        """Replace places that are not free; return which drones are moved, and what each does instead, in words.
 
-        Goals give way to hazards, and drones that only stay where they are to others' goals. They get the free place
-        that is nearest to their `wishes` (N, 3).
+        Goals give way to hazards. Drones that only stay where they are give way to others' goals. Each gets the free
+        point that is nearest to its `preferred` one (N, 3).
         """
         told = []
         going = np.array([number for number in self.who.tolist() if number in self.goals], dtype=np.intp)
@@ -88,13 +90,13 @@ class LegGoals:
             low = goal.lands if goal is not None else place[2] <= ground + _LOW_M
             radii = np.full(len(others), self._distance + MARGIN_M)
             taken = Hazards(np.vstack((others, hazards.points)), np.concatenate((radii, hazards.radii)))
-            self.places[number] = free_point(wishes[number], taken.points, taken.radii, ground, low=bool(low))
+            self.places[number] = free_point(preferred[number], taken.points, taken.radii, ground, low=bool(low))
             aside = float(np.sqrt(np.square(self.places[number] - place).sum()))
             told.append((number, f"{'lands' if low else 'hovers'} {aside:.2f} m aside: {why}"))
         return told
 
     def standing(self, hazards: Hazards, starts: Array, planned: float) -> Array:
-        """Those of the hazards that a plan can avoid: nobody starts or stays too near."""
+        """Return the hazards that routes can avoid: no drone starts or ends too near to them."""
         return np.asarray(hazards.points[nearest_distances(hazards.points, self._ends(starts)) >= planned])
 
     def _ends(self, starts: Array) -> Array:
@@ -102,24 +104,26 @@ class LegGoals:
 
 
 def needed(distance: float) -> float:
-    """How far apart places have to be so that drones keep `distance`: nobody is exactly where it is wanted."""
+    """Return how far apart places must be so that drones keep `distance`: tracking is not exact."""
     return distance + min(MARGIN_M, distance / 4)
 
 
 def check_separation(what: str, names: Sequence[str], places: Mapping[int, Point], distance: float) -> None:
-    """That no two `places`, by drones' numbers, are too near to each other to keep `distance`. Raises `ValueError`."""
+    """Raise `ValueError` if two of `places`, by drones' numbers, are too near to keep `distance`."""
     least = needed(distance) - SLACK_M
     if nearest_two(np.array([*places.values()]).reshape(-1, 3)) >= least:
         return
     for (first, one), (second, other) in combinations(places.items(), 2):
         gap = math.dist(one, other)
         if gap < least:
-            told = f"{gap:.2f}" if gap >= LEAST_M else f"{gap:.1g}"
+            told = f"{gap:.2f}" if gap >= DISTANCE_MIN_M else f"{gap:.1g}"
             asked = f"{distance:g} m are to be kept" + (
                 f", which takes {needed(distance):g} m" if gap >= distance - SLACK_M else ""
             )
             step = (
-                "ask for a smaller distance, or for a larger scale" if distance > LEAST_M else "ask for a larger scale"
+                "ask for a smaller distance, or for a larger scale"
+                if distance > DISTANCE_MIN_M
+                else "ask for a larger scale"
             )
             raise ValueError(
                 f"the {what} of {names[first]} and {names[second]} are {told} m apart, and {asked}: {step}"
@@ -127,7 +131,7 @@ def check_separation(what: str, names: Sequence[str], places: Mapping[int, Point
 
 
 def start_delays(goals: Mapping[int, Goal], homes: Array) -> Array:
-    """(N,) in seconds: those that land begin, then row by row, by the x of their homes."""
+    """Return delays (N,) in seconds: drones that land start first, then row by row, by the x of their homes."""
     lands = np.array([number in goals and goals[number].lands for number in range(len(homes))])
     _, rows = np.unique(homes[:, 0], return_inverse=True)
     turns = np.where(lands, 0, rows.reshape(-1) + bool(lands.any()))

@@ -1,4 +1,4 @@
-"""Obstacles that nobody knows of: who is going to come near them, and who sees one."""
+"""Encounters with obstacles that the planner does not know."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.trajectory import Trajectory
 
 _LOOK_S = 0.05
-"""How closely a plan is looked at: at 2 m/s a drone flies 0.1 m meanwhile."""
+"""The step at which trajectories are sampled: at 2 m/s a drone flies 0.1 m meanwhile."""
 _LOOK_M = 0.1
 
 
 class ObstacleEncounter(NamedTuple):
-    """A drone's plan leads it nearer than `keep` to an obstacle, for the last time at second `until` of the plan."""
+    """A drone's trajectory is nearer than `keep` to an obstacle, last at second `until` of the trajectory."""
 
     obstacle: int
     drone: int
@@ -24,7 +24,7 @@ class ObstacleEncounter(NamedTuple):
 
 
 def encounters(trajectory: Trajectory, obstacles: dict[int, Array], keep: float) -> list[ObstacleEncounter]:
-    """Everybody whom the plan brings nearer than `keep` to one of the `obstacles`, by their numbers."""
+    """Return all encounters with `obstacles`, which are given by their numbers."""
     if not obstacles:
         return []
     times = np.append(np.arange(0.0, trajectory.plan.duration_s, _LOOK_S), trajectory.plan.duration_s)

@@ -2,7 +2,7 @@
 
 The integrator is of second order: motors exactly (their commands are constant within a step), body rates by the
 midpoint rule, rotations by the Cayley map, which keeps them orthonormal up to rounding (Hairer, Lubich, Wanner,
-"Geometric Numerical Integration", 2006, Section IV.8), places with the mean thrust of the step, and drag implicitly.
+"Geometric Numerical Integration", 2006, Section IV.8), positions with the mean thrust of the step, and drag implicitly.
 """
 
 from __future__ import annotations
@@ -16,18 +16,23 @@ from robochoc.flight.quadrotor.airframe import GRAVITY, Airframe, Array
 
 Mask = npt.NDArray[np.bool_]
 
-HARD_M_S = 2.0
-"""Who touches the ground faster than that, or lies more than `STEEP` on its side, does not fly again."""
-STEEP = math.cos(math.radians(45))
+IMPACT_MAX_M_S = 2.0
+"""A drone that touches the ground faster, or tilted by more than `TILT_MAX_COSINE` says, does not fly again."""
+TILT_MAX_COSINE = math.cos(math.radians(45))
 _LEVELLING_S = 0.1
-"""The feet turn a drone that stands upright, with this time constant."""
+"""The time constant with which its feet level a drone that stands."""
 
 
 class RigidBodies:
-    """N drones. `state` is (6, N): position and velocity, in the world's frame, whose z is up.
+    """N drones on the ground or in the air.
 
-    `axes` is (3, 3, N): `axes[k]` is the body's axis k in the world. `rates` (3, N), rad/s, are about the body's
-    axes, and `thrusts` (4, N), N, are the rotors'. Who `stands` or has fallen is held by the ground.
+    Attributes:
+        state: (6, N), position and velocity in the world's frame, whose z is up.
+        axes: (3, 3, N): `axes[k]` is the body's axis k in the world.
+        rates: (3, N), rad/s, about the body's axes.
+        thrusts: (4, N), N, of the rotors.
+        stands: (N,): held by the ground.
+        fallen: (N,): crashed; these are held by the ground for good.
     """
 
     def __init__(self, homes: Array, ground: float, airframe: Airframe, dt: float) -> None:
@@ -42,8 +47,8 @@ class RigidBodies:
         self.thrusts = np.zeros((4, number))
         self.stands: Mask = np.ones(number, dtype=np.bool_)
         self.fallen: Mask = np.zeros(number, dtype=np.bool_)
-        self.broken = np.ones((4, number))
-        """0 for a motor that has stopped."""
+        self.motors_running = np.ones((4, number))
+        """0 for a motor that has stopped, else 1."""
         self._ground = ground
         self._airframe = airframe
         self._dt = dt
@@ -65,10 +70,10 @@ class RigidBodies:
         return self._axes
 
     def step(self, command: Array, air: Array) -> None:
-        """One step with these thrusts (4, N) commanded, in air that moves at `air` m/s: (3, N) or (3, 1)."""
+        """Advance by one step with commanded thrusts (4, N), in air that moves at `air` m/s: (3, N) or (3, 1)."""
         before = self.state[:2].copy() if self.stands.any() else None
         axes_before = None if before is None else self._axes.copy()
-        wrench = self._mixing @ self._spin(command * self.broken)
+        wrench = self._mixing @ self._spin(command * self.motors_running)
         up = self._axes[2].copy()
         self._turn(wrench[1:])
         up += self._axes[2]
@@ -78,8 +83,8 @@ class RigidBodies:
             self._touch(low, before, axes_before)
 
     def stop_motor(self, drone: int, motor: int) -> None:
-        """From now on it gives no thrust. A drone that stands does not fly again."""
-        self.broken[motor, drone] = 0
+        """Stop a motor: it gives no thrust from now on. A drone on the ground does not fly again."""
+        self.motors_running[motor, drone] = 0
         self.fallen[drone] |= self.stands[drone]
 
     def lay(self, drone: int, place: Array) -> None:
@@ -91,13 +96,13 @@ class RigidBodies:
         self.stands[drone] = self.fallen[drone] = True
 
     def energy(self) -> Array:
-        """(N,) in J: kinetic, of both kinds, and potential above the ground."""
+        """Return the energy (N,) in J: kinetic, of translation and rotation, and potential above the ground."""
         mass, inertia = self._airframe.mass, np.array(self._airframe.inertia)[:, None]
         moving = mass / 2 * (self.state[3:] ** 2).sum(0) + (inertia / 2 * self.rates**2).sum(0)
         return np.asarray(moving + mass * GRAVITY * (self.state[2] - self._ground))
 
     def _spin(self, command: Array) -> Array:
-        """The mean thrusts of the step, at whose end they stand."""
+        """Return the mean thrusts of the step, and advance the thrusts to its end."""
         gap = command - self.thrusts
         grows = gap > 0
         mean = command - gap * np.where(grows, *self._means)
@@ -105,7 +110,7 @@ class RigidBodies:
         return np.asarray(mean)
 
     def _turn(self, torque: Array) -> None:
-        """Euler's equation by the midpoint rule, then the rotation by the rates in the middle of the step."""
+        """Advance by Euler's equation with the midpoint rule, then turn by the rates in the middle of the step."""
         dt, spin = self._dt, self._turning
         push = torque * self._per_inertia
         spin[:3] = self.rates
@@ -128,7 +133,7 @@ class RigidBodies:
         self._axes[3:] = self._axes[:2]
 
     def _move(self, thrust: Array, air: Array) -> None:
-        """Newton's law. `thrust` is twice the force, as it is the sum of its directions before and after."""
+        """Advance by Newton's law. `thrust` is twice the force: the sum of its directions before and after."""
         dt, frame = self._dt, self._airframe
         drag = frame.drag / frame.mass
         velocity = self.state[3:]
@@ -139,10 +144,12 @@ class RigidBodies:
         velocity += push
 
     def _touch(self, low: Mask, before: Array | None, axes_before: Array | None) -> None:
-        """The ground takes up whoever came too low, and holds it."""
+        """Hold on the ground all drones that are too low."""
         hit = low & ~self.stands & ~self.fallen
         if hit.any():
-            self.fallen |= hit & ((self.state[5] < -HARD_M_S) | (self._axes[2, 2] < STEEP) | ~self.broken.all(0))
+            self.fallen |= hit & (
+                (self.state[5] < -IMPACT_MAX_M_S) | (self._axes[2, 2] < TILT_MAX_COSINE) | ~self.motors_running.all(0)
+            )
         held = low & self.stands
         if before is not None and axes_before is not None:
             np.copyto(self.state[:2], before, where=held)

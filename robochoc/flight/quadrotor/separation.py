@@ -1,9 +1,9 @@
-"""The nearest that two drones ever come, measured at every step of a simulation.
+"""The smallest distance that two drones ever have, measured at every step of a simulation.
 
 Pairs are listed as Verlet does ("Computer 'experiments' on classical fluids", 1967): a pair is on the list if it is at
-most `_REACH_M` further apart than the nearest pair seen so far. Until one of the drones has moved by half of that, no
-other pair can have come nearer than the nearest seen; then the list is made anew. So at most steps a few pairs are
-measured, and yet what is found is the least of all pairs at all steps.
+most `_REACH_M` further apart than the nearest pair so far. Until one of the drones has moved by half of that, no other
+pair can have come nearer; then the list is made anew. So most steps measure a few pairs only, and the result is still
+the minimum over all pairs and steps.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ from robochoc.flight.quadrotor.rigid_bodies import Mask
 
 _REACH_M = 0.5
 _ROUNDING_M = 1e-6
-"""More than what is lost in the list's distances, which are taken by scalar products."""
+"""More than the rounding of the list's distances, which are computed by scalar products."""
 
 
 class SeparationMonitor:
-    """Sees all drones at every step. Pairs with a drone that falls, or has fallen, are counted apart."""
+    """Measures all drones' distances at every step. Pairs with a drone that falls, or has fallen, count separately."""
 
     def __init__(self, number: int) -> None:
         self.nearest: ClosestApproach | None = None
         self.nearest_fallen: ClosestApproach | None = None
         self._pairs = np.triu_indices(number, 1)
-        self._lost: Mask = np.zeros(number, dtype=np.bool_)
+        self._failed: Mask = np.zeros(number, dtype=np.bool_)
         self._anchor: Array | None = None
         self._first: npt.NDArray[np.intp] = self._pairs[0]
         self._second: npt.NDArray[np.intp] = self._pairs[1]
         self._sound = 0
 
     def observe(self, places: Array, at_s: float) -> None:
-        """Everybody's place (3, N) at a time."""
+        """Measure the positions (3, N) at a time."""
         if not len(self._pairs[0]):
             return
         if self._anchor is None or self._moved(places, self._anchor):
@@ -49,14 +49,14 @@ class SeparationMonitor:
         if sound < len(squares):
             self.nearest_fallen = self._nearer(self.nearest_fallen, squares[sound:], sound, at_s)
 
-    def exclude(self, lost: Mask) -> None:
-        """From now on these have fallen, or fall."""
-        self._lost = lost.copy()
+    def exclude(self, failed: Mask) -> None:
+        """Count pairs with these drones separately from now on."""
+        self._failed = failed.copy()
         self._anchor = None
 
     @staticmethod
     def _moved(places: Array, anchor: Array) -> bool:
-        """Whether pairs that are not on the list may count by now."""
+        """Return whether pairs that are not on the list may count by now."""
         way = places - anchor
         way *= way
         return bool((way[0] + way[1] + way[2]).max() >= (_REACH_M / 2) ** 2)
@@ -66,17 +66,17 @@ class SeparationMonitor:
         lengths = np.square(places).sum(0)
         products = places.T @ places
         squares = (lengths[:, None] + lengths - 2 * products)[first, second]
-        lost = self._lost[first] | self._lost[second]
+        failed = self._failed[first] | self._failed[second]
         near = np.zeros(len(first), dtype=np.bool_)
-        for which, least in ((~lost, self.nearest), (lost, self.nearest_fallen)):
+        for which, least in ((~failed, self.nearest), (failed, self.nearest_fallen)):
             if which.any():
                 best = np.sqrt(max(squares[which].min(), 0))
                 if least is not None:
                     best = min(best, least.distance_m)
                 near |= which & (squares <= (best + _REACH_M + _ROUNDING_M) ** 2)
-        chosen = np.concatenate((np.flatnonzero(near & ~lost), np.flatnonzero(near & lost)))
+        chosen = np.concatenate((np.flatnonzero(near & ~failed), np.flatnonzero(near & failed)))
         self._first, self._second = first[chosen], second[chosen]
-        self._sound = int((near & ~lost).sum())
+        self._sound = int((near & ~failed).sum())
         self._anchor = places.copy()
 
     def _nearer(

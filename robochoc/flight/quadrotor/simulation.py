@@ -1,4 +1,4 @@
-"""The simulation's loop: what is wanted, what the rotors do, what comes of it, what is noted down.
+"""The simulation's loop: setpoints, the rotors' commands, the bodies' motion, the log.
 
 The step, `DT`, was chosen by measurement. A flight of 4.7 m in a wind of 3 m/s differs by at most 0.5 mm from one with
 ten times as many steps between the same commands, and a body that tumbles freely at one turn a second for 10 s keeps
@@ -25,33 +25,33 @@ from robochoc.flight.quadrotor.wind import Wind
 STEPS_PER_SAMPLE = 4
 DT = 1 / (SAMPLE_RATE_HZ * STEPS_PER_SAMPLE)
 _CUT_OFF = math.cos(math.radians(60))
-"""A drone whose motor has stopped has the others switched off once it is further over."""
+"""A drone whose motor has stopped has the others switched off once it is tilted further."""
 _PRESS_M = 0.05
-"""Who is to land is wanted so far below the ground, once it is right above its spot, so that it touches it."""
+"""The setpoint of a drone right above its landing point is so far below the ground, so that it touches it."""
 _ABOVE_M = 0.003
 _HOP_M = (0.01, 0.08)
-"""Who is wanted along the ground flies so far above it, at least and at most."""
+"""A drone with setpoints along the ground flies so far above it, at least and at most."""
 _HOP = 0.8
-"""Of what a plan keeps besides the distance: somebody may be right above."""
+"""The share of the routes' spare distance that this may take: another drone may be right above."""
 _TOUCH_M = 1e-6
 _BOUNDS = 1e6
-"""m and m/s: nobody is further away, or faster."""
+"""m and m/s: a state beyond is none."""
 
 
 class QuadrotorSimulation:
-    """N drones, step by step. `reference` (9, N) is what is wanted: place, velocity, acceleration."""
+    """Simulates N drones, step by step. `setpoints` (9, N) are their positions, velocities and accelerations."""
 
     def __init__(self, names: Sequence[str], homes: Array, ground: float, conditions: FlightConditions) -> None:
         number = len(names)
-        self.reference = np.zeros((9, number))
-        self.reference[:3] = homes.T
+        self.setpoints = np.zeros((9, number))
+        self.setpoints[:3] = homes.T
         self.events: list[FlightEvent] = []
         self.hop_m = _HOP_M[1]
-        self.broken: list[tuple[int, str, float]] = []
-        """Who cannot fly any more: its number, why, since when."""
+        self.failures: list[tuple[int, str, float]] = []
+        """Drones that cannot fly any more: number, reason, time in seconds."""
         self.separation = SeparationMonitor(number)
-        self.lost: Mask = np.zeros(number, dtype=np.bool_)
-        """Who falls or has fallen."""
+        self.failed: Mask = np.zeros(number, dtype=np.bool_)
+        """(N,): the drones that fall or have fallen."""
         self._names = names
         self._ground = ground
         self._bodies = RigidBodies(homes, ground, HUMMINGBIRD, DT)
@@ -73,66 +73,66 @@ class QuadrotorSimulation:
 
     @property
     def places(self) -> Array:
-        """(N, 3): where everybody is."""
+        """The drones' positions (N, 3)."""
         return np.asarray(self._bodies.state[:3].T)
 
     @property
     def is_sampled(self) -> bool:
-        """Whether what is now has just been noted down."""
+        """Whether the present state has just been logged."""
         return self._steps % STEPS_PER_SAMPLE == 0
 
     @property
     def falling(self) -> Mask:
-        """Who is on its way down."""
-        return self.lost & ~self._bodies.fallen
+        """The drones on their way down."""
+        return self.failed & ~self._bodies.fallen
 
     def settled(self, near: float, slow: float) -> bool:
-        """Whether all that can fly are so near their references and so slow, and nobody falls any more."""
-        gaps = np.square(self.reference[:3] - self._bodies.state[:3]).sum(0)
+        """Return whether no drone falls, and all others are so near to their setpoints and so slow."""
+        gaps = np.square(self.setpoints[:3] - self._bodies.state[:3]).sum(0)
         speeds = np.square(self._bodies.state[3:]).sum(0)
-        low = self.reference[2] <= self._ground + _TOUCH_M
-        calm = np.where(low, self._bodies.stands, (gaps < near**2) & (speeds < slow**2)) | self.lost
+        low = self.setpoints[2] <= self._ground + _TOUCH_M
+        calm = np.where(low, self._bodies.stands, (gaps < near**2) & (speeds < slow**2)) | self.failed
         return bool(calm.all()) and not self.falling.any()
 
     def tracking_errors(self) -> Array:
-        """(N,): how far everybody is from its reference; 0 for the lost."""
-        gaps = np.sqrt(np.square(self.reference[:3] - self._bodies.state[:3]).sum(0))
-        return np.where(self.lost, 0.0, gaps)
+        """Return each drone's distance (N,) from its setpoint; 0 for failed ones."""
+        gaps = np.sqrt(np.square(self.setpoints[:3] - self._bodies.state[:3]).sum(0))
+        return np.where(self.failed, 0.0, gaps)
 
     def advance(self, trajectory: Trajectory | None = None, *, late: bool = False) -> None:
-        """One step along `trajectory`. Who is to land and is `late` does so where it is."""
+        """Advance by one step along `trajectory`. If `late`, drones that are to land do so where they are."""
         while self._due and self._due[-1].at_s <= self.now_s:
             self._fail(self._due.pop())
         if trajectory is not None:
             trajectory.refer()
             trajectory.advance(DT)
         bodies = self._bodies
-        low = self.reference[2] <= self._ground + _TOUCH_M
-        moving = np.logical_or.reduce(self.reference[3:6] != 0)
+        low = self.setpoints[2] <= self._ground + _TOUCH_M
+        moving = np.logical_or.reduce(self.setpoints[3:6] != 0)
         idle = low & bodies.stands & ~moving
         low &= ~idle
         idle |= self._off
-        wanted = self._lowest(low, moving, late=late) if low.any() else self.reference
+        wanted = self._lowest(low, moving, late=late) if low.any() else self.setpoints
         bodies.step(self._controller.command(bodies, wanted, idle), self._wind.air())
         self._steps += 1
         if not bool(np.abs(bodies.state).max() < _BOUNDS):  # true of nan as well
             self._rescue()
-        if self.broken or bodies.fallen.any():
+        if self.failures or bodies.fallen.any():
             self._look_after_the_lost()
         self.separation.observe(bodies.state[:3], self.now_s)
         if self.is_sampled:
             self._note()
 
     def set_spare_distance(self, spare: float) -> None:
-        """From now on plans keep `spare` metres besides the distance."""
+        """Set how many metres routes keep besides the distance, from now on."""
         self.hop_m = min(max(_HOP * spare, _HOP_M[0]), _HOP_M[1])
 
     def log_event(self, drone: int, what: str) -> None:
-        """Note a happening now."""
+        """Log an event of `drone` now."""
         self.events.append(FlightEvent(self.now_s, drone, what))
 
     def record(self) -> tuple[Array, Array, Array]:
-        """Times (T,), positions (T, N, 3) and attitudes (T, N, 4) of all samples."""
+        """Return times (T,), positions (T, N, 3) and attitudes (T, N, 4) of all samples."""
         times = np.arange(len(self._places)) / SAMPLE_RATE_HZ
         positions = np.ascontiguousarray(np.stack(self._places).transpose(0, 2, 1))
         return times, positions, quaternions(np.stack(self._axes).transpose(0, 3, 1, 2))
@@ -142,43 +142,43 @@ class QuadrotorSimulation:
         self._axes.append(self._bodies.axes.copy())
 
     def _lowest(self, low: Mask, moving: Mask, *, late: bool) -> Array:
-        """What is wanted, those being `low` who are wanted on the ground: nobody slides along it."""
-        aside = np.square(self.reference[:2] - self._bodies.state[:2]).sum(0)
+        """Return the setpoints, with those of the `low` drones moved off the ground, or below it to land."""
+        aside = np.square(self.setpoints[:2] - self._bodies.state[:2]).sum(0)
         lands = low & ~moving & (late | (aside < _ABOVE_M**2))
-        wanted = self.reference.copy()
+        wanted = self.setpoints.copy()
         wanted[2] += self.hop_m * (low & moving) - _PRESS_M * lands
         return wanted
 
     def _fail(self, failure: MotorFailure) -> None:
         drone = self._names.index(failure.drone)
         self._bodies.stop_motor(drone, failure.motor)
-        if not self.lost[drone]:
+        if not self.failed[drone]:
             self._lose(drone, f"motor {failure.motor} has stopped")
             self._down[drone] = self._bodies.fallen[drone]
 
     def _lose(self, drone: int, why: str) -> None:
-        self.lost[drone] = True
+        self.failed[drone] = True
         self._off |= self._bodies.fallen
-        self.separation.exclude(self.lost)
-        self.broken.append((drone, why, self.now_s))
+        self.separation.exclude(self.failed)
+        self.failures.append((drone, why, self.now_s))
         self.log_event(drone, why)
 
     def _look_after_the_lost(self) -> None:
         bodies = self._bodies
-        self._off |= self.lost & (bodies.axes[2, 2] < _CUT_OFF)
+        self._off |= self.failed & (bodies.axes[2, 2] < _CUT_OFF)
         for drone in np.flatnonzero(bodies.fallen & ~self._down).tolist():
             self._down[drone] = self._off[drone] = True
-            if self.lost[drone]:
+            if self.failed[drone]:
                 self.log_event(drone, "hits the ground")
             else:
                 self._lose(drone, "has hit the ground")
 
     def _rescue(self) -> None:
-        """Who is beyond all bounds, or nowhere, lies below where it was noted last."""
+        """Put drones whose state is beyond all bounds on the ground, below their last logged position."""
         bodies = self._bodies
         for drone in np.flatnonzero(~(np.abs(bodies.state) < _BOUNDS).all(0)).tolist():
             bodies.lay(drone, self._places[-1][:, drone])
             self._controller.forget(drone)
             self._down[drone] = self._off[drone] = True
-            if not self.lost[drone]:
+            if not self.failed[drone]:
                 self._lose(drone, "has got out of all bounds")

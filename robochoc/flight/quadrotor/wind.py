@@ -1,8 +1,8 @@
-"""Wind: its mean, and gusts around it, the same each time from their seed.
+"""Wind: its mean, and gusts around it, reproducible from their seed.
 
 Gusts are first-order Gauss-Markov processes, as the longitudinal ones of the Dryden model are (MIL-F-8785C, Section
-3.7.1.2). Ours: they are so in all three directions, with one correlation time, and each drone has its own. Air is more
-alike over a metre or two; apart is the harder case for the distances between drones.
+3.7.1.2). Ours: they are so in all three directions, with one correlation time, and each drone has its own. Real air is
+more alike over a metre or two; independent gusts are the harder case for the distances between drones.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Wind:
         self._now = gusts * self._chance.standard_normal((3, number)) if gusts else np.zeros((3, 1))
 
     def air(self) -> Array:
-        """(3, N), or (3, 1) without gusts: the air's velocity in the next step."""
+        """Return the air's velocity in the next step: (3, N), or (3, 1) without gusts."""
         if not self._gusts:
             return self._mean
         drawn = self._chance.standard_normal(self._now.shape)

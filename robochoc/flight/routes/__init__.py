@@ -1,1 +1,1 @@
-"""Routes of many drones that keep their distance: which way each goes, and when (`timetable.plan`)."""
+"""Routes of many drones that keep their distance: paths, and when each drone flies (`timetable.plan_routes`)."""

@@ -1,4 +1,4 @@
-"""How a drone moves along its path, and where all of them are at any time.
+"""Motion of drones along their paths, and where all of them are at any time.
 
 Every straight piece of a path begins and ends at rest, in minimum-jerk motion: the polynomial of degree five whose
 velocity and acceleration are zero at both ends (Flash and Hogan, "The coordination of arm movements", 1985). So both
@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from robochoc.flight.routes.spacing import Array, norms
 
 _TOP_SPEED = 15 / 8
-"""The greatest speed of minimum-jerk motion over a unit of length in a unit of time: half way."""
+"""The greatest speed of minimum-jerk motion over a unit of length in a unit of time; half way."""
 _TOP_ACCELERATION = 10 / math.sqrt(3)
-"""And its greatest acceleration."""
+"""The greatest acceleration of the same."""
 
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """What a drone's motion never exceeds: `speed` in m/s, `acceleration` in m/s^2."""
+    """The limits of a drone's motion: `speed` in m/s, `acceleration` in m/s^2."""
 
     speed: float = 2.0
     acceleration: float = 2.0
@@ -35,7 +35,7 @@ class MotionLimits:
             raise ValueError(f"limits are positive numbers, not {self.speed} m/s and {self.acceleration} m/s^2")
 
     def durations(self, lengths: Array) -> Array:
-        """The shortest times (K,), in seconds, of motion over `lengths` (K,), from rest to rest."""
+        """Return the shortest times (K,), in seconds, of motion over `lengths` (K,), from rest to rest."""
         least: Array = np.maximum(
             _TOP_SPEED * lengths / self.speed, np.sqrt(_TOP_ACCELERATION * lengths / self.acceleration)
         )
@@ -44,7 +44,7 @@ class MotionLimits:
 
 @dataclass(frozen=True)
 class Motion:
-    """Where all are at a time, and how they move: metres, m/s, m/s^2, each (N, 3)."""
+    """Positions, velocities and accelerations of all drones at a time: m, m/s, m/s^2, each (N, 3)."""
 
     position: Array
     velocity: Array
@@ -52,7 +52,7 @@ class Motion:
 
 
 class Route:
-    """One drone's way along a path (K + 1, 3), from rest to rest, counted from when it begins."""
+    """One drone's motion along a path (K + 1, 3), from rest to rest. Time begins at 0 with it."""
 
     def __init__(self, drone: int, path: Array, limits: MotionLimits) -> None:
         self.drone = drone
@@ -62,7 +62,7 @@ class Route:
         self.duration_s = float(self._ends[-1])
 
     def sample(self, times: Array) -> Array:
-        """Where the drone is at `times` (T,): (T, 3)."""
+        """Return the drone's positions (T, 3) at `times` (T,)."""
         piece = np.minimum(np.searchsorted(self._ends, times, side="right"), len(self._ends) - 1)
         durations = self._durations[piece]
         share = np.clip((times - self._ends[piece] + durations) / durations, 0, 1)
@@ -71,7 +71,7 @@ class Route:
         return points
 
     def pieces(self, begins_s: float) -> tuple[Array, Array, Array, Array, Array]:
-        """Its straight pieces, begun at `begins_s`: when each begins and ends, how long it lasts, whence, whither."""
+        """Return its straight pieces, begun at `begins_s`: beginnings, ends, durations, origins, goals."""
         ends = begins_s + self._ends
         begins = np.concatenate(([begins_s], ends[:-1]))
         return begins, ends, self._durations, self.path[:-1], self.path[1:]
@@ -79,7 +79,7 @@ class Route:
 
 @dataclass(frozen=True)
 class _Window:
-    """A time in which nobody begins or ends a piece: who moves, and where the others rest."""
+    """A time in which no drone begins or ends a piece: the pieces in motion, and where the other drones rest."""
 
     begins_s: float
     ends_s: float
@@ -92,7 +92,7 @@ class _Window:
 
 
 class RoutePlan:
-    """Where everybody is from second 0 to `duration_s`. Made by `robochoc.flight.routes.timetable.plan`."""
+    """Where all drones are from second 0 to `duration_s`. Made by `robochoc.flight.routes.timetable.plan_routes`."""
 
     def __init__(self, starts: Array, flights: Sequence[tuple[Route, float]]) -> None:
         self._starts = starts.copy()
@@ -107,7 +107,7 @@ class RoutePlan:
         self._window = self._window_at(0.0)
 
     def at(self, s: float) -> Motion:
-        """Where everybody is at second `s` and how they move. Before 0 it is as at 0, and after the end as there."""
+        """Return the motion of all drones at second `s`. Before 0 it is as at 0, and after the end as there."""
         s = min(max(s, 0.0), self.duration_s)
         window = self._window
         if not window.begins_s <= s < window.ends_s:
@@ -153,6 +153,6 @@ _NONE = [np.empty(0), np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3
 
 
 def _way(share: Array) -> Array:
-    """The share of the length that is done after a `share` of the time."""
+    """Return the share of the length that is done after a `share` of the time."""
     way: Array = share * share * share * (10 + share * (6 * share - 15))
     return way

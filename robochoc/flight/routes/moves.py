@@ -1,17 +1,18 @@
-"""In which order drones move, if one moves at a time: each path is clear of all that are at rest meanwhile.
+"""The order in which drones move, if one moves at a time: each path is clear of all drones that rest meanwhile.
 
 A drone goes to its goal when that is free and a path leads there (`paths.py`). Where all that are not there yet block
-each other (they swap places, say), one of them steps aside, near its place if that helps, else into the sky.
+each other (they swap places, say), one of them makes room, near its place if that helps, else in the sky.
 
-It always ends: a drone steps aside near its place once and into the sky once, and then goes to its goal. If nobody can
-do even that, all begin anew with `_Emptied`: everybody, those that stay too, goes up, each to a place in the sky whose
-column is no other's, and then down to its goal. Who can go up does, so that there are ever fewer in the way of others:
-if it gets stuck, any other order does too. Down they go in the reverse of an order in which they could leave the goals.
+This always ends: a drone makes room near its place once and in the sky once, and then goes to its goal. If no drone can
+do even that, all begin anew with `_Emptied`: every drone, those that stay too, goes up, each to a place in the sky
+whose column is no other's, and then down to its goal. Each drone that can go up does, so that fewer are in the way of
+others: if it gets stuck, any other order does too. They go down in the reverse of an order in which they could leave
+the goals.
 
-So a way is found if all could go up from their starts, and from their goals, one after the other. Without standing
-points they can: the way up from the topmost leads away from all others, and across one flies at a height at which
-nobody rests, a distance above all places and a distance below those who wait. With them it fails only where they, or
-drones between which nobody fits, enclose somebody: that is `NoRouteError`.
+So a solution is found if all could go up from their starts, and from their goals, one after the other. Without standing
+points they can: the way up from the topmost leads away from all others, and drones cross at a height at which none
+rests, a distance above all places and a distance below those who wait. With standing points it fails only where these,
+or drones between which none fits, enclose a drone: that is `NoRouteError`.
 """
 
 from __future__ import annotations
@@ -40,18 +41,18 @@ class NoRouteError(ValueError):
 
 @dataclass(frozen=True)
 class Move:
-    """A drone goes along a path (K + 1, 3), from rest to rest."""
+    """A drone's move along a path (K + 1, 3), from rest to rest."""
 
     drone: int
     path: Array
     points: Array
-    """Where all others are at rest meanwhile: any other path that is clear of them would do as well."""
+    """Where all others rest meanwhile: any other path that is clear of them is as good."""
 
 
 def moves_between(starts: Array, goals: Array, standing: Array, space: Space, delays: Array) -> list[Move]:
-    """The moves, one after the other, that bring all from `starts` to `goals`; raises `NoRouteError`.
+    """Return moves, one after the other, that bring all drones from `starts` to `goals`. Raises `NoRouteError`.
 
-    `space.sky` is two distances or more above all of them. Who waits less, or hinders fewer, comes first.
+    `space.sky` is two distances or more above all of them. Drones that wait less, or block fewer others, come first.
     """
     found = _Direct(starts, goals, standing, space, delays)
     if not found.is_done():
@@ -60,7 +61,7 @@ def moves_between(starts: Array, goals: Array, standing: Array, space: Space, de
 
 
 class _Sequence:
-    """Where everybody rests between two moves, and the moves until then."""
+    """The moves so far, and where all drones rest after them."""
 
     def __init__(self, starts: Array, goals: Array, standing: Array, space: Space, delays: Array) -> None:
         self.goals = goals
@@ -68,11 +69,11 @@ class _Sequence:
         self.space = space
         self.count = len(starts)
         self.points = np.vstack((starts, standing))
-        """Who rests where: drones, and standing points after them."""
+        """Positions of drones, and standing points after them."""
         self.rests = self.points[: self.count]
         self.moves: list[Move] = []
         self.waiting: set[int] = set()
-        """Those in the sky."""
+        """The drones in the sky."""
 
     def others(self, drone: int) -> Array:
         return np.delete(self.points, drone, axis=0)
@@ -86,7 +87,7 @@ class _Sequence:
         return bool((norms(self.others(drone) - self.goals[drone]) >= self.space.least).all())
 
     def to_goal(self, drone: int, ways: Iterable[_Way], *, low: bool = True) -> bool:
-        """Go there, if one of `ways` leads there; along the ground only if `low`."""
+        """Move to the goal if one of `ways` leads there; along the ground only if `low`. Return whether it moved."""
         if not self.goal_is_free(drone):
             return False
         others = self.others(drone)
@@ -98,7 +99,7 @@ class _Sequence:
         return False
 
     def to_sky(self, drone: int) -> bool:
-        """Go up and wait there, a distance above the height at which one flies across."""
+        """Move up to wait there, a distance above the height at which drones cross. Return whether it moved."""
         others = self.others(drone)
         up = self.space.up(self.rests[drone], others)
         if up is None:
@@ -115,7 +116,7 @@ class _Sequence:
         return True
 
     def _spot(self, start: Array) -> Array:
-        """The nearest place in the sky whose column is apart from those of all that wait there."""
+        """Return the nearest point in the sky whose column is apart from those of all drones that wait there."""
         taken = self.rests[[*self.waiting], :2]
         spots = (start[:2] + offset for offset in _spiral(self.space.distance))
         free = (spot for spot in spots if (norms(taken - spot) >= self.space.distance).all())
@@ -123,7 +124,7 @@ class _Sequence:
 
 
 class _Direct(_Sequence):
-    """Who can goes to its goal; who blocks others steps aside."""
+    """Drones go to their goals as soon as they can; drones that block others make room."""
 
     def __init__(self, starts: Array, goals: Array, standing: Array, space: Space, delays: Array) -> None:
         super().__init__(starts, goals, standing, space, delays)
@@ -133,9 +134,9 @@ class _Direct(_Sequence):
         self._top = space.sky - space.distance
         active = [*self.away]
         self._blocked = np.zeros((self.count, len(self.points)), dtype=bool)
-        """Whether the straight way of a drone (row) is blocked by somebody at rest (column)."""
+        """Whether the straight way of a drone (row) is blocked by a drone at rest (column)."""
         self._would = np.zeros((self.count, self.count), dtype=bool)
-        """Whether it is blocked by somebody (column) who is at his goal."""
+        """Whether it is blocked by a drone (column) at its goal."""
         self._lengths = norms(goals - starts)
         self._blocked[active] = space.near(starts[active], goals[active], self.points)
         self._would[active] = space.near(starts[active], goals[active], goals)
@@ -143,7 +144,7 @@ class _Direct(_Sequence):
         self._blocked[space.slides(starts, goals), :] = True
 
     def is_done(self) -> bool:
-        """Bring all to their goals; False if that is not possible."""
+        """Move all drones to their goals; return whether that was possible."""
         while self.away:
             if not (
                 self._straight()
@@ -158,7 +159,7 @@ class _Direct(_Sequence):
         return True
 
     def go(self, drone: int, path: Array) -> None:
-        """Move, and see whose way that blocks or clears."""
+        """Move, and update which ways that blocks or clears."""
         super().go(drone, path)
         here, goal = self.rests[drone], self.goals[drone]
         self._blocked[:, drone] = False
@@ -176,7 +177,7 @@ class _Direct(_Sequence):
             self._lengths[drone] = norms(goal - here)
 
     def _ranks(self) -> list[int]:
-        """Those that are away: first who waits less, would block fewer, and has farther to go."""
+        """Return the drones not at their goals, in the order of delay, of drones that they would block, of distance."""
         away = sorted(self.away)
         hinders = self._would[away].sum(axis=0)
         return sorted(away, key=lambda drone: (self.delays[drone], hinders[drone], -self._lengths[drone], drone))
@@ -192,13 +193,14 @@ class _Direct(_Sequence):
         return any(self.to_goal(drone, (self.space.by_lane,)) for drone in self._ranks())
 
     def _unhindered(self) -> list[int]:
-        """Those whose straight way is blocked by none that will go away by itself."""
+        """Return the drones whose straight way is blocked only by drones that stay there."""
         return [drone for drone in self._ranks() if not self._blocked[drone, [*self.away]].any()]
 
     def _by_detour(self, drones: Iterable[int], *, again: bool = False) -> bool:
-        """One of `drones` goes round something. Who found no way looks `again` when more have moved: it takes a while.
+        """Move one of `drones` by a detour, and return whether one moved.
 
-        If nobody can do anything else they all do, and go along the ground where they have to.
+        A drone that found no way searches `again` only when others have moved, as a search takes long. If nothing else
+        is possible all search, and move along the ground where they have to.
         """
         for drone in drones:
             if (again or len(self.moves) >= self._next_look[drone]) and self.goal_is_free(drone):
@@ -208,7 +210,7 @@ class _Direct(_Sequence):
         return False
 
     def _steps_aside(self) -> bool:
-        """One of those that block most goes a little way from its place."""
+        """Move a drone that blocks most others a little way from its place."""
         away = sorted(self.away)
         blocks = self._blocked[away].sum(axis=0)
         ranks = sorted(self.away - self._aside, key=lambda drone: (-blocks[drone], -self.rests[drone][2], drone))
@@ -221,7 +223,7 @@ class _Direct(_Sequence):
         return False
 
     def _way_aside(self, drone: int) -> Array | None:
-        """To the nearest place that is nobody's, of those that are in the way of fewest."""
+        """Return a path to the nearest free point of those that block fewest drones."""
         here, others = self.rests[drone], self.others(drone)
         spots = here + _AROUND * self.space.distance
         low = min(self.space.ground + self.space.distance, float(here[2]))
@@ -245,10 +247,10 @@ class _Direct(_Sequence):
 
 
 class _Emptied(_Sequence):
-    """Everybody goes up, and then down to its goal, in the reverse of an order in which they could leave the goals."""
+    """All drones go up, and down to their goals in the reverse of an order in which they could leave the goals."""
 
     def all_moves(self) -> list[Move]:
-        """The moves; raises `NoRouteError`."""
+        """Return the moves. Raises `NoRouteError`."""
         standing = self.points[self.count :]
         left = _Emptied(self.goals, self.goals, standing, self.space, self.delays)
         left.empty()
@@ -259,7 +261,7 @@ class _Emptied(_Sequence):
         return self.moves
 
     def empty(self) -> None:
-        """All go up, the topmost of those that can first."""
+        """Move all drones up, the topmost of those that can first."""
         drones = sorted(range(self.count), key=lambda drone: -self.rests[drone][2])
         while drones:
             for drone in drones:
@@ -271,7 +273,7 @@ class _Emptied(_Sequence):
 
 
 def _spiral(distance: float) -> Iterator[Array]:
-    """Offsets in plan, ring by ring, all of them farther and farther out."""
+    """Yield offsets in the plane, ring by ring, further and further out."""
     yield np.zeros(2)
     for ring in count(1):
         for step in range(6 * ring):
@@ -280,7 +282,7 @@ def _spiral(distance: float) -> Iterator[Array]:
 
 
 def _around() -> Array:
-    """Where one may step aside, in distances: up, or to eight sides, level or rising or sinking; the nearest first."""
+    """Return offsets to make room, in distances: up, or to eight sides, level, rising or sinking; the nearest first."""
     # A little more than a whole distance: on the line between two places rounding must not decide.
     radii = (1.001, 1.5, 2.0, 3.0)
     sides = [(math.cos(step * math.pi / 4), math.sin(step * math.pi / 4)) for step in range(8)]

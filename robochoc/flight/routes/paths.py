@@ -1,17 +1,17 @@
-"""Which way a drone flies between others that are at rest: polylines that keep the distance from all of them.
+"""Paths of a drone between others that rest: polylines that keep the distance from all of them.
 
 Candidates, in order of preference:
 
 1. `straight`;
-2. `by_lane`: up or down to a lane's height, across, and up or down. The detour is the least possible, and of equal ones
-   the lowest lane is taken;
-3. `round`: the same by way of a column beside the start or the goal, for those that have something right above them;
+2. `by_lane`: up or down to a lane's height, across, and up or down. The lane with the shortest detour is taken, and of
+   equal ones the lowest;
+3. `round`: the same by way of a column beside the start or the goal, for drones with another one right above;
 4. over everything: from the start up to the `sky`, by way of a column beside it where that is needed, across, and
    down in the same manner. The sky is a height that is clear of all points at rest.
 
-What a point blocks is computed, not tried out: of a vertical line or of all the horizontal lines between two columns it
-blocks an interval of heights, half of which is sqrt(distance^2 - r^2), where r is how far the point is from them in
-plan. So `by_lane` finds a lane whenever there is one.
+What a point blocks is computed, not searched for. Of a vertical line, or of all horizontal lines between two columns,
+it blocks an interval of heights. Half of the interval is sqrt(distance^2 - r^2), where r is the distance of the point
+in the plane. So `by_lane` finds a lane whenever there is one.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ import numpy as np
 from robochoc.flight.routes.spacing import SLACK_M, Array, Flags, norms, segment_distances
 
 Column = Array
-"""The x and the y of all points above each other."""
+"""The x and the y of a vertical line."""
 
 _DIRECTIONS = 8
-"""Columns beside a point, around it."""
+"""Directions of the columns around a point."""
 _RADII = (1.0, math.sqrt(2), 2.0, 3.0)
-"""How far they are, in distances."""
+"""Distances of these columns, in distances."""
 
 
 @dataclass(frozen=True)
 class Space:
-    """Where paths are: at least `distance` from points at rest, not below `ground`; the `sky` is above all."""
+    """Where paths are: at least `distance` from points at rest, not below `ground`. The `sky` is above all points."""
 
     distance: float
     ground: float
@@ -44,34 +44,34 @@ class Space:
 
     @property
     def least(self) -> float:
-        """As `distance`, rounding allowed."""
+        """The distance, less rounding."""
         return self.distance - SLACK_M
 
     @property
     def off(self) -> float:
-        """The height from which on one is off the ground."""
+        """The height from which on a drone is off the ground."""
         return self.ground + self.distance / 4
 
     def near(self, origins: Array, ends: Array, points: Array) -> Flags:
-        """Whether (K, P) straight lines come too near to `points` (P, 3)."""
+        """Return whether (K, P) straight lines come too near to `points` (P, 3)."""
         return segment_distances(origins, ends, points) < self.least
 
     def is_clear(self, path: Array, points: Array) -> bool:
-        """Whether a path keeps the distance from `points`."""
+        """Return whether a path keeps the distance from `points`."""
         return not self.near(path[:-1], path[1:], points).any()
 
     def slides(self, starts: Array, goals: Array) -> Flags:
-        """Which straight lines (K,) lead along the ground, where nobody flies."""
+        """Return which straight lines (K,) lead along the ground, where drones do not fly."""
         low = np.maximum(starts[:, 2], goals[:, 2]) < self.off
         flags: Flags = low & (starts[:, :2] != goals[:, :2]).any(axis=1)
         return flags
 
     def by_lane(self, start: Array, goal: Array, points: Array) -> Array | None:
-        """Up or down to the best lane, across, and up or down; None where no lane is clear of `points`."""
+        """Return the path up or down to the best lane, across, and up or down; None if no lane is clear of `points`."""
         return next(self.lanes(start, goal, points), None)
 
     def lanes(self, start: Array, goal: Array, points: Array) -> Iterator[Array]:
-        """The paths by each of some lanes, a distance or more from each other, the best first."""
+        """Yield the paths by several lanes, a distance or more from each other, the best first."""
         least, most = self._reach(start, points)
         lowest, highest = self._reach(goal, points)
         floor = min(self.ground + self.distance, max(start[2], goal[2]))
@@ -89,7 +89,7 @@ class Space:
                     yield path
 
     def round(self, start: Array, goal: Array, points: Array) -> Array | None:
-        """By way of the best column beside the start or the goal."""
+        """Return the path by way of the best column beside the start or the goal; None if there is none."""
         best, path = math.inf, None
         reach, limits = self._reach(start, points), self._reach(goal, points)
         for column in (*self._beside(start), *self._beside(goal)):
@@ -107,7 +107,7 @@ class Space:
         return path
 
     def over(self, start: Array, goal: Array, points: Array) -> Array | None:
-        """By way of the sky, which has to be clear between the columns that are taken."""
+        """Return the path by way of the sky; None if the sky is not clear between the columns."""
         up, down = self.up(start, points), self.up(goal, points)
         if up is None or down is None:
             return None
@@ -115,7 +115,7 @@ class Space:
         return path if self.is_clear(path, points) else None
 
     def up(self, start: Array, points: Array) -> Array | None:
-        """From `start` to the sky, straight up if possible."""
+        """Return the path from `start` to the sky, straight up if possible."""
         path = _path(start, (start[:2], self.sky))
         if self.is_clear(path, points):
             return path
@@ -137,16 +137,16 @@ class Space:
             yield point[:2] + (self.distance * radius) * np.array([math.cos(angle), math.sin(angle)])
 
     def _exits(self, start: Array, column: Column, points: Array, reach: tuple[float, float]) -> list[float]:
-        """At which heights one can leave for a column: those where the clear ones begin and end.
+        """Return the heights at which a drone can leave for a column: those where clear intervals begin and end.
 
-        Not along the ground, unless there is no other.
+        Heights along the ground count only if there are no others.
         """
         low, high = max(reach[0], min(self.ground, float(start[2]))), min(reach[1], self.sky)
         found = _outside(self._walls(start[:2], column, points), low, high, (start[2], self.off))
         return [height for height in found if height >= self.off] or found
 
     def _reach(self, start: Array, points: Array) -> tuple[float, float]:
-        """From which height to which one can go straight up and down from `start`."""
+        """Return the lowest and the highest height that can be reached straight from `start`."""
         walls = self._walls(start[:2], start[:2], points)
         above = walls.mean(axis=1) > start[2]
         low = walls[~above, 1].max(initial=-math.inf)
@@ -154,7 +154,7 @@ class Space:
         return min(float(low), float(start[2])), max(float(high), float(start[2]))
 
     def _walls(self, first: Column, second: Column, points: Array) -> Array:
-        """The intervals of heights (W, 2) in which points block the way across between two columns."""
+        """Return the intervals of heights (W, 2) in which points block the way across between two columns."""
         radius = segment_distances(first[None], second[None], points[:, :2])[0]
         # A little less strict than `is_clear` is, which has the last word: rounding must not make them disagree.
         least = self.distance - SLACK_M / 2
@@ -165,7 +165,7 @@ class Space:
 
 
 def _outside(walls: Array, low: float, high: float, wished: tuple[float, ...]) -> list[float]:
-    """The ends of what is left of `low` to `high` without `walls`, and those of `wished` that are left."""
+    """Return the ends of what is left of `low` to `high` without `walls`, and those of `wished` that are left."""
     heights = np.concatenate((walls.ravel(), [low, high], wished))
     heights = np.unique(heights[(low <= heights) & (heights <= high)])
     free = ~((walls[None, :, 0] < heights[:, None]) & (heights[:, None] < walls[None, :, 1])).any(axis=1)
@@ -184,7 +184,7 @@ def _path(start: Array, *bends: tuple[Column, float] | Array) -> Array:
 
 
 def _joined(corners: Array) -> Array:
-    """A path without pieces that have no length, and without corners that are none on a vertical line."""
+    """Return a path without pieces of no length, and without needless corners on a vertical line."""
     stays = (corners[1:] == corners[:-1]).all(axis=1)
     corners = corners[np.concatenate(([True], ~stays))]
     if len(corners) < 3:  # noqa: PLR2004 - a corner is between two pieces

@@ -1,4 +1,4 @@
-"""How far things are from each other: points, straight lines, and what moves along them.
+"""Distances between points, straight lines, and what moves along them.
 
 Lengths are in metres, arrays are of float64, a point is a row of three.
 """
@@ -14,11 +14,11 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 SLACK_M = 1e-10
-"""Rounding: so much nearer than the distance is not yet too near."""
+"""Rounding: nearer than the distance by no more than this is not too near."""
 
 
 class TooCloseError(ValueError):
-    """Two that are to be at rest at the same time stand nearer than the distance that is to be kept.
+    """Two drones, or a drone and a standing point, would rest nearer to each other than the distance.
 
     `first` and `second` are drones' numbers; standing points are counted on from the drones. `where` says whether
     they are too close before they fly (`start`) or would be after it (`goal`).
@@ -33,7 +33,7 @@ class TooCloseError(ValueError):
 
 
 def segment_distances(origins: Array, ends: Array, points: Array) -> Array:
-    """The distance (K, P) of each straight line `origins` to `ends` (K, 3) from each of `points` (P, 3)."""
+    """Return the distance (K, P) of each straight line `origins` to `ends` (K, 3) from each of `points` (P, 3)."""
     along = ends - origins
     squared = np.einsum("kc,kc->k", along, along)
     squared[squared == 0] = 1
@@ -45,13 +45,16 @@ def segment_distances(origins: Array, ends: Array, points: Array) -> Array:
 
 
 def norms(vectors: Array) -> Array:
-    """The lengths of vectors, which are the last axis."""
+    """Return the lengths of vectors, which are the last axis."""
     lengths: Array = np.sqrt(np.einsum("...c,...c->...", vectors, vectors))
     return lengths
 
 
 def closest_approach(apart: Array, later: Array) -> Array:
-    """How near two come that are `apart` first and `later` then, both in even motion (vectors: the last axis)."""
+    """Return the smallest distance of two that are `apart` first and `later` then, in even motion.
+
+    Vectors are the last axis.
+    """
     change = later - apart
     squared = np.einsum("...c,...c->...", change, change)
     squared[squared == 0] = 1

@@ -1,14 +1,15 @@
-"""When drones fly, so that no two ever come nearer to each other than a distance.
+"""The timetable: when drones fly, so that no two ever come nearer to each other than a distance.
 
-`moves.py` gives moves that are safe one after the other. Here they begin as early as they can, in that order of
-precedence: what is scheduled stays, the next move takes the first time at which it keeps the distance from everybody
-at all times, before it, during it, and at rest after it, for good. Such a time there always is: when all that are
-scheduled have ended, the others rest where the move's path was found clear of them. This is prioritized planning
-(Erdmann and Lozano-Perez, "On multiple moving objects", 1987) on fixed paths, which would otherwise be incomplete.
+`moves.py` gives moves that are safe one after the other. Here they begin as early as possible, in that order of
+precedence. What is scheduled stays. The next move begins at the first time at which it keeps the distance from all
+drones at all times: before it, during it, and at rest after it, for good. There always is such a time: when all that
+are scheduled have ended, the other drones rest where the move's path was found clear of them. This is prioritized
+planning (Erdmann and Lozano-Perez, "On multiple moving objects", 1987) on fixed paths; without the order of `moves.py`
+it would be incomplete.
 
-Time is cut into steps, at which all moves begin. In a step everybody's motion is straight and even but for
-acceleration * step^2 / 8, which is added to the distance; but for that the nearest approach is exact. Paths that keep
-the distance from each other, or from where somebody rests, need no time, and no more than the distance.
+Time is cut into steps, at which all moves begin. In a step, motion differs from straight and even motion by at most
+acceleration * step^2 / 8, which is added to the distance; but for that, the closest approach is exact. Paths that keep
+the distance from each other, or from where a drone rests, need no time, and no more than the distance.
 """
 
 from __future__ import annotations
@@ -33,14 +34,14 @@ Steps = NDArray[np.int64]
 
 _STEP_S = 0.05
 _BULGE = 0.01
-"""How far two may deviate from even motion in a step, in distances, both together: the step is shorter if need be."""
+"""How far two drones may deviate from even motion in a step, in distances, both together. It bounds the step."""
 _CHUNK = 8
-"""Steps of a move that are looked at together, by the box around them."""
+"""Steps of a move that are compared together, by the box around them."""
 _PORTION = 4096
 _PATIENCE_S = 1.0
-"""Who would wait longer looks for another lane, and takes it if it is there that much sooner."""
+"""A drone that would wait longer tries other lanes, and takes one if it arrives that much sooner."""
 _LANES = 4
-"""At so many."""
+"""How many other lanes it tries."""
 _FOREVER = 2**62
 
 
@@ -54,24 +55,30 @@ def plan_routes(
     limits: MotionLimits | None = None,
     ground: float = 0.0,
 ) -> RoutePlan:
-    """How N drones fly from `starts` (N, 3) to `goals` (N, 3), never nearer to each other than `distance`.
+    """Return how N drones fly from `starts` to `goals`, never nearer to each other than `distance`.
 
-    They keep it from the `standing` points (M, 3) too. Drone i does not begin before second `delays[i]`; who has the
-    same start and goal stays there, unless `moves.py` finds no other way. Nobody flies below `ground`, but for starts
-    and goals that are there. The result is the same each time. Lengths are in metres.
+    The result is the same each time. Lengths are in metres.
 
-    Raises `TooCloseError` if two starts, or two goals, or one of them and a standing point, are nearer than `distance`;
-    `NoRouteError` where standing points enclose a start or a goal; ValueError for arguments that make no sense.
+    Args:
+        starts: (N, 3).
+        goals: (N, 3). A drone with the same start and goal stays there, unless `moves.py` finds no other way.
+        distance: Between drones' centres.
+        standing: Points (M, 3) from which drones keep the distance, too.
+        delays: (N,): a drone does not begin before that second.
+        limits: Speed and acceleration of all drones.
+        ground: No drone flies lower, except for starts and goals.
+
+    Raises:
+        TooCloseError: Two starts, or two goals, or one of them and a standing point, are nearer than `distance`.
+        NoRouteError: Standing points enclose a start or a goal.
+        ValueError: An argument makes no sense.
     """
     starts, goals = _points(starts, "starts"), _points(goals, "goals")
     standing = np.empty((0, 3)) if standing is None else _points(standing, "standing")
     delays = np.zeros(len(starts)) if delays is None else np.asarray(delays, dtype=float)
-    if len(goals) != len(starts) or delays.shape != (len(starts),):
-        raise ValueError(
-            f"{len(starts)} starts, {len(goals)} goals and delays of shape {delays.shape} do not go together"
-        )
     if not (0 < distance < math.inf and math.isfinite(ground) and np.isfinite(delays).all()):
         raise ValueError(f"distance {distance}, ground {ground} and all delays must be finite, the distance positive")
+    _check_counts(starts, goals, delays)
     check_spacing(starts, standing, distance, "start")
     check_spacing(goals, standing, distance, "goal")
     heights = np.concatenate((starts[:, 2], goals[:, 2], standing[:, 2], [ground]))
@@ -80,6 +87,14 @@ def plan_routes(
     for move in moves_between(starts, goals, standing, space, delays):
         table.add(move)
     return table.plan()
+
+
+def _check_counts(starts: Array, goals: Array, delays: Array) -> None:
+    """Raise `ValueError` if there is not one goal and one delay for each start."""
+    if len(goals) != len(starts) or delays.shape != (len(starts),):
+        raise ValueError(
+            f"{len(starts)} starts, {len(goals)} goals and delays of shape {delays.shape} do not go together"
+        )
 
 
 def _points(rows: Array, name: str) -> Array:
@@ -93,7 +108,7 @@ def _points(rows: Array, name: str) -> Array:
 
 @dataclass(frozen=True)
 class _Entry:
-    """A move in the timetable: where it is at each step (S + 1, 3), from the step at which it begins."""
+    """A move in the timetable: its positions at each step (S + 1, 3), from the step at which it begins."""
 
     flight: Route
     samples: Array
@@ -109,7 +124,7 @@ class _Entry:
 
     @cached_property
     def chunks(self) -> Array:
-        """The samples by chunks (C, _CHUNK + 1, 3); each begins where the one before ends; NaN where there are none."""
+        """The positions in chunks (C, _CHUNK + 1, 3); each begins where the one before ends; NaN beyond the end."""
         count = -(-self.steps // _CHUNK)
         padded = np.full((count * _CHUNK + 1, 3), np.nan)
         padded[: len(self.samples)] = self.samples
@@ -118,7 +133,7 @@ class _Entry:
 
 
 class _Timetable:
-    """The moves that are scheduled, and where everybody rests in between."""
+    """The scheduled moves, and where all drones rest in between."""
 
     def __init__(self, starts: Array, space: Space, limits: MotionLimits, delays: Array) -> None:
         self._starts = starts
@@ -131,7 +146,7 @@ class _Timetable:
         self._drones = np.empty(0, dtype=np.int64)
         self._latest = 0
         self._corners = np.empty((2, 0, 3))
-        """Of the boxes around all paths: the lowest, and the highest."""
+        """Of the boxes around all paths: the lowest corners, and the highest."""
         # Where somebody rests: the drone, the point, from which step, to which step.
         self._resting = np.arange(len(starts))
         self._places = starts.copy()
@@ -140,7 +155,7 @@ class _Timetable:
         self._last_rest = [*range(len(starts))]
 
     def add(self, move: Move) -> None:
-        """Schedule it at the first step at which it is safe, by another lane if that is much sooner."""
+        """Schedule `move` at the first step at which it is safe, by another lane if that is much sooner."""
         earliest = max(self._first[move.drone], int(self._from[self._last_rest[move.drone]]))
         entry = self._entry(move.drone, move.path, earliest)
         patience = math.ceil(_PATIENCE_S / self._step)
@@ -152,11 +167,11 @@ class _Timetable:
         self._enter(entry)
 
     def plan(self) -> RoutePlan:
-        """All of it, in seconds."""
+        """Return all scheduled moves, in seconds."""
         return RoutePlan(self._starts, [(entry.flight, entry.begins * self._step) for entry in self._entries])
 
     def _entry(self, drone: int, path: Array, earliest: int) -> _Entry:
-        """A move along `path`, as early as it can."""
+        """Return the move along `path`, as early as possible."""
         flight = Route(drone, path, self._limits)
         steps = max(1, math.ceil(flight.duration_s / self._step))
         entry = _Entry(flight, flight.sample(self._step * np.arange(steps + 1, dtype=np.float64)), earliest)
@@ -182,7 +197,7 @@ class _Timetable:
         self._to = np.append(self._to, _FOREVER)
 
     def _mark_rests(self, taken: Flags, entry: _Entry) -> None:
-        """When it would come too near to somebody at rest, on its way or at its end."""
+        """Mark the steps at which it would come too near to a drone at rest, on its way or at its end."""
         path, samples = entry.flight.path, entry.samples
         near = self._space.near(path[:-1], path[1:], self._places).any(axis=0) & (self._resting != entry.flight.drone)
         for rest in np.flatnonzero(near):
@@ -196,7 +211,7 @@ class _Timetable:
                 taken[: max(0, ends - entry.steps)] = True
 
     def _mark_goal(self, taken: Flags, entry: _Entry) -> None:
-        """When it would be at its goal before somebody has passed there."""
+        """Mark the steps at which it would be at its goal before another drone has passed there."""
         goal = entry.flight.path[-1:]
         for other in self._near(entry.flight.drone, goal):
             path = other.flight.path
@@ -207,7 +222,7 @@ class _Timetable:
                     taken[: max(0, other.begins + int(near[-1]) + 1 - entry.steps)] = True
 
     def _mark_moves(self, taken: Flags, entry: _Entry) -> None:
-        """When it would come too near to somebody who moves at the same time."""
+        """Mark the steps at which it would come too near to a drone that moves at the same time."""
         others = self._near(entry.flight.drone, entry.flight.path)
         if not others:
             return
@@ -222,23 +237,23 @@ class _Timetable:
             taken[steps[steps >= 0]] = True
 
     def _near(self, drone: int, path: Array) -> list[_Entry]:
-        """The moves of others that the boxes around the paths do not keep apart."""
+        """Return the other drones' moves that the boxes around the paths do not keep apart."""
         box = np.array([[path.min(axis=0)], [path.max(axis=0)]])
         near = (_box_gaps(box, self._corners)[0] < self._space.least) & (self._drones != drone)
         return [self._entries[number] for number in np.flatnonzero(near)]
 
 
 def _boxes(chunks: Array) -> Array:
-    """The lowest and the highest corner (2, C, 3) of the box around each chunk."""
+    """Return the lowest and the highest corner (2, C, 3) of the box around each chunk."""
     return np.array([np.fmin.reduce(chunks, axis=1), np.fmax.reduce(chunks, axis=1)])
 
 
 def _box_gaps(first: Array, second: Array) -> Array:
-    """How far boxes (2, A, 3) are from others (2, B, 3): (A, B)."""
+    """Return the distances (A, B) of boxes (2, A, 3) from others (2, B, 3)."""
     (low, high), (lows, highs) = first[:, :, None], second[:, None]
     return norms(np.maximum(np.maximum(lows - high, low - highs), 0))
 
 
 def _portions(pairs: Steps) -> Iterator[Steps]:
-    """So many at a time that they do not fill the memory."""
+    """Yield the pairs in portions that fit into memory."""
     return (pairs[first : first + _PORTION] for first in range(0, len(pairs), _PORTION))

@@ -173,9 +173,9 @@ class Types:
         parts = [(field, self._part(desc)) for field, desc in self._store.fielddefs[name][1]]
         names = {field for field, _ in parts}
         attributes = [*getattr(made, "__dataclass_fields__", ())]  # `from` is `from_` there
-        silent = {"seq"} if name == _HEADER else {"structure_needs_at_least_one_member"}
-        told = [
-            (field, own, part) for own, (field, part) in zip(attributes, parts, strict=False) if field not in silent
+        hidden = {"seq"} if name == _HEADER else {"structure_needs_at_least_one_member"}
+        shown = [
+            (field, own, part) for own, (field, part) in zip(attributes, parts, strict=False) if field not in hidden
         ]
 
         def make(value: object) -> object:
@@ -196,7 +196,7 @@ class Types:
             return made(*values)
 
         def fields(message: object) -> dict[str, Any]:
-            return {field: part.fields(getattr(message, own)) for field, own, part in told}
+            return {field: part.fields(getattr(message, own)) for field, own, part in shown}
 
         return _Kind(make, fields, made(*[part.empty for _, part in parts]))
 

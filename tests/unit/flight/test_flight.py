@@ -74,10 +74,10 @@ def calm(four: Mission) -> FlightLog:
 
 
 def test_it_says_how_far_it_is() -> None:
-    told: list[str] = []
-    flown = fly(planar(2), progress=told.append)
-    assert told[0] == "ways for 4 drones are looked for"
-    begin, end = (re.fullmatch(r"leg 1, (.+) s of (.+) s flown", one) for one in (told[1], told[-1]))
+    reported: list[str] = []
+    flown = fly(planar(2), progress=reported.append)
+    assert reported[0] == "planning routes of 4 drones"
+    begin, end = (re.fullmatch(r"leg 1, (.+) s of (.+) s flown", one) for one in (reported[1], reported[-1]))
     assert begin
     assert end
     assert float(begin[1]) < 0.1 < float(end[1]) == float(end[2]) < flown.times[-1]
@@ -214,11 +214,11 @@ def test_a_failure_is_reported_and_the_next_leg_keeps_away() -> None:
 def test_nobody_slides_along_the_ground() -> None:
     simulation = QuadrotorSimulation(["a"], np.zeros((1, 3)), 0.0, FlightConditions())
     for _ in range(60):
-        simulation.reference[3] = 0.5
-        simulation.reference[0] += 0.5 * DT
+        simulation.setpoints[3] = 0.5
+        simulation.setpoints[0] += 0.5 * DT
         simulation.advance()
     assert simulation.places[0, 2] > 0.05
-    simulation.reference[3] = 0
+    simulation.setpoints[3] = 0
     for _ in range(240):
         simulation.advance()
     assert simulation.places[0] == pytest.approx([0.25, 0, 0], abs=0.05)
@@ -339,10 +339,10 @@ def test_who_is_wanted_along_the_ground_keeps_away_from_who_is_above() -> None:
 def test_refusals_of_the_plan_name_drones() -> None:
     flight = Flight(["a", "b"], PAIR, FlightConditions())
     everybody = np.arange(2)
-    assert flight._told(TooCloseError(1, 2, 0.1234, "goal"), everybody) == (  # noqa: SLF001 - places are checked before
+    assert flight._refusal(TooCloseError(1, 2, 0.1234, "goal"), everybody) == (  # noqa: SLF001 - places are checked before
         "b and something that is in the way are to end only 0.123 m from each other"
     )
-    assert flight._told(NoRouteError([0, 1]), everybody).startswith("there is no way for a, b: ")  # noqa: SLF001
+    assert flight._refusal(NoRouteError([0, 1]), everybody).startswith("there is no way for a, b: ")  # noqa: SLF001
 
 
 def test_what_is_too_much_is_refused_before_it_takes_minutes() -> None:
@@ -350,7 +350,7 @@ def test_what_is_too_much_is_refused_before_it_takes_minutes() -> None:
         Flight(["a"] * 1001, np.zeros((1001, 3)), FlightConditions())
     with pytest.raises(ValueError, match=r"the homes of a and b are 1e-11 m apart, and 0\.01 m .* a larger scale$"):
         Flight(["a", "b"], PAIR * 5e-12, FlightConditions())
-    with pytest.raises(ValueError, match=r"b: the place \(inf, 0, 0\) m is more than"):
+    with pytest.raises(ValueError, match=r"b: the place \(inf, 0, 0\) m is over"):
         Flight(["a", "b"], np.array([[0.0, 0, 0], [math.inf, 0, 0]]), FlightConditions())
     with pytest.raises(ValueError, match="an obstacle: the place"):
         Flight(["a", "b"], PAIR, FlightConditions(obstacles=((0.0, 0.0, 1e200),)))

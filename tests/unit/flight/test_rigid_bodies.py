@@ -32,7 +32,7 @@ def airborne(place: Point = (0.0, 0.0, 10.0), airframe: Airframe = HUMMINGBIRD, 
 
 def ride(
     bodies: RigidBodies,
-    reference: Callable[[float], Array],
+    setpoints: Callable[[float], Array],
     seconds: float,
     *,
     air: Array = CALM,
@@ -45,7 +45,7 @@ def ride(
     for step in range(round(seconds / DT)):
         if step == round(min(failing_s, 1e6) / DT):
             bodies.stop_motor(0, 1)
-        command = controller.command(bodies, reference(step * DT), np.zeros(1, dtype=np.bool_))
+        command = controller.command(bodies, setpoints(step * DT), np.zeros(1, dtype=np.bool_))
         for _ in range(steps):
             bodies.step(command, air)
         places.append(bodies.state[:3, 0].copy())
@@ -61,11 +61,11 @@ def moving(start: Point, goal: Point) -> tuple[Callable[[float], Array], float]:
     """A planned way, and how long it takes."""
     way = plan_routes(np.array([start]), np.array([goal]), distance=0.5)
 
-    def reference(s: float) -> Array:
+    def setpoints(s: float) -> Array:
         motion = way.at(s)
         return np.concatenate((motion.position, motion.velocity, motion.acceleration), axis=1).T
 
-    return reference, way.duration_s
+    return setpoints, way.duration_s
 
 
 # The bodies
@@ -196,10 +196,10 @@ def test_a_drone_recovers_from_being_upside_down() -> None:
 
 @pytest.mark.parametrize(("wind", "most"), [(0.0, 0.01), (5.0, 0.07)])
 def test_tracking_stays_within_the_margin_of_plans(wind: float, most: float) -> None:
-    reference, lasts = moving((0.0, 0.0, 0.0), (3.0, 2.0, 3.0))
+    setpoints, lasts = moving((0.0, 0.0, 0.0), (3.0, 2.0, 3.0))
     bodies = RigidBodies(np.zeros((1, 3)), 0.0, HUMMINGBIRD, DT)
-    places = ride(bodies, reference, lasts, air=np.array([[wind], [0], [0]]))
-    wanted = np.array([reference((step + 1) * DT)[:3, 0] for step in range(len(places))])
+    places = ride(bodies, setpoints, lasts, air=np.array([[wind], [0], [0]]))
+    wanted = np.array([setpoints((step + 1) * DT)[:3, 0] for step in range(len(places))])
     assert np.sqrt(np.square(places - wanted).sum(1)).max() < most
 
 
@@ -210,12 +210,12 @@ def test_a_constant_wind_leaves_no_error() -> None:
 
 
 def test_ten_times_as_many_steps_make_no_difference() -> None:
-    reference, _ = moving((0.0, 0.0, 0.0), (3.0, 2.0, 3.0))
+    setpoints, _ = moving((0.0, 0.0, 0.0), (3.0, 2.0, 3.0))
     air = np.array([[3.0], [0], [0]])
     one, ten = (
         ride(
             RigidBodies(np.zeros((1, 3)), 0.0, HUMMINGBIRD, DT / steps),
-            reference,
+            setpoints,
             2.2,
             air=air,
             steps=steps,

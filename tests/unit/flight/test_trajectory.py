@@ -41,16 +41,16 @@ def test_no_pair_is_ever_nearer_than_the_watch_says(seed: int, number: int, pace
     chance = np.random.default_rng(seed)
     places = chance.uniform(-2, 2, (3, number))
     monitor = SeparationMonitor(number)
-    lost = np.zeros(number, dtype=np.bool_)
+    failed = np.zeros(number, dtype=np.bool_)
     best = [math.inf, math.inf]
     first, second = np.triu_indices(number, 1)
     for step in range(40):
         if step == 20:
-            lost[chance.integers(number)] = True
-            monitor.exclude(lost)
+            failed[chance.integers(number)] = True
+            monitor.exclude(failed)
         monitor.observe(places, step)
         apart = np.sqrt(np.square(places[:, first] - places[:, second]).sum(0))
-        falls = lost[first] | lost[second]
+        falls = failed[first] | failed[second]
         best = [min(best[0], apart[~falls].min(initial=math.inf)), min(best[1], apart[falls].min(initial=math.inf))]
         for found, expected in zip((monitor.nearest, monitor.nearest_fallen), best, strict=True):
             assert (found.distance_m if found else math.inf) == expected
@@ -133,9 +133,9 @@ def test_who_lands_begins_first_and_then_row_by_row() -> None:
 
 
 def test_the_clock_stops_smoothly_and_within_limits() -> None:
-    reference = np.zeros((9, 1))
+    setpoints = np.zeros((9, 1))
     way = plan_routes(np.array([[0.0, 0, 1]]), np.array([[8.0, 0, 1]]), distance=0.5)
-    trajectory = Trajectory(way, np.array([0]), reference)
+    trajectory = Trajectory(way, np.array([0]), setpoints)
     rows = []
     for step in range(round(4 / DT)):
         if step * DT >= 2.5:

@@ -184,18 +184,18 @@ def aside(verdict: Verdict, *weights: int, **known: Any) -> str:  # noqa: ANN401
 
 
 def test_weights_are_told_where_they_are_not_all_one() -> None:
-    assert "as few as possible (proven) step aside" in aside(Verdict.OPTIMAL, 1, 1)
+    assert "1 of 2 fly (proven maximum); no solution for the whole team" in aside(Verdict.OPTIMAL, 1, 1)
     assert "weight" not in aside(Verdict.OPTIMAL, 1, 1)
     told = aside(Verdict.OPTIMAL, 5, 2)
-    assert "as few as possible, by weight (proven) step aside" in told
-    assert "1 flies, 1 steps aside (weight 2)" in told
+    assert "1 of 2 fly (proven maximum by weight); no solution" in told
+    assert "1 withdrawn (weight 2):" in told
 
 
 def test_a_limit_is_told_with_the_best_so_far_and_the_bound() -> None:
     told = aside(Verdict.UNKNOWN, 1, 3, reason="the time was over", bound=2)
-    assert "unknown: the time was over; in the best answer so far 1 steps aside (weight 3); at least 2 have to" in told
+    assert "unknown: the time was over; in the best answer so far 1 withdraws (weight 3) (lower bound 2)" in told
     outcome = Outcome("t", "afb", "simulator", 0, Verdict.UNKNOWN, {"A": 1, "B": 2}, 2**60 + 1, reason="so", bound=3)
-    assert f"so; the best so far costs {2**60 + 1:,}, and nothing costs less than 3" in report(PAIR, outcome)
+    assert f"so; the best so far costs {2**60 + 1:,}, and lower bound 3" in report(PAIR, outcome)
 
 
 def test_who_placed_the_robots_is_told_where_that_was_not_asked_for() -> None:
@@ -205,7 +205,7 @@ def test_who_placed_the_robots_is_told_where_that_was_not_asked_for() -> None:
 
 def test_what_is_not_proven_says_so() -> None:
     outcome = Outcome("t", "dsa", "simulator", 0, Verdict.SOLUTION, {"A": 1, "B": 2}, 3, verified=True)
-    assert "solution, cost 3, which may not be the least, checked" in report(PAIR, outcome)
+    assert "solution for all 2 robots, cost 3 (not proven to be the minimum), checked" in report(PAIR, outcome)
 
 
 # Trees, explained
