@@ -18,7 +18,7 @@ from robochoc.flight.layout import Point
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.sink import Fields
 from robochoc.ros.waypoint import Waypoint
-from robochoc.system.installed import loaded, named, names_in
+from robochoc.system.installed import entry_point_names, entry_points_named, load_entry_point
 
 GROUP = "robochoc.waypoints"
 
@@ -50,7 +50,7 @@ def short_kind(kind: str) -> str:
 
 def kinds() -> tuple[str, ...]:
     """Return all types that a waypoint can become, built in and installed, sorted."""
-    return tuple(sorted({*_BUILT_IN, *map(short_kind, names_in(GROUP))}))
+    return tuple(sorted({*_BUILT_IN, *map(short_kind, entry_point_names(GROUP))}))
 
 
 @cache
@@ -63,10 +63,15 @@ def mapping_for(kind: str) -> WaypointMapping | None:
     short = short_kind(kind)
     if short in _BUILT_IN:
         return WaypointMapping(_BUILT_IN[short])
-    namesakes = [entry for name in names_in(GROUP) if short_kind(name) == short for entry in named(GROUP, name)]
+    namesakes = [
+        entry
+        for name in entry_point_names(GROUP)
+        if short_kind(name) == short
+        for entry in entry_points_named(GROUP, name)
+    ]
     if not namesakes:
         return None
-    found = loaded(namesakes[0], namesakes, _fault)
+    found = load_entry_point(namesakes[0], namesakes, _fault)
     if found.broken:
         raise NoMappingError(on_one_line(f"{namesakes[0].value}, installed for waypoints as {kind}, {found.broken}"))
     if isinstance(found.what, WaypointMapping):

@@ -8,8 +8,8 @@ from types import TracebackType
 from typing import Any, Self
 
 Fields = Mapping[str, Any]
-"""A message's fields by their ROS names, nested. Times (`stamp`) are integers, in nanoseconds. A field without a value is
-zero, or empty.
+"""A message's fields by their ROS names, nested. Times (`stamp`) are integers, in nanoseconds. A field without a value
+is zero, or empty.
 """
 
 

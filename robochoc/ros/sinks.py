@@ -14,7 +14,7 @@ from robochoc.ros.sink import Sink, SinkError
 from robochoc.ros.source import Source, SourceError
 from robochoc.system.entry_points import EntryPoint
 from robochoc.system.files import resolved
-from robochoc.system.installed import loaded, missing, named
+from robochoc.system.installed import entry_points_named, load_entry_point, not_installed_message
 
 SINKS, SOURCES = "robochoc.sinks", "robochoc.sources"
 
@@ -63,15 +63,15 @@ def _parts(text: str) -> tuple[str, str]:
 
 def _offered(group: str, kind: str, name: str, base: type, wrong: type[Exception]) -> object:
     """Return the class that is installed as `name`. Raises `wrong`."""
-    namesakes = named(group, name)
+    namesakes = entry_points_named(group, name)
     if not namesakes:
         hint = "" if name else f"; a {kind} is written NAME:PLACE, such as mcap:run.mcap"
-        raise wrong(on_one_line(missing(group, kind, name) + hint))
+        raise wrong(on_one_line(not_installed_message(group, kind, name) + hint))
     entry = namesakes[0]
     lacking = _lacking(entry) if len(namesakes) == 1 else ""
     if lacking:
         raise wrong(on_one_line(lacking))
-    found = loaded(entry, namesakes, lambda what: _fault(what, base))
+    found = load_entry_point(entry, namesakes, lambda what: _fault(what, base))
     if found.broken:
         raise wrong(on_one_line(f"{entry.value}, installed as {kind} {name!r}, {found.broken}"))
     return found.what

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypedDict, assert_never
 
+from robochoc.communication.kill_schedule import KillSchedule
 from robochoc.communication.run_result import Progress
 from robochoc.communication.session import Session
 from robochoc.journal.events import Observer
@@ -34,6 +35,7 @@ def open_session(
     options: Options,
     observer: Observer | None,
     progress: Callable[[Progress], None] | None,
+    kills: KillSchedule | None = None,
 ) -> Session:
     """Return a session of `protocol` in the runtime of `options`.
 
@@ -45,18 +47,23 @@ def open_session(
             from robochoc.communication.processes.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
 
             survive = options.survives_losses
-            return ProcessesRun(team, protocol, survive=survive, patience_s=options.patience, **rest)
+            run = ProcessesRun(team, protocol, survive=survive, patience_s=options.patience, **rest)
+            if kills:
+                run.schedule_kills(kills, run.kill)
+            return run
         case Runtime.SIMULATOR:
             from robochoc.communication.simulator.simulator import Simulation  # noqa: PLC0415 - one runtime is enough
 
             return Simulation(team, protocol, schedule_of(options), **rest)
         case Runtime.NETWORK:
-            return _network(protocol, team, options, rest)
+            return _network(protocol, team, options, kills, rest)
         case never:
             assert_never(never)
 
 
-def _network(protocol: type[Protocol], team: CompiledTeam, options: Options, rest: _Rest) -> Session:
+def _network(
+    protocol: type[Protocol], team: CompiledTeam, options: Options, kills: KillSchedule | None, rest: _Rest
+) -> Session:
     try:
         from robochoc.communication.network.local import LocalNetwork  # noqa: PLC0415 - and it is an extra
         from robochoc.communication.network.settings import PATIENCE_S, NetworkSettings  # noqa: PLC0415 - as above
@@ -65,8 +72,11 @@ def _network(protocol: type[Protocol], team: CompiledTeam, options: Options, res
             f"--runtime network needs {missing.name}; say: pip install 'robochoc[network]'"
         ) from None
     survive, patience_s = options.survives_losses, options.patience or PATIENCE_S
-    conditions = NetworkSettings(filters=options.filters, survive=survive, patience_s=patience_s)
-    return LocalNetwork(team, protocol, settings=conditions, **rest)
+    settings = NetworkSettings(filters=options.filters, survive=survive, patience_s=patience_s)
+    network = LocalNetwork(team, protocol, settings=settings, **rest)
+    if kills:
+        network.master.schedule_kills(kills, network.kill)
+    return network
 
 
 def schedule_of(options: Options) -> Schedule:

@@ -170,7 +170,7 @@ class ThisMachine(Deployment):
         """Open a session of the phase's protocol."""
         context = self._context
         return open_session(
-            phase.protocol, compiled, phase.parameters, self.options, context.observer, context.progress
+            phase.protocol, compiled, phase.parameters, self.options, context.observer, context.progress, context.kills
         )
 
     def _confirmed(self, alone: str | None = None, *, total: float = INFINITE, aside: float | None = None) -> bool:

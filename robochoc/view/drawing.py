@@ -79,7 +79,7 @@ def path_of(number: int, name: str) -> str:
 
 
 def corners(scene: Scene) -> list[list[float]]:
-    """Return points around all that is visible, axes' names included, in a frame scaled to radius 1 around the drones."""
+    """Return points around all that is visible, axes' names too, in a frame scaled to radius 1 around the drones."""
     extent, radius = _measured(scene)
     names = [2 * name_at - origin for _, _, origin, name_at in _beside(scene.axes, _TEXT * radius)]
     found: list[list[float]] = ((np.array([*_corners(extent), *names]) - extent.mean(axis=0)) / radius).tolist()
@@ -134,7 +134,7 @@ def _aim(meshcat: MeshcatCommands, extent: _Corners, radius: float) -> None:
 
 
 def _from_where_to_see(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return where, in the direction of `_EYE`, a camera that looks at the origin has all `corners` in a square view."""
+    """Return where, in the direction of `_EYE`, a camera that looks at the origin has all `corners`."""
     back: npt.NDArray[np.float64] = _EYE / np.linalg.norm(_EYE)
     right = np.cross([0, 0, 1], back)
     right /= np.linalg.norm(right)

@@ -12,7 +12,7 @@ from typing import ClassVar
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, Version, types_of
 from robochoc.ros.sink import Fields, Sink, SinkError
-from robochoc.system.files import Unfinished
+from robochoc.system.files import PendingFile
 
 _END_OF_TIME = (1 << 32) * 10**9
 """The first time, in nanoseconds since the epoch, that ROS 1 cannot hold."""
@@ -34,7 +34,7 @@ class RecordingSink(Sink):
         self.original: Mapping[str, str] = MappingProxyType({})
         self._open = False
         with self.sink_errors():
-            self.file = Unfinished(Path(place))
+            self.file = PendingFile(Path(place))
         self._open = True
 
     @abstractmethod

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.generators.queens3d import queens3d
-from robochoc.journal.journal import Header, Recorder, lines_of, metrics_of, read_journal
+from robochoc.journal.journal import Header, JournalRecorder, lines_of, metrics_of, read_journal
 from robochoc.model.message import Envelope
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
@@ -49,7 +49,7 @@ def test_a_seed_is_a_run(team: Team, seed: int, schedule: ScheduleName) -> None:
 @given(team=teams, seed=st.integers(0, 2**32))
 @settings(max_examples=50, deadline=None)
 def test_metrics_from_the_journal_are_the_hosts(team: Team, seed: int) -> None:
-    recorder = Recorder(Header(team=team.name, protocol="abt", runtime="simulator", seed=seed))
+    recorder = JournalRecorder(Header(team=team.name, protocol="abt", runtime="simulator", seed=seed))
     options = Options(runtime=Runtime.SIMULATOR, seed=seed, withdraw=Withdrawal.MAXIMAL)
     spent = solve(team, options, observer=recorder).metrics
     read = metrics_of(read_journal(recorder.content()).events)
@@ -57,7 +57,7 @@ def test_metrics_from_the_journal_are_the_hosts(team: Team, seed: int) -> None:
 
 
 def recorded(team: Team, options: Options) -> list[bytes]:
-    recorder = Recorder(Header(team=team.name, protocol="abt", runtime="simulator", seed=options.seed))
+    recorder = JournalRecorder(Header(team=team.name, protocol="abt", runtime="simulator", seed=options.seed))
     solve(team, options, observer=recorder)
     return [*lines_of(read_journal(recorder.content()))]
 
