@@ -16,7 +16,7 @@ from report import Row, Section
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Sent
-from robochoc.journal.journal import Header, JournalFile, Recorder, lines_of, read_journal
+from robochoc.journal.journal import Header, JournalFile, JournalRecorder, lines_of, read_journal
 from robochoc.run import Options, Runtime, solve
 
 MESSAGES = 1_000_000
@@ -72,7 +72,7 @@ def _size(content: bytes, sent: int) -> tuple[str, str]:
 
 def _write(header: Header, events: Sequence[AnyEvent], path: Path) -> None:
     file = JournalFile(path)
-    recorder = Recorder(header, sinks=[file.write])
+    recorder = JournalRecorder(header, sinks=[file.write])
     for event in events:
         recorder(event)
     recorder.close()

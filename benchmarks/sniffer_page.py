@@ -20,7 +20,7 @@ from tornado.httpclient import AsyncHTTPClient
 from tornado.websocket import websocket_connect
 
 from robochoc.journal.events import Began, Received, Sent, Settled
-from robochoc.journal.journal import Header, JournalFile, Recorder
+from robochoc.journal.journal import Header, JournalFile, JournalRecorder
 
 STOPPED = "stopped.pid"
 """In the folder for temporary files: who has stopped, and is to be put out."""
@@ -69,7 +69,7 @@ def _stop() -> None:
 def write(path: Path, messages: int) -> None:
     """A journal of `messages` messages of 49 robots, whose bundles come out of order."""
     file = JournalFile(path)
-    recorder = Recorder(Header(team="long", protocol="abt", runtime="processes", seed=0), None, [file.write])
+    recorder = JournalRecorder(Header(team="long", protocol="abt", runtime="processes", seed=0), None, [file.write])
     recorder(Began(t=0, protocol="ABT"))
     names = [f"Robot{row}.{column}" for row in range(1, 8) for column in range(1, 8)]
     waiting: list[list[str]] = [[] for _ in names]

@@ -74,7 +74,7 @@ class Problem:
 
 
 def load(path: Path | str) -> Problem:
-    """The team in the folder `path`. Raises `InvalidInputError` with every mistake's file and line."""
+    """Return the team in the folder `path`. Raises `InvalidInputError` with every mistake's file and line."""
     return Problem(read_team(Path(path)))
 
 
@@ -188,7 +188,10 @@ class AgentsContainer:
 
 
 def protocol_called(word: str) -> str:
-    """The installed name of the protocol that the paper's type names: `ABT` is `abt`. Raises `UnknownProtocolError`."""
+    """Return the installed name of the protocol that the paper's type names: `ABT` is `abt`.
+
+    Raises `UnknownProtocolError`.
+    """
     for offer in offers():
         if offer.protocol and word.casefold() in {offer.name.casefold(), offer.protocol.__name__.casefold()}:
             return offer.name

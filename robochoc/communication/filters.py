@@ -15,7 +15,7 @@ from typing import cast
 from robochoc.authority.keyring import KeyRing
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.system.entry_points import EntryPoint
-from robochoc.system.installed import all_in, loaded, missing, named
+from robochoc.system.installed import all_entry_points, entry_points_named, load_entry_point, not_installed_message
 
 GROUP = "robochoc.filters"
 
@@ -90,14 +90,14 @@ class FilterOffer:
 
 def filter_offers() -> tuple[FilterOffer, ...]:
     """All that installed packages offer, by name; what cannot be used too, with the reason."""
-    return tuple(_offer(entry, namesakes) for entry, namesakes in all_in(GROUP))
+    return tuple(_offer(entry, namesakes) for entry, namesakes in all_entry_points(GROUP))
 
 
 def filter_named(name: str) -> type[ChannelFilter]:
     """The filter called `name`. Raises `UnknownFilterError`, which names those there are."""
-    found = named(GROUP, name)
+    found = entry_points_named(GROUP, name)
     if not found:
-        raise UnknownFilterError(missing(GROUP, "filter", name))
+        raise UnknownFilterError(not_installed_message(GROUP, "filter", name))
     offer = _offer(found[0], found)
     if offer.filter is None:
         raise UnknownFilterError(f"{offer.place}, installed as filter {name!r}, {offer.broken}")
@@ -105,7 +105,7 @@ def filter_named(name: str) -> type[ChannelFilter]:
 
 
 def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> FilterOffer:
-    found = loaded(entry, namesakes, _fault)
+    found = load_entry_point(entry, namesakes, _fault)
     return FilterOffer(entry.name, entry.value, cast("type[ChannelFilter] | None", found.what), found.broken)
 
 

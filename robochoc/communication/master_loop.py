@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 from robochoc.communication.control import Wave
+from robochoc.communication.kill_schedule import KillSchedule
 from robochoc.communication.run_result import Progress
 from robochoc.communication.search_state import SearchState
 from robochoc.communication.session import over
@@ -20,12 +21,14 @@ TICK_S = 0.2
 
 
 class MasterLoop(ABC):
-    """The loop of a master whose search is in `state`. `progress` is called with the count of messages, if given."""
+    """The loop of a master whose search is in `state`. `progress` receives the count of messages now and then."""
 
     state: SearchState
 
     def __init__(self, progress: Callable[[Progress], None] | None = None) -> None:
         self._progress = progress
+        self._kills = KillSchedule()
+        self._kill: Callable[[str], None] | None = None
         self._shown = self._checked = 0.0
         self._began = time.monotonic()
 
@@ -50,6 +53,11 @@ class MasterLoop(ABC):
     def _send_wave(self, wave: Wave) -> None:
         """Ask all robots for their counters."""
 
+    def schedule_kills(self, kills: KillSchedule, kill: Callable[[str], None]) -> None:
+        """Have `kill` end robots' processes as `kills` says."""
+        self._kills = kills
+        self._kill = kill
+
     def _search_until(self, deadline: float | None) -> None:
         """Search until there is a verdict, the search has to be broken off, or the deadline comes.
 
@@ -60,9 +68,11 @@ class MasterLoop(ABC):
         if not state.ready or state.ended:
             return
         self._order_start()
+        self._kills.begin(time.monotonic())
         state.ordered = state.searching = True
         self._serve_until(lambda: state.ended, deadline)
         state.searching = False
+        self._kills.end(time.monotonic())
 
     def _serve_until(self, done: Callable[[], bool], deadline: float | None) -> None:
         """Serve the robots until `done()`, or until the deadline on the monotonic clock. Raises as `_serve`."""
@@ -70,12 +80,19 @@ class MasterLoop(ABC):
             now = time.monotonic()
             if over(deadline):
                 return
-            self._serve(TICK_S if deadline is None else min(TICK_S, deadline - now), deadline)
+            waits = (TICK_S, None if deadline is None else deadline - now, self._kills.wait_s(now))
+            self._serve(min(wait for wait in waits if wait is not None), deadline)
             if now - self._checked >= TICK_S:
                 self._checked = now
                 self._check_robots(now)
             if self.state.searching:
                 self._detect_end(now)
+                self._kill_due()
+
+    def _kill_due(self) -> None:
+        if self._kill is not None:
+            for name in self._kills.due(time.monotonic()):
+                self._kill(name)
 
     def _detect_end(self, now: float) -> None:
         """Begin a wave when it could show quiescence, or when somebody waits for the count of messages."""

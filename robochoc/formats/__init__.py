@@ -5,7 +5,7 @@ from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodabl
 from robochoc.formats.folder import write_team
 from robochoc.formats.robot import read_robot, robot_in
 from robochoc.formats.team import find_teams, read_team, robot_names
-from robochoc.formats.validation import check_event, check_robot, check_team, held_to_rules
+from robochoc.formats.validation import check_event, check_robot, check_team, with_checked_events
 from robochoc.formats.writer import robot_xml
 from robochoc.system.files import write_atomically
 
@@ -18,13 +18,13 @@ __all__ = [
     "check_team",
     "encodable",
     "find_teams",
-    "held_to_rules",
     "on_one_line",
     "read_robot",
     "read_team",
     "robot_in",
     "robot_names",
     "robot_xml",
+    "with_checked_events",
     "write_atomically",
     "write_team",
 ]

@@ -39,7 +39,7 @@ class Context:
 
 
 def read_private(element: etree._Element, context: Context) -> Constraint | None:
-    """An intra-agent constraint: over own variables only. See `_read` for the rest."""
+    """Return an intra-agent constraint: over own variables only. See `_read` for the rest."""
     model = attribute(element, "model")
     refuse_private_part(ConstraintModel(model) if model else None)
     constraint = _read(element, context, ConstraintModel(model) if model else None)
@@ -49,7 +49,7 @@ def read_private(element: etree._Element, context: Context) -> Constraint | None
 
 
 def read_shared(element: etree._Element, context: Context) -> Constraint | None:
-    """A constraint with a neighbour: over own variables and others'. See `_read` for the rest."""
+    """Return a constraint with a neighbour: over own variables and others'. See `_read` for the rest."""
     model = attribute(element, "model") or context.model
     refuse_no_model(model)
     constraint = _read(element, context, ConstraintModel(model) if model else None)
@@ -59,7 +59,7 @@ def read_shared(element: etree._Element, context: Context) -> Constraint | None:
 
 
 def _read(element: etree._Element, context: Context, model: ConstraintModel | None) -> Constraint | None:
-    """The constraint, or None where its definition has a mistake of its own. Raises `MistakeError`."""
+    """Return the constraint, or None where its definition has a mistake of its own. Raises `MistakeError`."""
     scope = _terms(element.get("scope") or "")
     given = element.find("parameters")
     parameters = scope if given is None else _terms(given.text or "")
@@ -96,7 +96,7 @@ def _definition(reference: str, context: Context) -> Relation | Predicate | None
 
 
 def _check_arity(given: str, constraint: Constraint) -> None:
-    """The original platform counts a scope's variables; who counts its constants too is right as well."""
+    """Raise `MistakeError` unless `given` is the number of variables in the scope, or of all terms."""
     if given and int(given) not in {len(constraint.variables), len(constraint.scope)}:
         raise MistakeError(
             f"arity is {given}, but the scope has {len(constraint.variables)} variables",

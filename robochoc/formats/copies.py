@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, 
 from itertools import product
 
 from robochoc.formats.diagnostics import Diagnostic, shortened
-from robochoc.formats.team_members import Members
+from robochoc.formats.team_members import TeamMembers
 from robochoc.model.expression import Apply, Constant, Expression, Name, UndefinedValueError, compile_expression
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Domain, Relation, Robot
 
@@ -20,8 +20,8 @@ MAX_COMPARED = 1_000_000
 """So many tuples are tried at most to find a difference."""
 
 
-def differing_copies(members: Members, misplaced: Collection[str]) -> Iterator[Diagnostic]:
-    """Copies that the child does not have, or has differently; children whose files are in `misplaced` are left out."""
+def differing_copies(members: TeamMembers, misplaced: Collection[str]) -> Iterator[Diagnostic]:
+    """Yield copies that differ from the child's constraints. Children whose files are in `misplaced` are left out."""
     domains = {variable.name: variable.domain for robot in members.robots for variable in robot.variables}
     for file in members.files.values():
         for name, copies in file.copies.items():
@@ -47,7 +47,7 @@ def _differing(
 
 
 def _grouped(constraints: Iterable[Constraint]) -> dict[tuple[str, ...], list[Constraint]]:
-    """Constraints by the set of their variables."""
+    """Return constraints by the set of their variables."""
     groups: dict[tuple[str, ...], list[Constraint]] = {}
     for constraint in constraints:
         groups.setdefault(tuple(sorted(constraint.variables)), []).append(constraint)
@@ -55,7 +55,7 @@ def _grouped(constraints: Iterable[Constraint]) -> dict[tuple[str, ...], list[Co
 
 
 def _written(group: Iterable[Constraint]) -> Counter[Hashable]:
-    """What the constraints say, whatever they and their definitions are called."""
+    """Return what the constraints say, whatever they and their definitions are called."""
     written: Counter[Hashable] = Counter()
     for constraint in group:
         definition = constraint.definition
@@ -68,7 +68,7 @@ def _written(group: Iterable[Constraint]) -> Counter[Hashable]:
 
 
 def _applied(constraint: Constraint) -> Expression:
-    """The body of a predicate, about the variables and constants it is applied to."""
+    """Return the body of a predicate, about the variables and constants it is applied to."""
     if isinstance(constraint.definition, Relation):
         raise TypeError("a relation has no body")
     terms: dict[str, Expression] = {
@@ -94,7 +94,7 @@ def _difference(
     originals: Sequence[Constraint],
     domains: Mapping[str, Domain],
 ) -> str:
-    """Where the two say different things; empty where they nowhere do."""
+    """Return where the two say different things; empty where they nowhere do."""
     if any(variable not in domains for variable in variables):
         return ""  # of a robot whose file is broken
     if math.prod(len(domains[variable]) for variable in variables) > MAX_COMPARED:
@@ -114,7 +114,7 @@ def _said(cost: float) -> str:
 
 
 def _price(constraint: Constraint, variables: tuple[str, ...]) -> Callable[[tuple[int, ...]], float]:
-    """What values of `variables` pay: `Constraint.price`, made for a million calls."""
+    """Return what values of `variables` pay: `Constraint.price`, made for a million calls."""
     definition = constraint.definition
     if isinstance(definition, Relation):
         slots = [(variables.index(term), 0) if isinstance(term, str) else (-1, term) for term in constraint.parameters]

@@ -145,12 +145,15 @@ def check_expression(what: str, expression: Expression, names: Sequence[str], wa
 
 @lru_cache(maxsize=256)
 def parsed(said: str, names: tuple[str, ...], wanted: Type) -> Expression:
-    """Like `parse`. The robots of a team mostly say the same: equal texts are parsed once and share one tree."""
+    """Return what `parse` returns.
+
+    Robots of a team mostly have equal texts: these are parsed once and share one tree.
+    """
     return parse(said, names, wanted)
 
 
 def expression_mistake(what: str, error: ExpressionError, line: int = 0) -> MistakeError:
-    """What is wrong with the expression of `what`, which stands in that `line`."""
+    """Return what is wrong with the expression of `what`, which stands in that `line`."""
     message = f"{what}: {error.message}, at character {error.position + 1}"
     return MistakeError(message, error.hint or "see FORMAT.md, 'Functional expressions'", line)
 
@@ -179,5 +182,5 @@ def _check_size(expression: object) -> None:
 
 
 def shown(terms: Sequence[Term]) -> str:
-    """A scope or a tuple, as it stands in a message."""
+    """Return a scope or a tuple, as it stands in a message."""
     return shortened(" ".join(map(in_short, terms)))

@@ -38,7 +38,7 @@ class InvalidInputError(Exception):
 
 
 class MistakeError(Exception):
-    """A mistake in one element, on its way to the `Report` that knows the file and the line."""
+    """A mistake in one element, on its way to the `DiagnosticCollector` that knows the file and the line."""
 
     def __init__(self, message: str, hint: str, line: int = 0) -> None:
         super().__init__(message)
@@ -47,7 +47,7 @@ class MistakeError(Exception):
         self.line = line
 
 
-class Report:
+class DiagnosticCollector:
     """The mistakes of one file, collected while it is read."""
 
     def __init__(self, file: str) -> None:
@@ -76,7 +76,7 @@ class Report:
 
 
 def suggestion(word: str, known: Collection[str], what: str) -> str:
-    """A hint for an unknown name: the known one that looks like it, or all of them; `what` is their plural."""
+    """Return a hint for an unknown name: the known one that looks like it, or all of them; `what` is their plural."""
     if not known:
         return f"there are no {what}"
     import difflib  # noqa: PLC0415 - start-up: only mistakes need it
@@ -87,15 +87,15 @@ def suggestion(word: str, known: Collection[str], what: str) -> str:
 
 
 def shortened(text: str) -> str:
-    """`text` short enough to stand in a message."""
+    """Return `text` short enough to stand in a message."""
     return text if len(text) <= 60 else f"{text[:57]}..."  # noqa: PLR2004 - characters
 
 
 def _place(diagnostic: Diagnostic) -> tuple[object, int]:
-    """The longest paths are 4096 characters; in longer ones `natural_key` could meet more digits than `int` accepts."""
+    """Return a sort key: file and line. Longer paths than 4096 characters could have numbers too long for `int`."""
     return natural_key(diagnostic.file[:4096]), diagnostic.line
 
 
 def encodable(path: str) -> str:
-    """`path` as text that has a UTF-8 form: a file system's names need not have one."""
+    """Return `path` as text that has a UTF-8 form: a file system's names need not have one."""
     return os.fsencode(path).decode("utf-8", "replace")

@@ -23,7 +23,7 @@ _RANGE = re.compile(r"([+-]?[0-9]{1,18})(?:\.\.([+-]?[0-9]{1,18}))?")
 
 
 def integer(word: str) -> int:
-    """The integer that `word` is. Raises `MistakeError`; digits are counted before Python reads them."""
+    """Return the integer that `word` is. Raises `MistakeError`; digits are counted before Python reads them."""
     if not _INTEGER.fullmatch(word):
         raise MistakeError(f"'{shortened(word)}' is no integer", "at most 18 digits, and a sign")
     return int(word)
@@ -37,7 +37,10 @@ def check_count(element: etree._Element, name: str, found: int) -> None:
 
 
 def read_domain(element: etree._Element) -> Domain:
-    """A domain from XCSP ranges, `1..4 7 9..12`, as ascending ranges that do not touch. Raises `MistakeError`."""
+    """Return a domain from XCSP ranges, `1..4 7 9..12`, as ascending ranges that do not touch.
+
+    Raises `MistakeError`.
+    """
     name = attribute(element, "name")
     ranges = sorted(map(_range, (element.text or "").split()), key=lambda part: part.start)
     domain = Domain(name, tuple(ranges))
@@ -58,7 +61,7 @@ def _range(word: str) -> range:
 
 
 def read_relation(element: etree._Element) -> Relation:
-    """A relation from its tuples, `1 2|2 3` or, where soft, `5:1 2|3:2 2`. Raises `MistakeError`."""
+    """Return a relation from its tuples, `1 2|2 3` or, where soft, `5:1 2|3:2 2`. Raises `MistakeError`."""
     semantics = Semantics(attribute(element, "semantics"))
     default = attribute(element, "defaultCost")
     if (semantics is Semantics.SOFT) != bool(default):
@@ -86,7 +89,7 @@ def read_relation(element: etree._Element) -> Relation:
 
 
 def _arity(element: etree._Element, tuples: list[tuple[int, ...]]) -> int:
-    """The given arity, or the first tuple's. Raises `MistakeError` where there is neither."""
+    """Return the given arity, or the first tuple's. Raises `MistakeError` where there is neither."""
     given = attribute(element, "arity")
     if not given and not tuples:
         raise MistakeError("a relation without tuples lacks its arity", 'write arity="2"')

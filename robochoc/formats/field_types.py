@@ -21,12 +21,12 @@ _LEAVES = (Apply, Constant, Name)
 """Expressions: they may be too deep to be walked, and have a check of their own."""
 
 AS_BUILT = "build it as its class says"
-"""What to do about a `ShapeError`."""
+"""What to do about a `FieldTypeError`."""
 
 _Check = Callable[[object], None]
 
 
-class ShapeError(TypeError):
+class FieldTypeError(TypeError):
     """An object is not made as it should be: `path` leads to the part that is wrong."""
 
     def __init__(self, value: object, expected: str) -> None:
@@ -36,18 +36,18 @@ class ShapeError(TypeError):
 
     @property
     def told(self) -> str:
-        """What is wrong, and where in the object."""
+        """Return what is wrong, and where in the object."""
         where = self.path.lstrip(".")
         return f"{where}: {self}" if where else str(self)
 
-    def inside(self, step: str) -> ShapeError:
+    def inside(self, step: str) -> FieldTypeError:
         """Return the same mistake, one `step` deeper."""
         self.path = f"{step}{self.path}"
         return self
 
 
-def check_shape(value: object, kind: type) -> None:
-    """Raise `ShapeError` unless `value` is an object of the dataclass `kind`, and all its parts are as it says."""
+def check_field_types(value: object, kind: type) -> None:
+    """Raise `FieldTypeError` unless `value` is an object of the dataclass `kind`, and all its parts are as it says."""
     _check(kind)(value)
 
 
@@ -65,11 +65,11 @@ def _check(hint: Any) -> _Check:  # noqa: ANN401 - an annotation
 
 
 def _exactly(expected: str, *kinds: type) -> _Check:
-    """Numbers: True is an `int`, and is written as no number is."""
+    """Return a check for numbers. It refuses True: that is an `int`, but is not written as a number."""
 
     def check(value: object) -> None:
         if type(value) not in kinds:
-            raise ShapeError(value, expected)
+            raise FieldTypeError(value, expected)
 
     return check
 
@@ -78,7 +78,7 @@ def _instance_of(kind: type) -> _Check:
     def check(value: object) -> None:
         if not isinstance(value, kind):
             expected = f"one of {kind.__name__}" if issubclass(kind, Enum) else f"a {kind.__name__}"
-            raise ShapeError(value, expected.replace("a NoneType", "None"))
+            raise FieldTypeError(value, expected.replace("a NoneType", "None"))
 
     return check
 
@@ -91,7 +91,7 @@ def _any_of(hint: Any) -> _Check:  # noqa: ANN401 - an annotation
     def check(value: object) -> None:
         found = next((option for option in options if isinstance(value, option)), None)
         if found is None:
-            raise ShapeError(value, expected)
+            raise FieldTypeError(value, expected)
         if found in checks:
             checks[found](value)
 
@@ -103,13 +103,13 @@ def _tuple_of(item: Any) -> _Check:  # noqa: ANN401 - an annotation
 
     def check(value: object) -> None:
         if not isinstance(value, tuple):
-            raise ShapeError(value, "a tuple")
+            raise FieldTypeError(value, "a tuple")
         if item is int and all(type(one) is int for one in value):
             return
         for number, one in enumerate(value):
             try:
                 check_item(one)
-            except ShapeError as error:
+            except FieldTypeError as error:
                 raise error.inside(f"[{number}]") from None
 
     return check
@@ -127,7 +127,7 @@ class _Parts:
         for name, check in _fields_of(self._kind):
             try:
                 check(getattr(value, name))
-            except ShapeError as error:
+            except FieldTypeError as error:
                 raise error.inside(f".{name}") from None
 
 

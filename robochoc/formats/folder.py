@@ -48,7 +48,7 @@ def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
 
 
 def _file(robot: Robot) -> bytes:
-    """The robot's file. Raises `InvalidInputError` when no reader would take it: it may be too large."""
+    """Return the robot's file. Raises `InvalidInputError` when no reader would take it: it may be too large."""
     content = robot_xml(robot)
     if len(content) > _SURELY_READ:
         robot_in(content, robot.name)

@@ -16,7 +16,7 @@ __all__ = ["PREDEFINED", "read_predicate", "read_topic"]
 
 
 def read_predicate(element: etree._Element) -> Predicate:
-    """A predicate from `int X int Y` and a Boolean functional expression. Raises `MistakeError`."""
+    """Return a predicate from `int X int Y` and a Boolean functional expression. Raises `MistakeError`."""
     name = attribute(element, "name")
     parameters = _formal(element.findtext("parameters") or "")
     functional = element.find("expression/functional")
@@ -30,7 +30,10 @@ def read_predicate(element: etree._Element) -> Predicate:
 
 
 def read_topic(element: etree._Element, variables: Collection[str]) -> Topic:
-    """A topic, whose `x`, `y` and `z` are expressions over the robot's own `variables`. Raises `MistakeError`."""
+    """Return a topic, whose `x`, `y` and `z` are expressions over the robot's own `variables`.
+
+    Raises `MistakeError`.
+    """
     given: dict[str, Expression] = {}
     for axis in ("x", "y", "z"):
         body = element.get(axis)
@@ -44,7 +47,7 @@ def read_topic(element: etree._Element, variables: Collection[str]) -> Topic:
 
 
 def _formal(text: str) -> tuple[str, ...]:
-    """The names in `int X int Y`. Raises `MistakeError`."""
+    """Return the names in `int X int Y`. Raises `MistakeError`."""
     words = text.split()
     names = tuple(words[1::2])
     if len(words) % 2 or any(word != "int" for word in words[::2]):

@@ -34,7 +34,7 @@ _Named = TypeVar("_Named", Domain, Relation | Predicate)
 
 
 def _names(things: Iterable[_Named], predefined: Mapping[str, _Named] = {}) -> dict[_Named, str] | None:
-    """Names that tell `things` apart, for those whose own do not; None where all own names do."""
+    """Return names that tell `things` apart, for those whose own do not; None where all own names do."""
     first: dict[str, _Named] = dict(predefined)
     names: dict[_Named, str] = {}
     for thing in things:

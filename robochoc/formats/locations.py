@@ -12,7 +12,7 @@ from robochoc.formats.names import in_short
 from robochoc.model.problem import Child, Constraint, Parent
 
 
-class Place(NamedTuple):
+class Location(NamedTuple):
     """A file and a line in it (0: no line is to blame); or an object, by what it is and is called."""
 
     file: str
@@ -26,19 +26,19 @@ class Place(NamedTuple):
         return Diagnostic(self.file, self.line, message, hint)
 
 
-class Places(Protocol):
+class Locations(Protocol):
     """Where one robot and its parts stand."""
 
-    def robot(self) -> Place:
+    def robot(self) -> Location:
         """Return where the robot itself stands."""
 
-    def variable(self, name: str) -> Place:
+    def variable(self, name: str) -> Location:
         """Return where its variable `name` stands."""
 
-    def constraint(self, constraint: Constraint) -> Place:
+    def constraint(self, constraint: Constraint) -> Location:
         """Return where a constraint that it holds stands."""
 
-    def neighbour(self, neighbour: Parent | Child) -> Place:
+    def neighbour(self, neighbour: Parent | Child) -> Location:
         """Return where a neighbour is listed."""
 
     def absent(self, name: str) -> tuple[str, str]:
@@ -46,28 +46,28 @@ class Places(Protocol):
 
 
 @dataclass(frozen=True)
-class FilePlaces:
+class FileLocations:
     """A robot in the XML file `file`, which says in `line` what kind of problem it is, and its variables in `lines`."""
 
     file: str
     line: int
     lines: Mapping[str, int]
 
-    def robot(self) -> Place:
+    def robot(self) -> Location:
         """Return the line of the presentation."""
-        return Place(self.file, self.line)
+        return Location(self.file, self.line)
 
-    def variable(self, name: str) -> Place:
+    def variable(self, name: str) -> Location:
         """Return the line of a variable."""
-        return Place(self.file, self.lines.get(name, self.line))
+        return Location(self.file, self.lines.get(name, self.line))
 
-    def constraint(self, constraint: Constraint) -> Place:
+    def constraint(self, constraint: Constraint) -> Location:
         """Return the line that the constraint was read from."""
-        return Place(self.file, constraint.line)
+        return Location(self.file, constraint.line)
 
-    def neighbour(self, neighbour: Parent | Child) -> Place:
+    def neighbour(self, neighbour: Parent | Child) -> Location:
         """Return the line that the neighbour was read from."""
-        return Place(self.file, neighbour.line)
+        return Location(self.file, neighbour.line)
 
     def absent(self, name: str) -> tuple[str, str]:
         """Return the file that should be there."""
@@ -76,29 +76,29 @@ class FilePlaces:
 
 
 @dataclass(frozen=True)
-class ObjectPlaces:
+class ObjectLocations:
     """A robot that was built in Python, and is called `name`: stale lines of files are not believed."""
 
     name: str
 
-    def robot(self) -> Place:
+    def robot(self) -> Location:
         """Return the robot."""
-        return Place(f"robot {shortened(self.name)}")
+        return Location(f"robot {shortened(self.name)}")
 
-    def variable(self, name: str) -> Place:
+    def variable(self, name: str) -> Location:
         """Return a variable, by its name."""
         return self._part("variable", name)
 
-    def constraint(self, constraint: Constraint) -> Place:
+    def constraint(self, constraint: Constraint) -> Location:
         """Return a constraint by its name, which need not be unique, and its scope."""
         scope = shortened(" ".join(map(in_short, constraint.scope)))
-        return Place(f"{self.robot()}, constraint {shortened(constraint.name)} ({scope})")
+        return Location(f"{self.robot()}, constraint {shortened(constraint.name)} ({scope})")
 
-    def neighbour(self, neighbour: Parent | Child) -> Place:
+    def neighbour(self, neighbour: Parent | Child) -> Location:
         """Return a neighbour, by its name."""
         return self._part("parent" if isinstance(neighbour, Parent) else "child", neighbour.name)
 
-    def part(self, what: str, name: str) -> Place:
+    def part(self, what: str, name: str) -> Location:
         """Return anything else of the robot, by its name."""
         return self._part(what, name)
 
@@ -106,5 +106,5 @@ class ObjectPlaces:
         """Return that there is no such robot."""
         return f"is not in the team: there is no robot '{name}'", "add that robot or leave this neighbour out"
 
-    def _part(self, what: str, name: str) -> Place:
-        return Place(f"{self.robot()}, {what} {shortened(name)}")
+    def _part(self, what: str, name: str) -> Location:
+        return Location(f"{self.robot()}, {what} {shortened(name)}")

@@ -24,7 +24,7 @@ _NO_XML = re.compile("[\0-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 
 
 def is_name(word: str) -> bool:
-    """Whether `word` can be a robot's or a variable's name."""
+    """Return whether `word` can be a robot's or a variable's name."""
     return _NAME.fullmatch(word) is not None
 
 
@@ -79,7 +79,7 @@ def check_unique(what: str, name: str, known: Collection[str]) -> None:
 
 
 def digits(value: int) -> int:
-    """How many there are, more or less: Python writes no integer of more than a few thousand."""
+    """Return how many there are, more or less: Python writes no integer of more than a few thousand."""
     return max(19, int(value.bit_length() * 0.30103) + 1)
 
 

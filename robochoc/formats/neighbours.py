@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Iterator
 
 from robochoc.formats.diagnostics import Diagnostic, shortened, suggestion
-from robochoc.formats.team_members import Members
+from robochoc.formats.team_members import TeamMembers
 from robochoc.model.priorities import CycleError, priority_order
 
 
-def missing_robots(members: Members) -> Iterator[Diagnostic]:
-    """Neighbours that are not there."""
+def missing_robots(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield neighbours that are not there."""
     known = dict.fromkeys([*members.files, *sorted(members.broken)])
     for entry in members.entries.values():
         if entry.other not in known:
@@ -21,8 +21,8 @@ def missing_robots(members: Members) -> Iterator[Diagnostic]:
             yield entry.place.mistake(f"the {entry.role} '{name}' {absent}", hint)
 
 
-def disagreements(members: Members) -> Iterator[Diagnostic]:
-    """Pairs of robots of which each should call the other the opposite of what it is called itself."""
+def disagreements(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield pairs of robots of which each should call the other the opposite of what it is called itself."""
     for entry in members.entries.values():
         name, other = entry.robot.name, entry.other
         answer = members.entries.get((other, name))
@@ -35,8 +35,8 @@ def disagreements(members: Members) -> Iterator[Diagnostic]:
             yield entry.place.mistake(message, f"change it here or at {answer.place}")
 
 
-def cycles(members: Members) -> Iterator[Diagnostic]:
-    """Cycles of parents, each without a link in common with those before it."""
+def cycles(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield cycles of parents, each without a link in common with those before it."""
     parents = {name: set(agreed) for name, agreed in members.agreed.items()}
     while True:
         try:
@@ -53,8 +53,8 @@ def cycles(members: Members) -> Iterator[Diagnostic]:
             return
 
 
-def mixed_kinds(members: Members) -> Iterator[Diagnostic]:
-    """Robots that differ from most others in being a DisCSP or a DisWCSP."""
+def mixed_kinds(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield robots that differ from most others in being a DisCSP or a DisWCSP."""
     usual = Counter(robot.kind for robot in members.robots).most_common(1)
     for robot in members.robots:
         if robot.kind is not usual[0][0]:
@@ -64,8 +64,8 @@ def mixed_kinds(members: Members) -> Iterator[Diagnostic]:
             yield members.place(robot.name).mistake(message, hint)
 
 
-def shared_variables(members: Members) -> Iterator[Diagnostic]:
-    """Variables that more than one robot calls its own."""
+def shared_variables(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield variables that more than one robot calls its own."""
     for variable, (first, *others) in members.owners.items():
         for other in others:
             message = f"the variable '{shortened(variable)}' is also one of '{first}'"
@@ -73,8 +73,8 @@ def shared_variables(members: Members) -> Iterator[Diagnostic]:
             yield members.place(other, variable).mistake(message, hint)
 
 
-def out_of_order(members: Members) -> Iterator[Diagnostic]:
-    """Robots that stand before one of their parents, where the team says an order of its own."""
+def out_of_order(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield robots that stand before one of their parents, where the team says an order of its own."""
     rank = {name: place for place, name in enumerate(members.order)}
     if not members.ranks:
         return  # the links themselves have a mistake

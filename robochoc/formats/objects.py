@@ -15,20 +15,20 @@ from robochoc.formats.definitions import (
     refuse_predefined,
 )
 from robochoc.formats.diagnostics import MAX_PER_FILE, Diagnostic, MistakeError, shortened
-from robochoc.formats.field_types import AS_BUILT, ShapeError, check_shape
-from robochoc.formats.locations import ObjectPlaces, Place
+from robochoc.formats.field_types import AS_BUILT, FieldTypeError, check_field_types
+from robochoc.formats.locations import Location, ObjectLocations
 from robochoc.formats.names import check_name, check_robot_name, check_unique, check_weight, check_word
 from robochoc.formats.rules import (
     NEIGHBOURS_ONCE,
     check_constraint,
     check_private,
     check_shared,
+    check_shown_variables,
     check_terms,
-    check_told,
     refuse_no_model,
     refuse_nothing_to_decide,
     refuse_private_part,
-    repeated,
+    repeated_neighbours,
 )
 from robochoc.model.problem import Constraint, ConstraintModel, Domain, Predicate, ProblemKind, Relation, Robot
 
@@ -49,10 +49,10 @@ class Objects:
         """Return what is wrong with `robot` by itself: nothing of its neighbours is looked at."""
         self._found, self._wrong = [], []
         if self._is_made_right(robot):
-            for _ in self._steps(robot, ObjectPlaces(robot.name)):
+            for _ in self._steps(robot, ObjectLocations(robot.name)):
                 if len(self._found) > MAX_PER_FILE:
                     del self._found[MAX_PER_FILE:]
-                    self._note(ObjectPlaces(robot.name).robot(), "and more mistakes", "mend those above first")
+                    self._note(ObjectLocations(robot.name).robot(), "and more mistakes", "mend those above first")
                     break
         return self._found
 
@@ -60,19 +60,19 @@ class Objects:
         """Return what is wrong with a constraint that `robot` is to share from now on."""
         self._found, self._wrong = [], []
         own = dict.fromkeys(variable.name for variable in robot.variables)
-        self._shared(constraint, own, robot.kind, ObjectPlaces(robot.name))
+        self._shared(constraint, own, robot.kind, ObjectLocations(robot.name))
         return self._found
 
     def _is_made_right(self, robot: Robot) -> bool:
         try:
-            check_shape(robot, Robot)
-        except ShapeError as error:
+            check_field_types(robot, Robot)
+        except FieldTypeError as error:
             name = robot.name if isinstance(getattr(robot, "name", None), str) else "?"
-            self._note(ObjectPlaces(name).robot(), error.told, AS_BUILT)
+            self._note(ObjectLocations(name).robot(), error.told, AS_BUILT)
             return False
         return True
 
-    def _steps(self, robot: Robot, places: ObjectPlaces) -> Iterator[None]:
+    def _steps(self, robot: Robot, places: ObjectLocations) -> Iterator[None]:
         """Look at one object after the other."""
         own = dict.fromkeys(variable.name for variable in robot.variables)
         with self._at(places.robot):
@@ -93,11 +93,11 @@ class Objects:
                 self._shared(constraint, own, robot.kind, places)
                 yield
         yield from self._children(robot, own, places)
-        for neighbour, message in repeated(robot.name, robot.parents, robot.children):
+        for neighbour, message in repeated_neighbours(robot.name, robot.parents, robot.children):
             self._note(places.neighbour(neighbour), message, NEIGHBOURS_ONCE)
             yield
 
-    def _variables(self, robot: Robot, places: ObjectPlaces) -> Iterator[None]:
+    def _variables(self, robot: Robot, places: ObjectLocations) -> Iterator[None]:
         with self._at(places.robot):
             refuse_nothing_to_decide(robot.variables)
         seen: set[str] = set()
@@ -114,7 +114,7 @@ class Objects:
                 self._note(places.robot(), message, "only a change of the team needs `shown`: leave it out")
             yield
 
-    def _topics(self, robot: Robot, own: Collection[str], places: ObjectPlaces) -> Iterator[None]:
+    def _topics(self, robot: Robot, own: Collection[str], places: ObjectLocations) -> Iterator[None]:
         seen: set[str] = set()
         for topic in robot.topics:
             with self._at(places.part, "topic", topic.name):
@@ -123,11 +123,11 @@ class Objects:
             seen.add(topic.name)
             yield
 
-    def _children(self, robot: Robot, own: Collection[str], places: ObjectPlaces) -> Iterator[None]:
+    def _children(self, robot: Robot, own: Collection[str], places: ObjectLocations) -> Iterator[None]:
         for child in robot.children:
             with self._at(places.neighbour, child):
                 check_name(child.name)
-                check_told(child.variables, own)
+                check_shown_variables(child.variables, own)
             for constraint in child.constraints:
                 if constraint.model is ConstraintModel.TKC:
                     message = f"a totally known constraint (TKC) with the child '{shortened(child.name)}'"
@@ -144,19 +144,21 @@ class Objects:
                     self._shared(copy, own, robot.kind, places)
                 yield
 
-    def _private(self, constraint: Constraint, own: Collection[str], kind: ProblemKind, places: ObjectPlaces) -> None:
+    def _private(
+        self, constraint: Constraint, own: Collection[str], kind: ProblemKind, places: ObjectLocations
+    ) -> None:
         with self._at(places.constraint, constraint):
             refuse_private_part(constraint.model)
             if self._applied(constraint, kind, places):
                 check_private(constraint, own)
 
-    def _shared(self, constraint: Constraint, own: Collection[str], kind: ProblemKind, places: ObjectPlaces) -> None:
+    def _shared(self, constraint: Constraint, own: Collection[str], kind: ProblemKind, places: ObjectLocations) -> None:
         with self._at(places.constraint, constraint):
             refuse_no_model(constraint.model)
             if self._applied(constraint, kind, places):
                 check_shared(constraint, own)
 
-    def _applied(self, constraint: Constraint, kind: ProblemKind, places: ObjectPlaces) -> bool:
+    def _applied(self, constraint: Constraint, kind: ProblemKind, places: ObjectLocations) -> bool:
         """Look at a constraint, whoever holds it. False: its definition is to blame. Raises `MistakeError`."""
         definition = constraint.definition
         check_word(constraint.name)
@@ -169,14 +171,14 @@ class Objects:
             check_constraint(constraint, kind)
         return right
 
-    def _defined(self, thing: Definition, places: ObjectPlaces) -> bool:
-        """Whether a domain or a definition is right; the first who has it is told what is wrong."""
+    def _defined(self, thing: Definition, places: ObjectLocations) -> bool:
+        """Return whether a domain or a definition is right; the first who has it is told what is wrong."""
         known = self._known.get(id(thing))
         if known is None:
             known = self._known[id(thing)] = (thing, self._is_right(thing, places))
         return known[1]
 
-    def _is_right(self, thing: Definition, places: ObjectPlaces) -> bool:
+    def _is_right(self, thing: Definition, places: ObjectLocations) -> bool:
         try:
             _check_defined(thing)
         except MistakeError as mistake:
@@ -188,14 +190,14 @@ class Objects:
         return True
 
     @contextmanager
-    def _at(self, place: Callable[..., Place], *part: object) -> Iterator[None]:
+    def _at(self, place: Callable[..., Location], *part: object) -> Iterator[None]:
         """Note a `MistakeError` raised inside; only then anybody asks for the `place` of the `part`."""
         try:
             yield
         except MistakeError as mistake:
             self._note(place(*part), mistake.message, mistake.hint)
 
-    def _note(self, place: Place, message: str, hint: str) -> None:
+    def _note(self, place: Location, message: str, hint: str) -> None:
         self._found.append(place.mistake(message, hint))
 
 
@@ -214,10 +216,10 @@ def _check_defined(thing: Definition) -> None:
 
 
 def repeated_robots(robots: Iterable[Robot]) -> Iterator[Diagnostic]:
-    """Robots of one name."""
+    """Yield robots of one name."""
     seen: set[str] = set()
     for robot in robots:
         if robot.name in seen:
             message = f"a second robot '{shortened(robot.name)}'"
-            yield ObjectPlaces(robot.name).robot().mistake(message, "names of robots are unique: rename one of them")
+            yield ObjectLocations(robot.name).robot().mistake(message, "names of robots are unique: rename one of them")
         seen.add(robot.name)

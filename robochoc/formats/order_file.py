@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, Report, shortened, suggestion
+from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, shortened, suggestion
 from robochoc.model.problem import Team
 
 MAX_BYTES = 1024 * 1024
@@ -12,8 +12,8 @@ _MISSING_SHOWN = 10
 
 
 def read_order(path: Path, team: Team) -> tuple[str, ...]:
-    """The order in the file `path`, of all robots of `team`. Raises `InvalidInputError` with every mistake."""
-    report = Report(str(path))
+    """Return the order in the file `path`, of all robots of `team`. Raises `InvalidInputError` with every mistake."""
+    report = DiagnosticCollector(str(path))
     lines = _text(path).splitlines()
     known = frozenset(team.order)
     places: dict[str, int] = {}

@@ -73,7 +73,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
 
 
 def result_json(outcome: Outcome) -> bytes:
-    """`outcome` as one line of JSON, without the line's end."""
+    """Return `outcome` as one line of JSON, without the line's end."""
     spent = outcome.metrics
     metrics = _MetricsForm(
         messages=sum(spent.messages.values()),
@@ -151,7 +151,7 @@ def _epoch_of(form: _EpochForm) -> EpochOutcome:
 
 
 def read_result(content: bytes) -> Outcome:
-    """The outcome that a JSON result tells of. Raises `ResultError`, saying what is wrong."""
+    """Return the outcome that a JSON result tells of. Raises `ResultError`, saying what is wrong."""
     try:
         form = msgspec.json.decode(content, type=_Form)
     except UnicodeDecodeError as error:

@@ -11,13 +11,20 @@ from lxml import etree
 
 from robochoc.formats.constraints import Context, read_private, read_shared
 from robochoc.formats.definitions import check_semantics, refuse_predefined
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, Report, shortened, suggestion
+from robochoc.formats.diagnostics import (
+    Diagnostic,
+    DiagnosticCollector,
+    InvalidInputError,
+    MistakeError,
+    shortened,
+    suggestion,
+)
 from robochoc.formats.extension import check_count, read_domain, read_relation
 from robochoc.formats.intension import read_predicate, read_topic
-from robochoc.formats.locations import FilePlaces
+from robochoc.formats.locations import FileLocations
 from robochoc.formats.names import check_robot_name, check_unique
-from robochoc.formats.rules import NEIGHBOURS_ONCE, check_told, refuse_nothing_to_decide, repeated
-from robochoc.formats.team_members import Member
+from robochoc.formats.rules import NEIGHBOURS_ONCE, check_shown_variables, refuse_nothing_to_decide, repeated_neighbours
+from robochoc.formats.team_members import TeamMember
 from robochoc.formats.xml import attribute, line, parsed_xml, read_xml
 from robochoc.model.problem import (
     Child,
@@ -36,7 +43,7 @@ from robochoc.model.problem import (
 
 
 @dataclass(frozen=True, kw_only=True)
-class RobotFile(Member):
+class RobotFile(TeamMember):
     """A robot, and what its file says beyond it: that is the team's to check, and then no longer needed."""
 
     context: Context
@@ -44,7 +51,7 @@ class RobotFile(Member):
 
 
 def read_robot(path: Path | str) -> Robot:
-    """The robot in the XML file `path`, named after the file's stem.
+    """Return the robot in the XML file `path`, named after the file's stem.
 
     Its neighbours are not looked at: `read_team` does that. Raises `InvalidInputError` with all mistakes of the file.
     """
@@ -52,13 +59,13 @@ def read_robot(path: Path | str) -> Robot:
 
 
 def read_robot_file(path: Path) -> RobotFile:
-    """The robot in the XML file `path`, with what the team has to check. Raises `InvalidInputError`."""
+    """Return the robot in the XML file `path`, with what the team has to check. Raises `InvalidInputError`."""
     _check_name(path.stem, path)
     return _Reader(path, read_xml(path, "instance")).whole()
 
 
 def robot_in(content: bytes, name: str) -> Robot:
-    """The robot called `name`, whose XML file has this `content`. Nobody need have written such a file.
+    """Return the robot called `name`, whose XML file has this `content`. Nobody need have written such a file.
 
     The same limits hold as for a file. Raises `InvalidInputError`, which tells of the file `NAME.xml`.
     """
@@ -81,7 +88,7 @@ class _Reader:
     def __init__(self, path: Path, instance: etree._Element) -> None:
         self._name = path.stem
         self._instance = instance
-        self._report = Report(str(path))
+        self._report = DiagnosticCollector(str(path))
         self._own: dict[str, int] = {}
 
     def whole(self) -> RobotFile:
@@ -103,11 +110,11 @@ class _Reader:
         unsaid = frozenset(
             attribute(agent, "name") for agent in self._agents("agents_children") if agent.get("variable") is None
         )
-        places = FilePlaces(file, line(presentation), self._own)
+        places = FileLocations(file, line(presentation), self._own)
         return RobotFile(robot, places, copies, unsaid, context=context)
 
     def _elements(self, section: str, tag: str, count: str) -> Iterator[etree._Element]:
-        """The elements of a section of the instance, whose count is checked."""
+        """Yield the elements of a section of the instance, whose count is checked."""
         for container in self._instance.iterchildren(section):
             with self._report.at(line(container)):
                 check_count(container, count, len(container))
@@ -197,7 +204,7 @@ class _Reader:
             yield Parent(attribute(agent, "name"), self._constraints(agent, context, read_shared), line(agent))
 
     def _children(self, context: Context, copies: dict[str, tuple[Constraint, ...]]) -> Iterator[Child]:
-        """The children, with this robot's part of PKCs only; what it repeats of TKCs goes into `copies`."""
+        """Yield the children, with this robot's part of PKCs only; what it repeats of TKCs goes into `copies`."""
         for agent in self._agents("agents_children"):
             name = attribute(agent, "name")
             held = self._constraints(agent, context, read_shared)
@@ -210,9 +217,9 @@ class _Reader:
             if agent.get("variable") is not None:
                 told = tuple((agent.get("variable") or "").split())
                 with self._report.at(line(agent)):
-                    check_told(told, self._own)
+                    check_shown_variables(told, self._own)
             yield Child(name, told, parts, line(agent), kept)
 
     def _check_neighbours(self, parents: tuple[Parent, ...], children: tuple[Child, ...]) -> None:
-        for neighbour, message in repeated(self._name, parents, children):
+        for neighbour, message in repeated_neighbours(self._name, parents, children):
             self._report.add(neighbour.line, message, NEIGHBOURS_ONCE)

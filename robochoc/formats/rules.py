@@ -26,7 +26,7 @@ from robochoc.model.problem import (
 )
 
 NEIGHBOURS_ONCE = "list every neighbour once, as parent or as child"
-"""What to do about neighbours that are `repeated`."""
+"""What to do about neighbours that are `repeated_neighbours`."""
 NOBODY_LEFT = ("all robots have left after this event", "keep one, or add another")
 """What is wrong with an event of a scenario after which there is no team, and what to do."""
 
@@ -119,7 +119,7 @@ def refuse_nothing_to_decide(variables: Collection[object]) -> None:
         raise MistakeError("the robot has no variable", 'add <variable name="V1.1" domain="D1"/>')
 
 
-def check_told(told: Sequence[str], own: Collection[str]) -> None:
+def check_shown_variables(told: Sequence[str], own: Collection[str]) -> None:
     """Raise `MistakeError` unless a child is `told` of `own` variables, of each once."""
     seen: set[str] = set()
     for variable in told:
@@ -131,8 +131,10 @@ def check_told(told: Sequence[str], own: Collection[str]) -> None:
         seen.add(variable)
 
 
-def repeated(name: str, parents: Sequence[Parent], children: Sequence[Child]) -> Iterator[tuple[Parent | Child, str]]:
-    """Neighbours of the robot `name` that are listed before, or are itself; and what is wrong with each."""
+def repeated_neighbours(
+    name: str, parents: Sequence[Parent], children: Sequence[Child]
+) -> Iterator[tuple[Parent | Child, str]]:
+    """Yield neighbours of the robot `name` that are listed before, or are itself; and what is wrong with each."""
     seen = {name: "the robot itself"}
     for role, neighbours in (("parent", parents), ("child", children)):
         for neighbour in neighbours:
@@ -141,14 +143,14 @@ def repeated(name: str, parents: Sequence[Parent], children: Sequence[Child]) ->
             seen.setdefault(neighbour.name, f"listed as {role} already")
 
 
-def check_brought(constraint: Constraint) -> None:
+def check_added_constraint(constraint: Constraint) -> None:
     """Raise `MistakeError` for a partially known constraint that a scenario adds to two robots."""
     if constraint.model is ConstraintModel.PKC:
         message = "a partially known constraint (PKC) in a scenario"
         raise MistakeError(message, 'each side would need its part: write model="TKC"')
 
 
-def check_newcomers_constraint(constraint: Constraint) -> None:
+def check_constraint_of_added_robot(constraint: Constraint) -> None:
     """Raise `MistakeError` for a partially known constraint of a robot that a scenario adds."""
     if constraint.model is ConstraintModel.PKC:
         message = "a partially known constraint (PKC) of a robot that a scenario adds"

@@ -10,11 +10,11 @@ from pathlib import Path
 from lxml import etree
 
 from robochoc.formats.constraints import Context, read_shared
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, Report, shortened
+from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, MistakeError, shortened
 from robochoc.formats.robot import RobotFile, read_robot_file
-from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
+from robochoc.formats.rules import NOBODY_LEFT, check_added_constraint, check_constraint_of_added_robot
 from robochoc.formats.xml import attribute, line, read_xml
-from robochoc.model.change import ChangeError, apply_changes
+from robochoc.model.change import apply_changes
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
@@ -27,6 +27,7 @@ from robochoc.model.problem import (
     ScenarioEvent,
     Team,
 )
+from robochoc.model.team_edits import ChangeError
 from robochoc.system.files import resolved
 
 SCENARIO = "scenario.xml"
@@ -34,12 +35,12 @@ SCENARIO = "scenario.xml"
 
 
 def has_scenario(folder: Path) -> bool:
-    """Whether there is anything of that name in `folder`."""
+    """Return whether there is anything of that name in `folder`."""
     return os.path.lexists(folder / SCENARIO)
 
 
 def read_scenario(folder: Path, team: Team | None, files: Mapping[str, RobotFile]) -> tuple[ScenarioEvent, ...]:
-    """The events of the scenario in `folder`, each of which the team as it stands then can take.
+    """Return the events of the scenario in `folder`, each of which the team as it stands then can take.
 
     `team` is None when the robots' `files` have mistakes: then only the scenario's own mistakes are looked for. Files
     of added robots lie in the folder or below. Raises `InvalidInputError`.
@@ -60,7 +61,7 @@ class _Reader:
         self._path = folder / SCENARIO
         self._team = team
         self._contexts: dict[str, Context] = {name: file.context for name, file in files.items()}
-        self._report = Report(str(self._path))
+        self._report = DiagnosticCollector(str(self._path))
         self._elsewhere: list[Diagnostic] = []
         """Mistakes in the files of added robots."""
         self._unread = False
@@ -69,7 +70,7 @@ class _Reader:
         """Robots, variables and constraints that could not be added."""
 
     def events(self) -> tuple[ScenarioEvent, ...]:
-        """All events. Raises `InvalidInputError`."""
+        """Return all events. Raises `InvalidInputError`."""
         try:
             events = tuple([self._event(one) for one in read_xml(self._path, "scenario").iterchildren("event")])
             self._report.finish()
@@ -94,7 +95,7 @@ class _Reader:
         return ScenarioEvent(tuple(changes), None if after == "solved" else int(after.split()[0]))
 
     def _changes(self, element: etree._Element) -> Iterator[tuple[int, Change]]:
-        """The changes that `element` stands for, each with its line."""
+        """Yield the changes that `element` stands for, each with its line."""
         if element.tag == "add_constraint":
             yield from self._added_constraints(element)
         elif element.tag == "add_agent":
@@ -105,7 +106,7 @@ class _Reader:
             yield line(element), _change(element)
 
     def _added(self, name: str) -> Robot | None:
-        """The robot in the file `name`; None where it has mistakes, which are told with that file's lines."""
+        """Return the robot in the file `name`; None where it has mistakes, which are told with that file's lines."""
         try:
             path = resolved(self._inside / name)
             there = path.is_file()
@@ -146,7 +147,7 @@ class _Reader:
                 self._missed.add(attribute(child, "name"))
                 constraint = read_shared(child, context)
                 if constraint:
-                    check_brought(constraint)
+                    check_added_constraint(constraint)
                     self._missed.discard(constraint.name)
                     yield line(child), AddConstraint(agent, parent, constraint)
 
@@ -172,12 +173,12 @@ class _Reader:
             self._elsewhere.append(Diagnostic(robot.file, bad.line, message, bad.hint))
 
     def _excused(self, bad: ChangeError) -> bool:
-        """Whether `bad` may only follow from a mistake that was told already."""
+        """Return whether `bad` may only follow from a mistake that was told already."""
         return bool(bad.missing) and (self._unread or bad.missing in self._missed)
 
 
 def _change(element: etree._Element) -> Change:
-    """What an element says that needs no other file."""
+    """Return what an element says that needs no other file."""
     match element.tag:
         case "remove_agent":
             return RemoveAgent(attribute(element, "name"))
@@ -191,15 +192,15 @@ def _change(element: etree._Element) -> Change:
 
 def _refuse_parts(robot: Robot) -> None:
     """Raise `InvalidInputError` where an added robot brings its part of partially known constraints."""
-    report = Report(robot.file)
+    report = DiagnosticCollector(robot.file)
     for constraint in robot.shared:
         with report.at(constraint.line):
-            check_newcomers_constraint(constraint)
+            check_constraint_of_added_robot(constraint)
     report.finish()
 
 
 def _without_line(robot: Robot, number: int) -> Robot:
-    """`robot` without the neighbours and constraints in line `number` of its file."""
+    """Return `robot` without the neighbours and constraints in line `number` of its file."""
     parents = (
         replace(parent, constraints=tuple(one for one in parent.constraints if one.line != number))
         for parent in robot.parents
@@ -211,7 +212,7 @@ def _without_line(robot: Robot, number: int) -> Robot:
 
 
 def _names_brought(change: Change) -> set[str]:
-    """What would be there, had `change` been made."""
+    """Return what would be there, had `change` been made."""
     match change:
         case AddAgent(robot):
             return {robot.name, *(variable.name for variable in robot.variables)}

@@ -10,7 +10,7 @@ from typing import Protocol, cast
 
 from lxml import etree
 
-from robochoc.formats.diagnostics import Report, shortened
+from robochoc.formats.diagnostics import DiagnosticCollector, shortened
 
 _SCHEMAS = {"instance": "robot.xsd", "scenario": "scenario.xsd"}
 _OPTIONAL = {"topics", "relations", "predicates", "constraints"}
@@ -64,13 +64,13 @@ class LogEntry(Protocol):
 
 
 def entries(error_log: object) -> list[LogEntry]:
-    """The messages in an lxml `error_log`, which the stubs leave opaque."""
+    """Return the messages in an lxml `error_log`, which the stubs leave opaque."""
     return list(cast("Iterable[LogEntry]", error_log))
 
 
 @cache
 def schema_for(root: str) -> etree.XMLSchema:
-    """The schema of files with that root element, compiled when the first of them is read.
+    """Return the schema of files with that root element, compiled when the first of them is read.
 
     Schemas lie in the wheel's package, or at the checkout's top.
     """
@@ -85,7 +85,7 @@ def check_schema(tree: etree._Element, file: str, schema: etree.XMLSchema) -> No
         return
     import difflib  # noqa: PLC0415 - start-up: only mistakes need it
 
-    report = Report(file)
+    report = DiagnosticCollector(file)
     unknown: dict[str | None, list[str]] = {}
     for entry in entries(schema.error_log):
         parts = _parts(entry)
@@ -99,7 +99,7 @@ def check_schema(tree: etree._Element, file: str, schema: etree.XMLSchema) -> No
 
 
 def _parts(entry: LogEntry) -> dict[str, str]:
-    """The parts of one message, by the names that the phrases use."""
+    """Return the parts of one message, by the names that the phrases use."""
     parts = dict.fromkeys(("element", "attribute", "missing", "value", "rule", "expected"), "")
     for part in _PARTS:
         found = part.search(entry.message)

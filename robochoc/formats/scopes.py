@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from robochoc.formats.diagnostics import Diagnostic, shortened, suggestion
-from robochoc.formats.team_members import Members
+from robochoc.formats.team_members import TeamMembers
 from robochoc.model.problem import Constraint, ConstraintModel, Parent, Robot
 
 
-def misplaced(members: Members) -> Iterator[Diagnostic]:
-    """Constraints with parents whose scopes do not fit the place where they stand."""
+def misplaced_constraints(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield constraints with parents whose scopes do not fit the place where they stand."""
     for robot in members.robots:
         if members.has_all_parents(robot.name):
             near = {robot.name, *members.agreed[robot.name]}
@@ -21,8 +21,8 @@ def misplaced(members: Members) -> Iterator[Diagnostic]:
                         yield members.files[robot.name].places.constraint(constraint).mistake(*mistake)
 
 
-def _foreign(members: Members, near: set[str], parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
-    """A variable in the scope that belongs to no robot in `near` (itself and its parents), if there is one."""
+def _foreign(members: TeamMembers, near: set[str], parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
+    """Return a variable in the scope that belongs to no robot in `near` (itself and its parents), if there is one."""
     for name in constraint.variables:
         owners = members.owners.get(name, [])
         if not owners and not members.broken:
@@ -36,8 +36,8 @@ def _foreign(members: Members, near: set[str], parent: Parent, constraint: Const
     return None
 
 
-def _place(members: Members, robot: Robot, parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
-    """Why the constraint should not stand under `parent`, if so."""
+def _place(members: TeamMembers, robot: Robot, parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
+    """Return why the constraint should not stand under `parent`, if so."""
     found = [members.owners.get(name, []) for name in constraint.variables]
     if any(len(owners) != 1 for owners in found):
         return None  # the mistake is another one, and told elsewhere
@@ -55,8 +55,8 @@ def _place(members: Members, robot: Robot, parent: Parent, constraint: Constrain
     return None
 
 
-def misplaced_parts(members: Members) -> Iterator[Diagnostic]:
-    """Parents' parts of PKC constraints over variables of others than the two, or that the child does not show."""
+def misplaced_parts(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield parents' parts of PKCs with variables of third robots, or with variables that the child does not show."""
     for robot in members.robots:
         for child in robot.children:
             if members.is_parent(robot.name, child.name):
@@ -66,7 +66,7 @@ def misplaced_parts(members: Members) -> Iterator[Diagnostic]:
                         yield members.files[robot.name].places.constraint(part).mistake(*mistake)
 
 
-def _foreign_to_both(members: Members, robot: Robot, child: str, part: Constraint) -> tuple[str, str] | None:
+def _foreign_to_both(members: TeamMembers, robot: Robot, child: str, part: Constraint) -> tuple[str, str] | None:
     own, others = members.own[robot.name], members.own[child]
     for name in part.variables:
         if name not in own and name not in others:
@@ -75,8 +75,8 @@ def _foreign_to_both(members: Members, robot: Robot, child: str, part: Constrain
     return None
 
 
-def _unshown(members: Members, child: str, part: Constraint) -> tuple[str, str] | None:
-    """A variable of `child` in its parent's part that the child, by its own file, shows to nobody."""
+def _unshown(members: TeamMembers, child: str, part: Constraint) -> tuple[str, str] | None:
+    """Return a variable of `child` in its parent's part that the child, by its own file, shows to nobody."""
     if members.broken:
         return None
     robot = members.files[child].robot
@@ -89,8 +89,8 @@ def _unshown(members: Members, child: str, part: Constraint) -> tuple[str, str] 
     return None
 
 
-def untold(members: Members) -> Iterator[Diagnostic]:
-    """Variables that a child's constraints need, and that its parent's file does not name for it."""
+def missing_shown_variables(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield variables that a child's constraints need, and that its parent's file does not name for it."""
     for robot in members.robots:
         for child in robot.children:
             if members.is_parent(robot.name, child.name) and child.name not in members.files[robot.name].unsaid:

@@ -10,8 +10,8 @@ from pathlib import Path
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
 from robochoc.formats.robot import RobotFile, read_robot_file
 from robochoc.formats.scenario import SCENARIO, has_scenario, read_scenario
-from robochoc.formats.team_members import Members
-from robochoc.formats.validation import between, note_valid
+from robochoc.formats.team_members import TeamMembers
+from robochoc.formats.validation import check_between_robots, note_valid
 from robochoc.model.priorities import natural_key, priority_order
 from robochoc.model.problem import Robot, Team
 
@@ -19,7 +19,7 @@ _NEXT_STEP = "give a folder with one XML file per robot; 'robochoc generate quee
 
 
 def find_teams(path: Path | str) -> list[Path]:
-    """The folders of teams at `path` or below, in natural order.
+    """Return the folders of teams at `path` or below, in natural order.
 
     A folder with XML files in it is a team, and nothing is looked for below it; other folders are searched, hidden
     ones and symbolic links left out. Raises `InvalidInputError` when there is no team, or a folder cannot be read.
@@ -31,7 +31,7 @@ def find_teams(path: Path | str) -> list[Path]:
 
 
 def read_team(folder: Path | str) -> Team:
-    """The team whose robots are the XML files in `folder`, in priority order.
+    """Return the team whose robots are the XML files in `folder`, in priority order.
 
     Raises `InvalidInputError` with the mistakes of all its files, and of all pairs of files (FORMAT.md, "The team").
     """
@@ -46,8 +46,8 @@ def read_team(folder: Path | str) -> Team:
             files[path.stem] = read_robot_file(path)
         except InvalidInputError as invalid:
             found.extend(invalid.diagnostics)
-    members = Members(files, frozenset(path.stem for path in paths) - files.keys())
-    found.extend(between(members))
+    members = TeamMembers(files, frozenset(path.stem for path in paths) - files.keys())
+    found.extend(check_between_robots(members))
     team = None if found else _whole(folder, members)
     if has_scenario(folder):
         try:
@@ -62,7 +62,7 @@ def read_team(folder: Path | str) -> Team:
 
 
 def robot_names(folder: Path | str) -> tuple[str, ...]:
-    """The names of the robots whose files are in `folder`, in natural order, from the files' names alone.
+    """Return the names of the robots whose files are in `folder`, in natural order, from the files' names alone.
 
     No file is opened: whoever only has to know who takes part need not see what each robot has to solve. Raises
     `InvalidInputError` when the folder cannot be read, or has no robot.
@@ -73,13 +73,13 @@ def robot_names(folder: Path | str) -> tuple[str, ...]:
     return names
 
 
-def _whole(folder: Path, members: Members) -> Team:
+def _whole(folder: Path, members: TeamMembers) -> Team:
     order = priority_order(members.agreed)
     return Team(encodable(folder.resolve().name), tuple(_informed(members, name) for name in order))
 
 
-def _informed(members: Members, name: str) -> Robot:
-    """The robot `name`; where its file does not say what a child must be told, the constraints do."""
+def _informed(members: TeamMembers, name: str) -> Robot:
+    """Return the robot `name`; where its file does not say what a child must be told, the constraints do."""
     file = members.files[name]
     children = []
     for child in file.robot.children:
@@ -103,12 +103,12 @@ def _teams(top: Path) -> Iterator[Path]:
 
 
 def _xml_files(entries: Iterable[os.DirEntry[str]]) -> Iterator[str]:
-    """Names of what claims to be an XML file; whether it is one, its reader says."""
+    """Return names of what claims to be an XML file; whether it is one, its reader says."""
     return (entry.name for entry in entries if entry.name.endswith(".xml") and not entry.name.startswith("."))
 
 
 def _listing(folder: Path) -> list[os.DirEntry[str]]:
-    """What is in `folder`, in natural order. Raises `InvalidInputError`."""
+    """Return what is in `folder`, in natural order. Raises `InvalidInputError`."""
     try:
         with os.scandir(folder) as entries:
             return sorted(entries, key=lambda entry: natural_key(entry.name))

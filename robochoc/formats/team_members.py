@@ -7,29 +7,29 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 
-from robochoc.formats.locations import Place, Places
+from robochoc.formats.locations import Location, Locations
 from robochoc.model.priorities import CycleError, priority_order
 from robochoc.model.problem import Child, Constraint, Parent, Robot
 
 
-class Role(StrEnum):
+class NeighbourRole(StrEnum):
     """What a robot says that another is to it."""
 
     PARENT = "parent"
     CHILD = "child"
 
     @property
-    def opposite(self) -> Role:
-        """What the other says of the robot, if they agree."""
-        return Role.CHILD if self is Role.PARENT else Role.PARENT
+    def opposite(self) -> NeighbourRole:
+        """Return what the other says of the robot, if they agree."""
+        return NeighbourRole.CHILD if self is NeighbourRole.PARENT else NeighbourRole.PARENT
 
 
 @dataclass(frozen=True)
-class Member:
+class TeamMember:
     """A robot, and where its parts stand; with what only its file says, if it has one."""
 
     robot: Robot
-    places: Places
+    places: Locations
     copies: Mapping[str, tuple[Constraint, ...]] = field(default_factory=dict)
     """By child: the TKC constraints that the original platform's files repeat with the parent."""
     unsaid: frozenset[str] = frozenset()
@@ -37,17 +37,17 @@ class Member:
 
 
 @dataclass(frozen=True)
-class Entry:
+class NeighbourEntry:
     """What lists a neighbour: a line of a robot's file, or an object."""
 
     robot: Robot
     other: str
-    role: Role
-    place: Place
+    role: NeighbourRole
+    place: Location
 
 
 @dataclass(frozen=True)
-class Members:
+class TeamMembers:
     """The robots of a team, as far as each is right by itself.
 
     `broken` names the robots that have mistakes of their own. They are there, but nothing is known of them: a check
@@ -55,7 +55,7 @@ class Members:
     else than the links says it: a team that was built in Python has one.
     """
 
-    files: Mapping[str, Member]
+    files: Mapping[str, TeamMember]
     broken: frozenset[str]
     order: tuple[str, ...] = ()
 
@@ -65,18 +65,25 @@ class Members:
         return (file.robot for file in self.files.values())
 
     @cached_property
-    def entries(self) -> dict[tuple[str, str], Entry]:
-        """Who lists whom, by the names of the two."""
+    def entries(self) -> dict[tuple[str, str], NeighbourEntry]:
+        """Return who lists whom, by the names of the two."""
         return {
-            (name, neighbour.name): Entry(member.robot, neighbour.name, role, member.places.neighbour(neighbour))
+            (name, neighbour.name): NeighbourEntry(
+                member.robot, neighbour.name, role, member.places.neighbour(neighbour)
+            )
             for name, member in self.files.items()
             for role, neighbour in _listed(member.robot)
         }
 
     def is_parent(self, parent: str, child: str) -> bool:
-        """Whether both could be read, and both say so."""
+        """Return whether both could be read, and both say so."""
         below, above = self.entries.get((parent, child)), self.entries.get((child, parent))
-        return below is not None and above is not None and below.role is Role.CHILD and above.role is Role.PARENT
+        return (
+            below is not None
+            and above is not None
+            and below.role is NeighbourRole.CHILD
+            and above.role is NeighbourRole.PARENT
+        )
 
     @cached_property
     def agreed(self) -> dict[str, list[str]]:
@@ -87,7 +94,7 @@ class Members:
         }
 
     def has_all_parents(self, name: str) -> bool:
-        """Whether every parent of `name` could be read and agrees."""
+        """Return whether every parent of `name` could be read and agrees."""
         return len(self.agreed[name]) == len(self.files[name].robot.parents)
 
     @cached_property
@@ -130,18 +137,18 @@ class Members:
         return used
 
     def needed(self, parent: str, child: str) -> dict[str, Constraint]:
-        """The variables of `parent` in constraints that `child` holds, with the constraint that needs each."""
+        """Return the variables of `parent` in constraints that `child` holds, with the constraint that needs each."""
         used = self._used[child]
         return {variable: used[variable] for variable in self.own[parent] if variable in used}
 
-    def place(self, robot: str, variable: str = "") -> Place:
-        """Where a robot stands, or a variable of its, for a message about two robots."""
+    def place(self, robot: str, variable: str = "") -> Location:
+        """Return where a robot stands, or a variable of its, for a message about two robots."""
         places = self.files[robot].places
         return places.variable(variable) if variable else places.robot()
 
 
-def _listed(robot: Robot) -> Iterator[tuple[Role, Parent | Child]]:
+def _listed(robot: Robot) -> Iterator[tuple[NeighbourRole, Parent | Child]]:
     for parent in robot.parents:
-        yield Role.PARENT, parent
+        yield NeighbourRole.PARENT, parent
     for child in robot.children:
-        yield Role.CHILD, child
+        yield NeighbourRole.CHILD, child

@@ -16,8 +16,8 @@ from typing import TypeVar
 
 from robochoc.formats.copies import differing_copies
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, shortened
-from robochoc.formats.field_types import AS_BUILT, ShapeError, check_shape
-from robochoc.formats.locations import ObjectPlaces, Place
+from robochoc.formats.field_types import AS_BUILT, FieldTypeError, check_field_types
+from robochoc.formats.locations import Location, ObjectLocations
 from robochoc.formats.names import check_integer
 from robochoc.formats.neighbours import (
     cycles,
@@ -28,12 +28,13 @@ from robochoc.formats.neighbours import (
     shared_variables,
 )
 from robochoc.formats.objects import Objects, repeated_robots
-from robochoc.formats.rules import NOBODY_LEFT, check_brought, check_newcomers_constraint
-from robochoc.formats.scopes import misplaced, misplaced_parts, untold
-from robochoc.formats.team_members import Member, Members
-from robochoc.model.change import ChangeError, apply_changes
+from robochoc.formats.rules import NOBODY_LEFT, check_added_constraint, check_constraint_of_added_robot
+from robochoc.formats.scopes import misplaced_constraints, misplaced_parts, missing_shown_variables
+from robochoc.formats.team_members import TeamMember, TeamMembers
+from robochoc.model.change import apply_changes
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, RemoveValue, Robot, ScenarioEvent, Team
+from robochoc.model.team_edits import ChangeError
 
 MAX_BETWEEN = 1000
 """So many mistakes between the robots of one team are told."""
@@ -66,7 +67,7 @@ def check_writable(team: Team) -> None:
     """
     check_team(team)
     found = [
-        ObjectPlaces(robot.name)
+        ObjectLocations(robot.name)
         .robot()
         .mistake(
             f"it shows '{shortened(robot.shown[0])}', though nothing else of it says so",
@@ -76,7 +77,7 @@ def check_writable(team: Team) -> None:
         if robot.shown
     ]
     if team.scenario:
-        place = Place(f"team {shortened(team.name)}")
+        place = Location(f"team {shortened(team.name)}")
         found.append(place.mistake("its scenario is no robot's", "write it as scenario.xml, and the team without it"))
     if found:
         raise InvalidInputError(_numbered(found))
@@ -97,7 +98,7 @@ def check_event(team: Team, event: ScenarioEvent) -> None:
 
     What this team cannot take is no mistake here: it may have lost the robots that somebody has counted on.
     """
-    place = Place("an event")
+    place = Location("an event")
     found = list(_of_the_shape(event, ScenarioEvent, place)) or [
         mistake for change in event.changes for mistake in _of_the_change(_robots(team, event), change, place)
     ]
@@ -105,7 +106,7 @@ def check_event(team: Team, event: ScenarioEvent) -> None:
         raise InvalidInputError(_numbered(found))
 
 
-def held_to_rules(
+def with_checked_events(
     field: Callable[[Team, _Ended, float | None], ScenarioEvent | None],
 ) -> Callable[..., ScenarioEvent | None]:
     """Return `field`, which says what happens to a team, with its events held against the rules before they happen."""
@@ -126,7 +127,7 @@ def note_valid(team: Team) -> None:
 
 
 def is_known_valid(team: Team) -> bool:
-    """Whether this very object has been found valid before."""
+    """Return whether this very object has been found valid before."""
     known = _valid.get(id(team))
     return known is not None and known() is team
 
@@ -142,36 +143,36 @@ def _numbered(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
         yield mistake if seen[mistake] == 1 else replace(mistake, file=f"{mistake.file} (no. {seen[mistake]})")
 
 
-def between(members: Members) -> list[Diagnostic]:
+def check_between_robots(members: TeamMembers) -> list[Diagnostic]:
     """Return what the robots of a team get wrong between them."""
     return list(islice(_between(members), MAX_BETWEEN))
 
 
-def _between(members: Members) -> Iterator[Diagnostic]:
+def _between(members: TeamMembers) -> Iterator[Diagnostic]:
     yield from missing_robots(members)
     yield from disagreements(members)
     yield from cycles(members)
     yield from out_of_order(members)
     yield from mixed_kinds(members)
     yield from shared_variables(members)
-    scopes = list(misplaced(members))
+    scopes = list(misplaced_constraints(members))
     yield from scopes
     yield from misplaced_parts(members)
-    yield from untold(members)
+    yield from missing_shown_variables(members)
     yield from differing_copies(members, {mistake.file for mistake in scopes})
 
 
 def _of_the_whole(team: Team) -> list[Diagnostic]:
-    """What leaves nothing else to be asked: no robots, or objects that are none."""
+    """Return what leaves nothing else to be asked: no robots, or objects that are none."""
     given: object = team
-    place = Place("the team")
+    place = Location("the team")
     found = list(_of_the_shape(replace(given, robots=()) if isinstance(given, Team) else given, Team, place))
     if found:
         return found
-    place = Place(f"team {shortened(team.name)}")
+    place = Location(f"team {shortened(team.name)}")
     robots: object = team.robots
     if not isinstance(robots, tuple):
-        return [place.mistake(f"robots: {ShapeError(robots, 'a tuple')}", AS_BUILT)]
+        return [place.mistake(f"robots: {FieldTypeError(robots, 'a tuple')}", AS_BUILT)]
     try:
         team.name.encode()
     except UnicodeEncodeError:
@@ -181,17 +182,17 @@ def _of_the_whole(team: Team) -> list[Diagnostic]:
     return []
 
 
-def _of_the_shape(value: object, kind: type, place: Place) -> Iterator[Diagnostic]:
+def _of_the_shape(value: object, kind: type, place: Location) -> Iterator[Diagnostic]:
     try:
-        check_shape(value, kind)
-    except ShapeError as error:
+        check_field_types(value, kind)
+    except FieldTypeError as error:
         yield place.mistake(error.told, AS_BUILT)
 
 
 def _mistakes(team: Team) -> list[Diagnostic]:
     objects = Objects()
     found: list[Diagnostic] = []
-    right: dict[str, Member] = {}
+    right: dict[str, TeamMember] = {}
     broken: set[str] = set()
     for robot in team.robots:
         mistakes = objects.mistakes(robot)
@@ -200,24 +201,24 @@ def _mistakes(team: Team) -> list[Diagnostic]:
         if mistakes and isinstance(name, str):
             broken.add(name)
         elif not mistakes:
-            right.setdefault(robot.name, Member(robot, ObjectPlaces(robot.name)))
+            right.setdefault(robot.name, TeamMember(robot, ObjectLocations(robot.name)))
     named = [robot for robot in team.robots if isinstance(getattr(robot, "name", None), str)]
     twice = list(repeated_robots(named))
     for name in broken:
         right.pop(name, None)
     if twice or len(named) < len(team.robots):
         return [*found, *twice]
-    return [*found, *between(Members(right, frozenset(broken), team.order))]
+    return [*found, *check_between_robots(TeamMembers(right, frozenset(broken), team.order))]
 
 
 # Changes over time
 
 
 def _of_the_scenario(team: Team) -> Iterator[Diagnostic]:
-    """The first event that cannot be, with all that is wrong with it: what comes after would follow from it."""
+    """Yield the first event that cannot be, with all that is wrong with it: what comes after would follow from it."""
     now = replace(team, scenario=()) if team.scenario else team
     for number, event in enumerate(team.scenario, start=1):
-        place = Place(f"event {number} of the scenario")
+        place = Location(f"event {number} of the scenario")
         found = list(_of_the_time(event, place))
         for change in event.changes:
             mistakes = list(_of_the_change(_robots(now), change, place))
@@ -234,7 +235,7 @@ def _of_the_scenario(team: Team) -> Iterator[Diagnostic]:
             return
 
 
-def _of_the_time(event: ScenarioEvent, place: Place) -> Iterator[Diagnostic]:
+def _of_the_time(event: ScenarioEvent, place: Location) -> Iterator[Diagnostic]:
     try:
         check_integer(event.after or 0)
     except MistakeError as mistake:
@@ -244,21 +245,21 @@ def _of_the_time(event: ScenarioEvent, place: Place) -> Iterator[Diagnostic]:
 
 
 def _robots(team: Team, event: ScenarioEvent = _NOTHING) -> dict[str, Robot]:
-    """Who is there, and who comes with `event`."""
+    """Return the robots of `team`, and those that `event` adds, by name."""
     coming = [change.robot for change in event.changes if isinstance(change, AddAgent)]
     return {robot.name: robot for robot in (*team.robots, *coming)}
 
 
-def _of_the_change(robots: Mapping[str, Robot], change: Change, place: Place) -> Iterator[Diagnostic]:
-    """What is wrong with a change whatever else the team is like."""
+def _of_the_change(robots: Mapping[str, Robot], change: Change, place: Location) -> Iterator[Diagnostic]:
+    """Yield what is wrong with a change whatever else the team is like."""
     try:
         match change:
             case AddAgent(robot):
                 yield from Objects().mistakes(robot)
                 for constraint in robot.shared:
-                    check_newcomers_constraint(constraint)
+                    check_constraint_of_added_robot(constraint)
             case AddConstraint(agent, _, constraint):
-                check_brought(constraint)
+                check_added_constraint(constraint)
                 if agent in robots:
                     yield from Objects().mistakes_of_constraint(constraint, robots[agent])
             case AddValue(_, value) | RemoveValue(_, value):

@@ -12,7 +12,7 @@ from robochoc.solver.team_network import identifiers, team_network
 
 
 def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
-    """The merged problem of `team` as an XCSP3-core document: tables over the true values, and allDifferent.
+    """Return the merged problem of `team` as an XCSP3-core document: tables over the true values, and allDifferent.
 
     Variables get names that XCSP3 allows; the attribute `note` says whose variable each is. With costs it is a COP:
     what soft constraints charge are variables too, and their sum is to be minimised. Whoever exports many teams may

@@ -43,7 +43,7 @@ _HINTS = {
 
 
 def read_xml(path: Path, root: str) -> etree._Element:
-    """The root element of the XML file `path`, which must be a `root` and valid by its schema.
+    """Return the root element of the XML file `path`, which must be a `root` and valid by its schema.
 
     Raises `InvalidInputError` with every mistake that the failing layer shows.
     """
@@ -55,7 +55,7 @@ def read_xml(path: Path, root: str) -> etree._Element:
 
 
 def parsed_xml(content: bytes, path: Path, root: str) -> etree._Element:
-    """Like `read_xml`, of the `content` of a file that would be `path`. Whoever wrote it may be a stranger."""
+    """Return the root element of `content`, as `read_xml` does for a file at `path`. The content is not trusted."""
     _check_text(content, path)
     doctype = _DOCTYPE.match(content)
     if doctype:
@@ -78,17 +78,17 @@ def parsed_xml(content: bytes, path: Path, root: str) -> etree._Element:
 
 
 def attribute(element: etree._Element, name: str) -> str:
-    """An attribute's text without blanks around it; empty where it is left out."""
+    """Return an attribute's text without blanks around it; empty where it is left out."""
     return (element.get(name) or "").strip(_BLANKS)
 
 
 def line(element: etree._Element) -> int:
-    """Where `element` stands in its file."""
+    """Return where `element` stands in its file."""
     return cast("int | None", element.sourceline) or 0
 
 
 def _parser(schema: etree.XMLSchema | None = None, *, recover: bool = False) -> etree.XMLParser:
-    """Comments and processing instructions are read over; the encoding is UTF-8 whatever the file declares."""
+    """Return a parser that ignores comments and processing instructions, and reads UTF-8 whatever the file declares."""
     return etree.XMLParser(
         encoding="utf-8",
         resolve_entities=False,
@@ -103,7 +103,7 @@ def _parser(schema: etree.XMLSchema | None = None, *, recover: bool = False) -> 
 
 
 def _with_few_mistakes(tree: etree._Element, content: bytes, schema: etree.XMLSchema) -> etree._Element:
-    """`tree`, cut off where so many mistakes are found that no more are told.
+    """Return `tree`, cut off where so many mistakes are found that no more are told.
 
     For each mistake lxml counts the siblings before it, and a million of them take it hours. A parser that validates
     while it reads does not, but knows no lines either: it only says how much to look at.
@@ -130,7 +130,7 @@ def _check_text(content: bytes, path: Path) -> None:
 
 
 def _bytes(path: Path) -> bytes:
-    """At most one byte more than is allowed. A FIFO is opened without waiting for its writer, and refused."""
+    """Return at most one byte more than is allowed. A FIFO is opened without waiting for its writer, and refused."""
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
@@ -140,7 +140,7 @@ def _bytes(path: Path) -> bytes:
 
 
 def _malformed(path: Path, error: etree.XMLSyntaxError, parser: etree.XMLParser) -> InvalidInputError:
-    """Only the first of the parser's messages (the error's own log has older ones too): others follow from it."""
+    """Return the first of the parser's messages as a diagnostic: the others follow from it."""
     for first in entries(parser.error_log):
         what = re.split(r", (?:use|try) XML_PARSE_HUGE", first.message.strip())[0]
         return _invalid(

@@ -24,7 +24,7 @@ from robochoc.formats import PREDEFINED
 from robochoc.model.expression import Constant, Name, Type, parse
 from robochoc.model.problem import Child, Constraint, Domain, Parent, Predicate, Robot, Team, Topic, Variable
 
-LARGEST_N = 64
+MAX_N = 64
 """4,096 robots; beyond that a folder of files is no longer a sensible form."""
 
 Cell = tuple[int, int]
@@ -56,12 +56,12 @@ NOT_ATTACKING = Predicate(
 def queens3d(
     n: int, model: QueensModel | str = QueensModel.PLANAR, robots: QueensRobots | str = QueensRobots.CELLS
 ) -> Team:
-    """The team for an n x n x n cube, in lexicographic priority order; a robot flies a cell's drone, or a row's.
+    """Return the team for an n x n x n cube, in lexicographic priority order; a robot flies a cell's drone, or a row's.
 
-    Raises `ValueError` unless 1 <= n <= `LARGEST_N` and the model and the robots are known.
+    Raises `ValueError` unless 1 <= n <= `MAX_N` and the model and the robots are known.
     """
-    if not 1 <= n <= LARGEST_N:
-        raise ValueError(f"n is {n}; it must be from 1 to {LARGEST_N}")
+    if not 1 <= n <= MAX_N:
+        raise ValueError(f"n is {n}; it must be from 1 to {MAX_N}")
     model = QueensModel(model)
     levels = Domain("D1", (range(1, n + 1),))
     numbers = range(1, n + 1)
@@ -79,7 +79,7 @@ def queens3d(
 
 
 def _robot(name: str, cells: Sequence[Cell], flown_by: Mapping[Cell, str], levels: Domain, model: QueensModel) -> Robot:
-    """The robot that flies the drones of `cells`; it holds what they owe each other, and what they owe above."""
+    """Return the robot that flies the drones of `cells`; it holds what they owe each other, and what they owe above."""
     n = len(levels)
     private, above, below = [], dict[str, list[Constraint]](), dict[str, list[str]]()
     for cell in cells:
@@ -109,7 +109,7 @@ def _topic(cell: Cell) -> Topic:
 
 
 def _attackable(cell: Cell, n: int) -> Iterator[Cell]:
-    """Cells that share a line of the board with `cell`: its column, its row, its diagonals (Figure 2's order)."""
+    """Yield the cells in the same column, row or diagonal of the board as `cell`, in the order of Figure 2."""
     row, column = cell
     yield from ((i, column) for i in range(1, n + 1) if i != row)
     yield from ((row, j) for j in range(1, n + 1) if j != column)
@@ -120,7 +120,7 @@ def _attackable(cell: Cell, n: int) -> Iterator[Cell]:
 
 
 def _apart(parent: Cell, child: Cell, model: QueensModel) -> Constraint:
-    """What two robots owe each other; p1's i and j are the coordinates in which the cells differ."""
+    """Return what two robots owe each other; p1's i and j are the coordinates in which the cells differ."""
     names = (_variable(parent), _variable(child))
     diagonal = parent[0] != child[0] and parent[1] != child[1]
     if diagonal and model is QueensModel.PLANAR:

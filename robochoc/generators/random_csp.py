@@ -37,12 +37,12 @@ from robochoc.model.problem import (
     Variable,
 )
 
-MOST_AGENTS = 1000
-MOST_VALUES = 1000
-MOST_FORBIDDEN = 1_000_000
+MAX_AGENTS = 1000
+MAX_VALUES = 1000
+MAX_FORBIDDEN_PAIRS = 1_000_000
 """Of all constraints together: so no robot's file grows beyond what can be read. With costs: most pairs of values."""
-HIGHEST_COST = 1_000_000
-DRAWS = 1000
+MAX_COST = 1_000_000
+MAX_GRAPH_DRAWS = 1000
 """So many graphs are drawn in search of a connected one."""
 
 Edge = tuple[int, int]
@@ -59,7 +59,7 @@ def random_csp(
     connected: bool = False,
     max_cost: int | None = None,
 ) -> Team:
-    """The team of the problem <agents, domain, density, tightness> that `seed` stands for.
+    """Return a team in which `Robot3` owns `V3`. The lower robot of an edge holds the edge's constraint.
 
     `Robot3` owns `V3` and holds its constraints with robots of smaller numbers. With `connected`, graphs are drawn
     until one is connected, so that each connected graph is as likely as any other. With `max_cost`, it is a DisWCSP.
@@ -68,13 +68,15 @@ def random_csp(
     """
     pairs, rows = _sizes(agents, domain, density, tightness)
     count, forbidden = round(density * pairs), round(tightness * domain**2)
-    if count * forbidden > MOST_FORBIDDEN:
-        raise ValueError(f"{count:,} constraints of {forbidden:,} forbidden pairs are more than {MOST_FORBIDDEN:,}")
+    if count * forbidden > MAX_FORBIDDEN_PAIRS:
+        raise ValueError(
+            f"{count:,} constraints of {forbidden:,} forbidden pairs are more than {MAX_FORBIDDEN_PAIRS:,}"
+        )
     if max_cost is not None:
         _check_costs(max_cost, count * rows)
     chance = Random(seed)  # noqa: S311 - a problem, not a secret
     constraints = {}
-    for edge in graph(chance, agents, count, connected=connected):
+    for edge in random_graph(chance, agents, count, connected=connected):
         relation = _forbidding(edge, _some(chance, rows, forbidden), domain)
         if max_cost is not None:
             relation = _charging(chance, relation, domain, max_cost)
@@ -82,11 +84,15 @@ def random_csp(
         constraints[edge] = Constraint(f"C{edge[0]}.{edge[1]}", relation, scope, scope)
     costs = "" if max_cost is None else f"-cost{max_cost}"
     name = f"random-{agents}-{domain}-{float(density)}-{float(tightness)}{costs}-{seed}{'-connected' * connected}"
-    return team_on(name, agents, domain, constraints, ProblemKind.DISCSP if max_cost is None else ProblemKind.DISWCSP)
+    return team_of_edges(
+        name, agents, domain, constraints, ProblemKind.DISCSP if max_cost is None else ProblemKind.DISWCSP
+    )
 
 
-def team_on(name: str, agents: int, domain: int, constraints: Mapping[Edge, Constraint], kind: ProblemKind) -> Team:
-    """The team of `Robot1`, `Robot2`, ..., where `Robot3` owns `V3`, and the lower one of an edge its constraint."""
+def team_of_edges(
+    name: str, agents: int, domain: int, constraints: Mapping[Edge, Constraint], kind: ProblemKind
+) -> Team:
+    """Return a team in which `Robot3` owns `V3`. The lower robot of an edge holds the edge's constraint."""
     values = Domain("D", (range(1, domain + 1),))
     above: dict[int, list[Parent]] = {number: [] for number in range(1, agents + 1)}
     below: dict[int, list[Child]] = {number: [] for number in above}
@@ -107,8 +113,8 @@ def team_on(name: str, agents: int, domain: int, constraints: Mapping[Edge, Cons
 
 
 def _sizes(agents: int, domain: int, density: float, tightness: float) -> tuple[int, int]:
-    """How many pairs of robots there are, and how many pairs of values. Raises `ValueError`."""
-    for what, number, most in (("agents", agents, MOST_AGENTS), ("domain", domain, MOST_VALUES)):
+    """Return how many pairs of robots there are, and how many pairs of values. Raises `ValueError`."""
+    for what, number, most in (("agents", agents, MAX_AGENTS), ("domain", domain, MAX_VALUES)):
         if not 1 <= number <= most:
             raise ValueError(f"{what} is {number}; it must be from 1 to {most}")
     for what, share in (("density", density), ("tightness", tightness)):
@@ -119,36 +125,40 @@ def _sizes(agents: int, domain: int, density: float, tightness: float) -> tuple[
 
 def _check_costs(max_cost: int, pairs: int) -> None:
     """Raise `ValueError` unless so many pairs of values can have costs of at most `max_cost`."""
-    if not 0 <= max_cost <= HIGHEST_COST:
-        raise ValueError(f"max-cost is {max_cost}; it must be from 0 to {HIGHEST_COST}")
-    if pairs > MOST_FORBIDDEN:
-        raise ValueError(f"all constraints together have {pairs:,} pairs of values, more than {MOST_FORBIDDEN:,}")
+    if not 0 <= max_cost <= MAX_COST:
+        raise ValueError(f"max-cost is {max_cost}; it must be from 0 to {MAX_COST}")
+    if pairs > MAX_FORBIDDEN_PAIRS:
+        raise ValueError(f"all constraints together have {pairs:,} pairs of values, more than {MAX_FORBIDDEN_PAIRS:,}")
 
 
-def graph(chance: Random, agents: int, count: int, *, connected: bool = False) -> list[Edge]:
-    """`count` pairs of robots, in ascending order, each choice as likely as any other; see `random_csp`."""
+def random_graph(chance: Random, agents: int, count: int, *, connected: bool = False) -> list[Edge]:
+    """Return `count` pairs of robots, in ascending order, each choice as likely as any other; see `random_csp`."""
     return _connected(chance, agents, count) if connected else _edges(chance, agents, count)
 
 
 def _edges(chance: Random, agents: int, count: int) -> list[Edge]:
-    """`count` pairs of robots, in ascending order."""
+    """Return `count` pairs of robots, in ascending order."""
     chosen = set(_some(chance, agents * (agents - 1) // 2, count))
     pairs = ((higher, lower) for higher in range(1, agents) for lower in range(higher + 1, agents + 1))
     return [pair for place, pair in enumerate(pairs) if place in chosen]
 
 
 def _connected(chance: Random, agents: int, count: int) -> list[Edge]:
-    """`count` pairs of robots that link them all: drawn until they do. Raises `ValueError` when that is in vain."""
+    """Return `count` pairs of robots that link them all: drawn until they do.
+
+    Raises `ValueError` when that is in vain.
+    """
     if count < agents - 1:
         raise ValueError(
             f"a connected graph of {agents} robots needs {agents - 1} constraints, and the density makes {count}"
         )
-    for _ in range(DRAWS):
+    for _ in range(MAX_GRAPH_DRAWS):
         edges = _edges(chance, agents, count)
         if _links_all(edges, agents):
             return edges
     raise ValueError(
-        f"none of {DRAWS:,} graphs of {agents} robots and {count} constraints was connected; raise the density"
+        f"none of {MAX_GRAPH_DRAWS:,} graphs of {agents} robots and {count} constraints was connected;"
+        " raise the density"
     )
 
 
@@ -173,7 +183,7 @@ def _forbidding(edge: Edge, forbidden: list[int], domain: int) -> Relation:
 
 
 def _charging(chance: Random, relation: Relation, domain: int, max_cost: int) -> Relation:
-    """`relation`, which forbids pairs of values, with a cost for all others."""
+    """Return `relation`, which forbids pairs of values, with a cost for all others."""
     priced: dict[tuple[int, ...], float] = dict.fromkeys(relation.tuples, INFINITE)
     for pair in itertools.product(range(1, domain + 1), repeat=2):
         if pair not in priced:
@@ -183,12 +193,12 @@ def _charging(chance: Random, relation: Relation, domain: int, max_cost: int) ->
 
 
 def _some(chance: Random, size: int, count: int) -> list[int]:
-    """`count` different numbers below `size`, in ascending order; each choice is as likely as any other."""
+    """Return `count` different numbers below `size`, in ascending order; each choice is as likely as any other."""
     return sorted(_drawn(chance, size, count))
 
 
 def _drawn(chance: Random, size: int, count: int) -> Iterator[int]:
-    """The first steps of Fisher and Yates's shuffle of all numbers below `size`, of which only what moved is kept."""
+    """Yield the first steps of the Fisher-Yates shuffle of all numbers below `size`. Only moved numbers are stored."""
     moved: dict[int, int] = {}
     for left in range(size, size - count, -1):
         place = int(chance.random() * left)

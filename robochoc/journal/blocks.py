@@ -15,14 +15,14 @@ MAGIC = b"\x89RJL\r\n\x1a\n"
 """The first bytes of a journal; transfers that take it for text destroy them, as PNG's (RFC 2083)."""
 FORMAT = 1
 """The version of the frame, and of the columns within."""
-LARGEST_BLOCK = 64 * 2**20
+MAX_BLOCK_BYTES = 64 * 2**20
 """No block holds more bytes, uncompressed."""
 LEVEL = 4
 """zlib's. Level 1 packs ABT's messages 7 to 13 % worse, level 6 3 to 7 % better, at about half and twice the cost."""
 _PREAMBLE = struct.Struct("<8sHH")
 _FRAME = struct.Struct("<II16s")
 _DIGEST = 16
-_LARGEST_PACKED = LARGEST_BLOCK + LARGEST_BLOCK // 1000 + 64
+_LARGEST_PACKED = MAX_BLOCK_BYTES + MAX_BLOCK_BYTES // 1000 + 64
 """More than zlib makes of the largest block."""
 
 PREAMBLE = _PREAMBLE.pack(MAGIC, FORMAT, 0)
@@ -37,7 +37,7 @@ class JournalTruncatedError(JournalDamagedError):
 
 
 def _digest(before: bytes, packed: bytes, size: int) -> bytes:
-    """The checksum of a block: of the one before, its lengths, and what it holds."""
+    """Return the checksum of a block: of the one before, its lengths, and what it holds."""
     lengths = struct.pack("<II", len(packed), size)
     return blake2b(before + lengths + packed, digest_size=_DIGEST).digest()
 
@@ -46,8 +46,8 @@ BEGINNING = blake2b(PREAMBLE, digest_size=_DIGEST).digest()
 """What stands for the checksum before the first block's."""
 
 
-def framed(content: bytes, before: bytes) -> tuple[bytes, bytes]:
-    """The block that holds `content`, whose length is at most `LARGEST_BLOCK`, and its checksum.
+def frame_block(content: bytes, before: bytes) -> tuple[bytes, bytes]:
+    """Return the block that holds `content`, whose length is at most `MAX_BLOCK_BYTES`, and its checksum.
 
     `before` is the checksum of the block before it, `BEGINNING` for the first.
     """
@@ -56,7 +56,7 @@ def framed(content: bytes, before: bytes) -> tuple[bytes, bytes]:
     return _FRAME.pack(len(packed), len(content), digest) + packed, digest
 
 
-class Unframer:
+class BlockReader:
     """Takes a journal apart, as its bytes come."""
 
     def __init__(self) -> None:
@@ -65,21 +65,21 @@ class Unframer:
         self._before = b""
 
     def feed(self, content: bytes) -> None:
-        """Here are the next bytes."""
+        """Append the next bytes."""
         self._buffer += content
 
     @property
     def rest(self) -> str:
-        """What is wrong if no more bytes come; empty: nothing."""
+        """Return what is wrong if no more bytes come; empty: nothing."""
         return f"byte {self._place:,}: it ends within a block" if self._buffer or not self._before else ""
 
     @property
     def place(self) -> str:
-        """Where the next block begins, in words."""
+        """Return where the next block begins, in words."""
         return f"byte {self._place:,}"
 
     def next(self) -> bytes | None:
-        """What the next block holds; None: it is not whole yet.
+        """Return what the next block holds; None: it is not whole yet.
 
         Raises `JournalError` where it is no journal of this version, `JournalDamagedError` where a block is not as it
         was written.
@@ -90,7 +90,7 @@ class Unframer:
         if len(buffer) < _FRAME.size:
             return None
         length, size, digest = _FRAME.unpack_from(buffer)
-        if size > LARGEST_BLOCK or length > _LARGEST_PACKED:
+        if size > MAX_BLOCK_BYTES or length > _LARGEST_PACKED:
             raise JournalDamagedError(f"{self.place}: a block claims to have {max(size, length):,} bytes")
         end = _FRAME.size + length
         if len(buffer) < end:
@@ -105,7 +105,7 @@ class Unframer:
         return content
 
     def _begin(self) -> bool:
-        """Whether the preamble is there."""
+        """Return whether the preamble is there."""
         if len(self._buffer) < _PREAMBLE.size:
             if not MAGIC.startswith(self._buffer[: len(MAGIC)]):
                 raise JournalError("it is no journal")

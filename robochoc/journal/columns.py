@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from robochoc.journal.entries import Line
+from robochoc.journal.entries import JournalEntry
 from robochoc.journal.events import Decided, Received, Sent, Settled
 
 SENT, RECEIVED, SETTLED, DECIDED, OTHER = range(5)
@@ -53,7 +53,7 @@ class _Block(msgspec.Struct, array_like=True, forbid_unknown_fields=True, frozen
     sizes: list[int]
     checks: list[int]
     assignments: list[dict[str, int]]
-    others: list[Line]
+    others: list[JournalEntry]
 
 
 class _Numbers(dict[Any, int]):
@@ -68,8 +68,8 @@ _encode = msgspec.msgpack.Encoder().encode
 _json = msgspec.json.Encoder().encode
 
 
-def columns_of(entries: Iterable[Line], *, exact: bool) -> bytes:
-    """What a block of `entries` holds. Unless `exact`, times are rounded to the nanosecond: clocks know no more.
+def columns_of(entries: Iterable[JournalEntry], *, exact: bool) -> bytes:
+    """Return what a block of `entries` holds. Unless `exact`, times are rounded to the nanosecond: clocks know no more.
 
     Raises `TypeError`, `ValueError`, `OverflowError` or `RecursionError` for what `entries_of` would not read again:
     robots on other machines may tell of anything, and what follows must not be lost with it.
@@ -96,9 +96,9 @@ class _Columns:
         self.checks: list[int] = []
         self.checked: list[int] = []
         self.assignments: list[dict[str, int]] = []
-        self.others: list[Line] = []
+        self.others: list[JournalEntry] = []
 
-    def take(self, entries: Iterable[Line]) -> None:
+    def take(self, entries: Iterable[JournalEntry]) -> None:
         """Add `entries`. This loop is what a journal costs the run, so it asks for exact types, and calls little."""
         kinds, times, clocks, actors = self.kinds.append, self.times.append, self.clocks.append, self.actors.append
         partners, says, words, shapes = self.partners.append, self.says.append, self.words, self.shapes
@@ -143,7 +143,7 @@ class _Columns:
         _finite(entry.t for entry in self.others)
 
     def packed(self, *, exact: bool) -> bytes:
-        """All of it, as msgpack."""
+        """Return all of it, as msgpack."""
         shapes = [[self.words[word] for word in shape] for shape in self.shapes]  # which may add words
         scale, times = _scaled(self.times, exact=exact)
         return _encode(
@@ -167,7 +167,7 @@ class _Columns:
 
 
 def _scaled(times: Iterable[float], *, exact: bool) -> tuple[Literal[0, 1, 1_000_000_000], list[int] | bytes]:
-    """Times as a scale and the steps between whole numbers of 1 / scale, or (0) as the doubles that they are."""
+    """Return times as a scale and the steps between whole numbers of 1 / scale, or (0) as the doubles that they are."""
     times = array("d", times)
     if all(map(float.is_integer, times)):
         return 1, _steps(map(int, times))
@@ -180,7 +180,7 @@ def _scaled(times: Iterable[float], *, exact: bool) -> tuple[Literal[0, 1, 1_000
 
 
 def _steps(numbers: Iterable[int]) -> list[int]:
-    """Each number less the one before it."""
+    """Return each number less the one before it."""
     numbers = list(numbers)
     return list(map(sub, numbers, [0, *numbers]))
 
@@ -188,8 +188,11 @@ def _steps(numbers: Iterable[int]) -> list[int]:
 _decode = msgspec.msgpack.Decoder(_Block).decode
 
 
-def entries_of(content: bytes) -> list[Line]:
-    """The entries of a block that holds `content`. Raises `BlockError` where that is anything but what is written."""
+def entries_of(content: bytes) -> list[JournalEntry]:
+    """Return the entries of a block that holds `content`.
+
+    Raises `BlockError` where that is anything but what is written.
+    """
     try:
         block = _decode(content)
         _json(block.values)  # msgpack can hold what no message can: keys that are no text, extensions
@@ -220,7 +223,7 @@ class _Entries:
         _fit(self._times, timed)
         _finite((*self._times, *(entry.t for entry in block.others)))
 
-    def __iter__(self) -> Iterator[Line]:
+    def __iter__(self) -> Iterator[JournalEntry]:
         block, shapes, words = self._block, self._shapes, self._block.words
         times, clocks = iter(self._times), iter(self._clocks)
         actors, partners, says = iter(block.actors), iter(block.partners), iter(block.says)
@@ -260,7 +263,7 @@ def _fit(column: Sequence[object], count: int) -> None:
 
 
 def _named(shape: Sequence[int], words: Sequence[str]) -> tuple[str, tuple[str, ...]]:
-    """A message's type, and the names of its fields."""
+    """Return a message's type, and the names of its fields."""
     name, *fields = (words[place] for place in shape)
     if len({*fields}) < len(fields):
         raise ValueError(f"a message of type {name!r} has two fields of one name")
@@ -268,7 +271,7 @@ def _named(shape: Sequence[int], words: Sequence[str]) -> tuple[str, tuple[str, 
 
 
 def _times(block: _Block) -> Sequence[float]:
-    """The times of the entries of the four kinds, in the runtime's unit."""
+    """Return the times of the entries of the four kinds, in the runtime's unit."""
     if isinstance(block.times, bytes):
         if block.scale:
             raise ValueError("times are doubles, but have a scale")
@@ -288,7 +291,7 @@ def _finite(times: Iterable[float]) -> None:
 
 
 def _whole(numbers: Iterable[int]) -> list[int]:
-    """`numbers`, all of 64 bits. Raises `ValueError`."""
+    """Return `numbers`, all of 64 bits. Raises `ValueError`."""
     numbers = list(numbers)
     if numbers and not (min(numbers) >= -_LARGEST and max(numbers) < _LARGEST):
         raise ValueError("a count is too large")

@@ -41,5 +41,5 @@ class Ended(Event, frozen=True, kw_only=True):
     outcome: Outcome
 
 
-Line = AnyEvent | Header | Ended
+JournalEntry = AnyEvent | Header | Ended
 """One entry."""

@@ -176,7 +176,7 @@ Observer = Callable[[AnyEvent], None]
 
 
 def actor(event: AnyEvent) -> str | None:
-    """The robot whose step `event` is part of; None where it is nobody's."""
+    """Return the robot whose step `event` is part of; None where it is nobody's."""
     match event:
         case Sent():
             return event.sender

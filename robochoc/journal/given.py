@@ -20,7 +20,7 @@ from robochoc.model.problem import INFINITE, Constraint, Domain, Relation, Robot
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.explanation import Invalidated
 
-NOTHING_VOID = Invalidated(frozenset(), frozenset())
+NOTHING_INVALIDATED = Invalidated(frozenset(), frozenset())
 _STAND_IN = (range(1),)
 """What is written for an empty domain, as a file has none."""
 
@@ -40,12 +40,12 @@ class TeamWriter:
         self,
         team: Team,
         brief: RunParameters = DEFAULT_PARAMETERS,
-        void: Invalidated = NOTHING_VOID,
+        void: Invalidated = NOTHING_INVALIDATED,
         *,
         fresh: Collection[str] = (),
         quiet: bool = True,
     ) -> Given:
-        """What `team`, in its order, is given; `why` in it tells why a robot cannot be written."""
+        """Return what `team`, in its order, is given; `why` in it tells why a robot cannot be written."""
         event = Given(
             t=0,
             order=team.order,
@@ -70,7 +70,7 @@ class TeamWriter:
         return msgspec.structs.replace(event, robots=news)
 
     def _file(self, robot: Robot) -> str:
-        """The robot's file; an equal robot's is not written again."""
+        """Return the robot's file; an equal robot's is not written again."""
         if self._robots.get(robot.name) == robot:
             return self._files[robot.name]
         try:
@@ -87,7 +87,7 @@ class TeamReader:
         self._robots: dict[str, Robot] = {}
 
     def team(self, given: Given) -> Team:
-        """The team, in its order. Raises `GivenProblemError`."""
+        """Return the team, in its order. Raises `GivenProblemError`."""
         if given.why:
             raise GivenProblemError(f"what the robots were given could not be written: {given.why}")
         for name, content in given.robots.items():
@@ -105,25 +105,25 @@ class TeamReader:
         return team
 
 
-def brief_of(given: Given) -> RunParameters:
-    """What all robots were told beside the problem."""
+def run_parameters_of(given: Given) -> RunParameters:
+    """Return what all robots were told beside the problem."""
     return RunParameters(given.seed, given.settings, given.aside)
 
 
-def void_of(given: Given) -> Invalidated:
-    """What of the epoch before does not stand."""
+def invalidated_of(given: Given) -> Invalidated:
+    """Return what of the epoch before does not stand."""
     return Invalidated(frozenset(given.void_keys), frozenset(given.void_agents))
 
 
 def _as_given(robot: Robot, shown: tuple[str, ...], empty: Collection[str]) -> Robot:
-    """`robot` with what its file cannot say."""
+    """Return `robot` with what its file cannot say."""
     if not (shown or any(variable.name in empty for variable in robot.variables)):
         return robot
     return replace(robot, shown=shown, variables=_with_domain(robot, empty, ()))
 
 
 def _with_domain(robot: Robot, names: Collection[str], ranges: tuple[range, ...]) -> tuple[Variable, ...]:
-    """The variables of `robot`, those in `names` with the domain `ranges`."""
+    """Return the variables of `robot`, those in `names` with the domain `ranges`."""
     return tuple(
         replace(variable, domain=Domain(variable.domain.name, ranges)) if variable.name in names else variable
         for variable in robot.variables
@@ -134,7 +134,7 @@ def _with_domain(robot: Robot, names: Collection[str], ranges: tuple[range, ...]
 
 
 def _writable(robot: Robot) -> Robot:
-    """`robot` as a file can say it: no domain is empty. Raises `ValueError`."""
+    """Return `robot` as a file can say it: no domain is empty. Raises `ValueError`."""
     for name in (robot.name, *(variable.name for variable in robot.variables)):
         if not is_name(name):
             raise ValueError(f"{name!r} cannot be a name in a file")

@@ -10,34 +10,34 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
-from robochoc.journal.entries import VERSION, Ended, Header, JournalError, Line
+from robochoc.journal.entries import VERSION, Ended, Header, JournalEntry, JournalError
 from robochoc.journal.events import AnyEvent, Began, Sent, Settled
-from robochoc.journal.reader import Follower, Journal, in_order, is_journal, lines_of, read_journal
-from robochoc.journal.recorder import JournalFile, Recorder, Sink, improvements
+from robochoc.journal.reader import Follower, Journal, is_journal, lines_of, read_journal, sorted_by_time
+from robochoc.journal.recorder import BlockSink, JournalFile, JournalRecorder, improvements
 from robochoc.model.outcome import Metrics
 
 __all__ = [
     "VERSION",
+    "BlockSink",
     "Ended",
     "Follower",
     "Header",
     "Journal",
+    "JournalEntry",
     "JournalError",
     "JournalFile",
-    "Line",
-    "Recorder",
-    "Sink",
+    "JournalRecorder",
     "improvements",
-    "in_order",
     "is_journal",
     "lines_of",
     "metrics_of",
     "read_journal",
+    "sorted_by_time",
 ]
 
 
 def metrics_of(events: Iterable[AnyEvent]) -> Metrics:
-    """What the events say of messages, bytes, NCCCs and checks. Wall-clock time is not in them: 0."""
+    """Return what the events say of messages, bytes, NCCCs and checks. Wall-clock time is not in them: 0."""
     total = Metrics()
     messages: Counter[str] = Counter()
     size = largest = ncccs = 0

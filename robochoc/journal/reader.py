@@ -15,9 +15,9 @@ from typing import BinaryIO, Protocol, cast
 
 import msgspec
 
-from robochoc.journal.blocks import MAGIC, JournalDamagedError, JournalTruncatedError, Unframer
+from robochoc.journal.blocks import MAGIC, BlockReader, JournalDamagedError, JournalTruncatedError
 from robochoc.journal.columns import BlockError, entries_of
-from robochoc.journal.entries import READ, Ended, Header, JournalError, Line
+from robochoc.journal.entries import READ, Ended, Header, JournalEntry, JournalError
 from robochoc.journal.events import AnyEvent, Began
 from robochoc.model.outcome import Outcome
 
@@ -45,7 +45,7 @@ class Journal:
 
 
 def is_journal(content: bytes) -> bool:
-    """Whether `content` begins as a journal does, in either form."""
+    """Return whether `content` begins as a journal does, in either form."""
     return content.startswith((MAGIC, _TEXT))
 
 
@@ -74,11 +74,11 @@ def read_journal(content: bytes) -> Journal:
             raise JournalError("it has no header")
         outcome = last.outcome if isinstance(last, Ended) else None
         events = cast("list[AnyEvent]", lines[1:-1] if outcome else lines[1:])  # so has it here
-        return Journal(first, tuple(in_order(events)), outcome, damage, truncated)
+        return Journal(first, tuple(sorted_by_time(events)), outcome, damage, truncated)
 
 
-def in_order(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
-    """Events of a journal, as they were written; each run's come in the order of their times, `Began` first."""
+def sorted_by_time(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
+    """Yield events of a journal, as they were written; each run's come in the order of their times, `Began` first."""
     events = list(events)
     begun = [place for place, event in enumerate(events) if type(event) is Began]
     by_time = attrgetter("t")
@@ -89,7 +89,7 @@ def in_order(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
 
 
 def lines_of(journal: Journal) -> Iterator[bytes]:
-    """The text form of a journal: one JSON object a line."""
+    """Yield the text form of a journal: one JSON object a line."""
     encode = msgspec.json.Encoder().encode
     yield encode(journal.header) + b"\n"
     for event in journal.events:
@@ -115,13 +115,13 @@ class Follower:
         self._form: _Form | None = None
         self._began = self._over = False
 
-    def read(self, most: int | None = None) -> list[Line]:
-        """The entries that have become whole since the last call, in the file's order; the first is the `Header`.
+    def read(self, most: int | None = None) -> list[JournalEntry]:
+        """Return the entries that are complete since the last call, in the file's order. The first is the `Header`.
 
         Stops after the block with which there are more than `most`. Raises `JournalError` when it turns out that the
         file is no journal.
         """
-        lines: list[Line] = []
+        lines: list[JournalEntry] = []
         while self.damage is None and (most is None or len(lines) <= most):
             found = self._next()
             if found is None:
@@ -129,11 +129,14 @@ class Follower:
             lines += found
         return lines
 
-    def finish(self) -> tuple[list[Line], str | None]:
-        """No more will be written: what is left, and the damage, if any. Raises `JournalError`."""
+    def finish(self) -> tuple[list[JournalEntry], str | None]:
+        """Return the remaining entries, and the damage if there is any.
+
+        Nothing more is written. Raises `JournalError`.
+        """
         if self._form is None:
             raise JournalError("it is empty")
-        lines: list[Line] = []
+        lines: list[JournalEntry] = []
         if self.damage is None:
             try:
                 lines += self._fitting(self._form.rest())
@@ -145,11 +148,11 @@ class Follower:
 
     @property
     def is_over(self) -> bool:
-        """Whether the journal says how the run ended: nothing will follow."""
+        """Return whether the journal says how the run ended: nothing will follow."""
         return self._over
 
-    def _next(self) -> Sequence[Line] | None:
-        """The next entries; None: there are none yet."""
+    def _next(self) -> Sequence[JournalEntry] | None:
+        """Return the next entries; None: there are none yet."""
         while True:
             try:
                 if self._form and (lines := self._form.next()) is not None:
@@ -174,8 +177,8 @@ class Follower:
     def _place(self) -> str:
         return self._form.place if self._form else ""
 
-    def _fitting(self, lines: Sequence[Line]) -> Sequence[Line]:
-        """`lines`, if they may follow those before: a header, events, an end.
+    def _fitting(self, lines: Sequence[JournalEntry]) -> Sequence[JournalEntry]:
+        """Return `lines`, if they may follow those before: a header, events, an end.
 
         Raises `JournalError`, `JournalDamagedError`.
         """
@@ -198,7 +201,7 @@ class Follower:
 
 
 def _source(file: BinaryIO) -> Callable[[], bytes]:
-    """What reads the next piece of `file`."""
+    """Return what reads the next piece of `file`."""
     place = 0
 
     def at_an_offset() -> bytes:
@@ -219,28 +222,28 @@ class _Form(Protocol):
     """One of the two forms of journals."""
 
     def feed(self, piece: bytes) -> None:
-        """Here are the next bytes."""
+        """Append the next bytes."""
 
-    def next(self) -> Sequence[Line] | None:
-        """The next entries; None: they are not whole yet. Raises `JournalError`, `JournalDamagedError`."""
+    def next(self) -> Sequence[JournalEntry] | None:
+        """Return the next entries; None: they are not whole yet. Raises `JournalError`, `JournalDamagedError`."""
 
-    def rest(self) -> Sequence[Line]:
-        """The entries that are whole if nothing follows. Raises `JournalError`, `JournalDamagedError`."""
+    def rest(self) -> Sequence[JournalEntry]:
+        """Return the entries that are whole if nothing follows. Raises `JournalError`, `JournalDamagedError`."""
 
     @property
     def place(self) -> str:
-        """Where the last entries stood."""
+        """Return where the last entries stood."""
 
 
 class _Blocks:
     """The binary form."""
 
     def __init__(self) -> None:
-        self._unframer = Unframer()
+        self._unframer = BlockReader()
         self.feed = self._unframer.feed
         self.place = ""
 
-    def next(self) -> Sequence[Line] | None:
+    def next(self) -> Sequence[JournalEntry] | None:
         self.place = self._unframer.place
         content = self._unframer.next()
         if content is None:
@@ -250,7 +253,7 @@ class _Blocks:
         except BlockError as bad:
             raise JournalDamagedError(f"{self.place}: a block holds no entries: {bad}") from bad
 
-    def rest(self) -> Sequence[Line]:
+    def rest(self) -> Sequence[JournalEntry]:
         if self._unframer.rest:
             raise JournalTruncatedError(self._unframer.rest)
         return ()
@@ -262,7 +265,7 @@ class _Text:
     def __init__(self) -> None:
         self._buffer = bytearray()
         self._searched = self._lines = 0
-        self._decode = msgspec.json.Decoder(Line).decode
+        self._decode = msgspec.json.Decoder(JournalEntry).decode
 
     @property
     def place(self) -> str:
@@ -271,7 +274,7 @@ class _Text:
     def feed(self, piece: bytes) -> None:
         self._buffer += piece
 
-    def next(self) -> Sequence[Line] | None:
+    def next(self) -> Sequence[JournalEntry] | None:
         end = self._buffer.find(b"\n", self._searched)
         if end < 0:
             self._searched = len(self._buffer)
@@ -283,13 +286,13 @@ class _Text:
         self._searched = 0
         return self._decoded(line)
 
-    def rest(self) -> Sequence[Line]:
+    def rest(self) -> Sequence[JournalEntry]:
         try:
             return self._decoded(self._buffer) if self._buffer else ()
         except JournalDamagedError as cut:
             raise JournalTruncatedError(str(cut)) from cut
 
-    def _decoded(self, line: bytearray) -> Sequence[Line]:
+    def _decoded(self, line: bytearray) -> Sequence[JournalEntry]:
         self._lines += 1
         try:
             entry = self._decode(line)
@@ -304,7 +307,7 @@ class _Text:
 
 @contextmanager
 def _without_cycles() -> Iterator[None]:
-    """Millions of entries come into being, none goes: the collector would look at all of them again and again."""
+    """Pause the cyclic garbage collector: it would visit millions of new entries again and again, and free none."""
     if not gc.isenabled():
         yield
         return

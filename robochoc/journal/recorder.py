@@ -14,15 +14,15 @@ from threading import Lock
 
 import msgspec
 
-from robochoc.journal.blocks import BEGINNING, LARGEST_BLOCK, PREAMBLE, framed
+from robochoc.journal.blocks import BEGINNING, MAX_BLOCK_BYTES, PREAMBLE, frame_block
 from robochoc.journal.columns import columns_of
-from robochoc.journal.entries import Ended, Header, Line
+from robochoc.journal.entries import Ended, Header, JournalEntry
 from robochoc.journal.events import AnyEvent, Began, Decided, Given, Heard, Improved, Refused, Sent, actor
 from robochoc.journal.given import GivenProblemError, TeamReader
 from robochoc.model.outcome import Outcome
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import INFINITE
-from robochoc.system.files import Growing
+from robochoc.system.files import AppendableFile
 from robochoc.verification.objective import Objective
 
 MOST_IN_A_BLOCK = 8192
@@ -30,11 +30,11 @@ MOST_IN_A_BLOCK = 8192
 SPAN_S = 0.25
 """After so long, at the next event, a block is closed: so much of a run that is killed is missing."""
 
-Sink = Callable[[bytes], object]
+BlockSink = Callable[[bytes], object]
 """Takes one whole block after the other; the first time the beginning of the file, too. It may raise `OSError`."""
 
 
-class Recorder:
+class JournalRecorder:
     """An observer that writes a journal of the events, while they come, to all `sinks`.
 
     It may be called by several threads. Without sinks the journal is kept in memory: `content`. With an `objective`,
@@ -46,7 +46,7 @@ class Recorder:
     """How the run ended, to be set before `close`; None: not yet, or it broke off."""
 
     def __init__(
-        self, header: Header, objective: Callable[[], Objective] | None = None, sinks: Sequence[Sink] = ()
+        self, header: Header, objective: Callable[[], Objective] | None = None, sinks: Sequence[BlockSink] = ()
     ) -> None:
         self._memory = io.BytesIO()
         self._outlets = [_Outlet(sink) for sink in sinks or (self._memory.write,)]
@@ -54,7 +54,7 @@ class Recorder:
         self._exact = header.runtime == "simulator"
         self._lock = Lock()
         self._closed = False
-        self._pending: list[Line] = [_readable(header)]
+        self._pending: list[JournalEntry] = [_readable(header)]
         self._weighed: list[AnyEvent] | None = None
         self._given: list[Given] = []
         self._digest = BEGINNING
@@ -95,7 +95,7 @@ class Recorder:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing has been told, and so nothing written: what stood in the file's place is still there."""
+        """Return whether nothing was recorded. Then nothing is written: the old file is still there."""
         return self._number == 0 and len(self._pending) <= 1
 
     def content(self) -> bytes:
@@ -105,7 +105,7 @@ class Recorder:
 
     @property
     def failures(self) -> list[OSError]:
-        """Why sinks are asked no more."""
+        """Return why sinks are asked no more."""
         return [outlet.failure for outlet in self._outlets if outlet.failure]
 
     def _close_block(self) -> None:
@@ -134,8 +134,8 @@ class Recorder:
         number = self._number + len(self._staged)
         self._staged, self._number = [], number
 
-    def _told(self, pending: list[Line]) -> tuple[Sequence[Line], list[AnyEvent] | None, list[Given]]:
-        """`pending`, and improvements where a run ends; and what may improve in the run that is open, if it minimises.
+    def _told(self, pending: list[JournalEntry]) -> tuple[Sequence[JournalEntry], list[AnyEvent] | None, list[Given]]:
+        """Return `pending` with improvements where a run ends, and the events and problems of the open run.
 
         The third is all that robots have been given.
 
@@ -145,7 +145,7 @@ class Recorder:
             return pending, None, []
         weighed = None if self._weighed is None else [*self._weighed]
         given = [*self._given]
-        lines: list[Line] = []
+        lines: list[JournalEntry] = []
         for entry in pending:
             match entry:
                 case Began():
@@ -167,11 +167,11 @@ class Recorder:
         events = [*(given if heard else ()), *sorted(weighed, key=attrgetter("t"))]
         yield from (event for event in improvements(events, self._objective()) if isinstance(event, Improved))
 
-    def _packed(self, lines: Sequence[Line]) -> tuple[list[bytes], bytes]:
-        """Blocks of `lines`, and the checksum of the last."""
+    def _packed(self, lines: Sequence[JournalEntry]) -> tuple[list[bytes], bytes]:
+        """Return blocks of `lines`, and the checksum of the last."""
         blocks, digest = [], self._digest
         for content in _contents(lines, exact=self._exact):
-            block, digest = framed(content, digest)
+            block, digest = frame_block(content, digest)
             blocks.append(block)
         if self._digest is BEGINNING:
             blocks[0] = PREAMBLE + blocks[0]
@@ -187,7 +187,7 @@ class JournalFile:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._file: Growing | None = None
+        self._file: AppendableFile | None = None
         self._closed = False
 
     def write(self, block: bytes) -> None:
@@ -196,14 +196,14 @@ class JournalFile:
             raise OSError(errno.EBADF, os.strerror(errno.EBADF), str(self._path))
         try:
             if self._file is None:
-                self._file = Growing(self._path, block)
+                self._file = AppendableFile(self._path, block)
             else:
                 self._file.append(block)
         except OSError as error:
             raise OSError(error.errno, error.strerror, str(self._path)) from error
 
     def close(self) -> None:
-        """Nothing more will come."""
+        """Close the file."""
         if self._file and not self._closed:
             self._file.close()
         self._closed = True
@@ -214,7 +214,7 @@ class _Outlet:
 
     failure: OSError | None = None
 
-    def __init__(self, sink: Sink) -> None:
+    def __init__(self, sink: BlockSink) -> None:
         self._sink = sink
         self._had = 0
 
@@ -229,7 +229,7 @@ class _Outlet:
 
 
 def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[AnyEvent]:
-    """`events`, and an `Improved` after each that tells of something cheaper than ever.
+    """Yield `events`, and an `Improved` after each that tells of something cheaper than ever.
 
     What robots were given says which variables they show: `objective` may be of the team as the files have it.
     """
@@ -266,21 +266,21 @@ def _interfaces(reader: TeamReader, given: Given) -> dict[str, tuple[str, ...]]:
 
 
 def _readable(header: Header) -> Header:
-    """`header`, whose team may be named for a folder whose name is no text."""
+    """Return `header`, whose team may be named for a folder whose name is no text."""
     return msgspec.structs.replace(header, team=header.team.encode(errors="replace").decode())
 
 
-def _contents(lines: Sequence[Line], *, exact: bool) -> Iterator[bytes]:
-    """What the blocks of `lines` hold: one, or as many as it takes."""
+def _contents(lines: Sequence[JournalEntry], *, exact: bool) -> Iterator[bytes]:
+    """Yield what the blocks of `lines` hold: one, or as many as it takes."""
     try:
         content = columns_of(lines, exact=exact)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
         why = str(error)
     else:
-        if len(content) <= LARGEST_BLOCK:
+        if len(content) <= MAX_BLOCK_BYTES:
             yield content
             return
-        why = f"it has {len(content):,} bytes, more than {LARGEST_BLOCK:,}"
+        why = f"it has {len(content):,} bytes, more than {MAX_BLOCK_BYTES:,}"
     if len(lines) == 1:
         with suppress(TypeError, ValueError, OverflowError, RecursionError):
             yield columns_of([_instead(lines[0], why)], exact=exact)
@@ -290,8 +290,11 @@ def _contents(lines: Sequence[Line], *, exact: bool) -> Iterator[bytes]:
     yield from _contents(lines[middle:], exact=exact)
 
 
-def _instead(line: Line, why: str) -> Line:
-    """What is written for an entry that cannot be written as it is. Raises `ValueError` where there is nothing."""
+def _instead(line: JournalEntry, why: str) -> JournalEntry:
+    """Return what is written for an entry that cannot be written as it is.
+
+    Raises `ValueError` where there is nothing.
+    """
     match line:
         case Sent():
             return msgspec.structs.replace(line, content={"left out": why})

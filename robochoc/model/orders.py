@@ -42,14 +42,17 @@ class OrderError(Exception):
 
 
 def with_order(team: Team, order: Order | Sequence[str] | None, seed: int = 0) -> Team:
-    """`team` in the order called, or listed as, `order`; None: as it is. Raises `OrderError`."""
+    """Return `team` in the order called, or listed as, `order`; None: as it is. Raises `OrderError`."""
     if order is None:
         return team
     return with_priorities(team, compute_order(team, order, seed) if isinstance(order, Order) else order)
 
 
 def compute_order(team: Team, order: Order, seed: int = 0) -> tuple[str, ...]:
-    """The names of `team`'s robots in the order called `order`, highest priority first. `seed` is for `random`."""
+    """Return the names of `team`'s robots in the order called `order`, highest priority first.
+
+    `seed` is for `random`.
+    """
     graph = constraint_graph(team)
     match order:
         case Order.GIVEN:
@@ -72,7 +75,7 @@ def compute_order(team: Team, order: Order, seed: int = 0) -> tuple[str, ...]:
 
 
 def with_dom_deg_order(team: Team) -> Team:
-    """`team` in an order that soon shows who has to step aside, if it can be turned around."""
+    """Return `team` in an order that soon shows who has to step aside, if it can be turned around."""
     try:
         return with_order(team, Order.DOM_DEG)
     except OrderError:
@@ -80,7 +83,7 @@ def with_dom_deg_order(team: Team) -> Team:
 
 
 def constraint_graph(team: Team) -> Graph:
-    """For each robot those that share a constraint with it, and those that the files link to it without one."""
+    """Return the neighbours of each robot: those it shares a constraint with, and those that files link to it."""
     near: dict[str, set[str]] = {robot.name: set() for robot in team.robots}
     for robot in team.robots:
         groups = [_owners(team, constraint) for constraint in robot.shared]
@@ -95,17 +98,17 @@ def constraint_graph(team: Team) -> Graph:
 
 
 def _lexicographic(graph: Graph) -> tuple[str, ...]:
-    """`Robot2.1` before `Robot10.1`."""
+    """Return `Robot2.1` before `Robot10.1`."""
     return tuple(sorted(graph, key=natural_key))
 
 
 def _max_degree(graph: Graph) -> tuple[str, ...]:
-    """Those with the most neighbours first."""
+    """Return those with the most neighbours first."""
     return tuple(sorted(graph, key=lambda name: (-len(graph[name]), natural_key(name))))
 
 
 def _min_width(graph: Graph) -> tuple[str, ...]:
-    """Made from its end: who has the fewest neighbours among those that are left comes last, and leaves.
+    """Return a minimum-width order, built from its end: the robot with the fewest remaining neighbours comes last.
 
     Freuder, "A sufficient condition for backtrack-free search", JACM 29, 1982: no order has a smaller width (the
     most neighbours that a robot has above it).
@@ -122,7 +125,7 @@ def _min_width(graph: Graph) -> tuple[str, ...]:
 
 
 def _depth_first(graph: Graph) -> tuple[str, ...]:
-    """The order in which a depth-first search meets the robots: the pseudo-tree it induces is that search's tree.
+    """Return the order in which a depth-first search visits the robots. It induces that search's pseudo-tree.
 
     It begins with the robot that has the most neighbours, goes on to the neighbour that has the most, and begins
     again in each part of the team that is not linked to those before. Pseudo-trees: Freuder and Quinn, "Taking
@@ -144,7 +147,7 @@ def _depth_first(graph: Graph) -> tuple[str, ...]:
 
 
 def _dom_deg(graph: Graph, team: Team) -> tuple[str, ...]:
-    """The smallest domain per neighbour first, those without neighbours last.
+    """Return the smallest domain per neighbour first, those without neighbours last.
 
     The domain is the declared one: of a robot with several variables, all combinations of their values. What its
     private constraints leave of it is known only when it has been compiled.
@@ -161,7 +164,10 @@ def _dom_deg(graph: Graph, team: Team) -> tuple[str, ...]:
 
 
 def _random(graph: Graph, seed: int) -> tuple[str, ...]:
-    """Each order is as likely as any other. Uses `Random.random` alone, which Python promises never to change."""
+    """Return each order is as likely as any other.
+
+    Uses `Random.random` alone, which Python promises never to change.
+    """
     chance = Random(seed)  # noqa: S311 - an order, not a secret
     lots = {name: chance.random() for name in _lexicographic(graph)}
     return tuple(sorted(lots, key=lambda name: (lots[name], natural_key(name))))
@@ -171,7 +177,7 @@ def _random(graph: Graph, seed: int) -> tuple[str, ...]:
 
 
 def with_priorities(team: Team, names: Sequence[str]) -> Team:
-    """`team` with the priorities of `names` (all its robots, the highest first): the same constraints and solutions.
+    """Return `team` with the priorities of `names`, highest first: the same constraints and solutions.
 
     Each totally known constraint stands with the robot of its scope that is now the lowest, and the others are that
     robot's parents. Links that are there for no constraint stay, turned where they have to be. Children are told
@@ -215,17 +221,17 @@ class _Turned:
         self._seen = {name: place for place, name in enumerate(priority_order(self._parents))}
 
     def team(self) -> Team:
-        """The team that has been turned."""
+        """Return the team that has been turned."""
         return replace(self._old, robots=tuple(map(self._robot, self._rank)))
 
     def _holder(self, robot: Robot, constraint: Constraint) -> str:
-        """Who holds `constraint`, which `robot` has held so far."""
+        """Return the robot that holds `constraint` from now on. So far it was `robot`."""
         if constraint.model is ConstraintModel.PKC:
             return robot.name
         return max(_owners(self._old, constraint), key=self._rank.__getitem__)
 
     def _lasting_links(self) -> Iterator[tuple[str, str]]:
-        """Parent and child of each link that must stay, whoever holds the totally known constraints."""
+        """Yield parent and child of each link that must stay, independent of totally known constraints."""
         for robot in self._old.robots:
             needed = self._needed_before[robot.name]
             for parent in robot.parents:
@@ -261,11 +267,11 @@ class _Turned:
         )
 
     def _listed(self, before: Mapping[str, object], now: set[str]) -> list[str]:
-        """The names in `now`: those that were listed before in that order, and then the new ones by priority."""
+        """Return the names in `now`: those that were listed before in that order, and then the new ones by priority."""
         return [*(name for name in before if name in now), *sorted(now - before.keys(), key=self._rank.__getitem__)]
 
     def _told(self, robot: Robot, child: Child) -> Child:
-        """`child`, with the variables of `robot` that it is told from now on."""
+        """Return `child`, with the variables of `robot` that it is told from now on."""
         needs_now = self._needed[child.name].get(robot.name, set())
         needed_before = self._needed_before[child.name].get(robot.name, set())
         kept = [name for name in child.variables if name in needs_now or name not in needed_before]
@@ -273,7 +279,7 @@ class _Turned:
         return replace(child, variables=tuple(dict.fromkeys([*kept, *own])))
 
     def _definable(self, robot: Robot, held: Sequence[Constraint]) -> Iterator[Constraint]:
-        """The constraints in `held`; definitions that come from another file give way where two have one name."""
+        """Yield the constraints in `held`; definitions that come from another file give way where two have one name."""
         stay = set(map(id, robot.shared))
         parts = (constraint for child in robot.children for constraint in child.constraints)
         own = (*robot.private, *parts, *(constraint for constraint in held if id(constraint) in stay))
@@ -286,7 +292,10 @@ class _Turned:
 
 
 def _unlike(definition: Relation | Predicate, known: dict[str, Relation | Predicate]) -> Relation | Predicate:
-    """`definition`, under the first of its name, name_2, ... that means nothing else in `known`; and puts it there."""
+    """Return `definition`, under the first of its name, name_2, ...
+
+    that means nothing else in `known`; and puts it there.
+    """
     named, number = definition, 1
     while known.setdefault(named.name, named) != named:
         number += 1
@@ -303,7 +312,7 @@ def _owners(team: Team, constraint: Constraint) -> set[str]:
 
 
 def _needed(team: Team, name: str, held: Sequence[Constraint]) -> dict[str, set[str]]:
-    """For each other robot its variables in the constraints that `name` holds."""
+    """Return, for each other robot, its variables in the constraints that `name` holds."""
     needed: dict[str, set[str]] = defaultdict(set)
     for constraint in held:
         for variable in constraint.variables:

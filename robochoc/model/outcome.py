@@ -42,7 +42,7 @@ class Metrics:
     largest: int = 0
 
     def __add__(self, other: Metrics) -> Metrics:
-        """The cost of two runs, one after the other."""
+        """Return the cost of two runs, one after the other."""
         types = sorted({*self.messages, *other.messages})
         return Metrics(
             messages={name: self.messages.get(name, 0) + other.messages.get(name, 0) for name in types},
@@ -154,14 +154,14 @@ class Outcome:
 
     @property
     def ruled_out(self) -> str | None:
-        """Who alone could tell that there is no solution, in words; across machines that is no more than its claim."""
+        """Return who claims that there is no solution, in words. Across machines nobody can check the claim."""
         if self.witness is None or self.claimed_by is None:
             return self.witness and f"{self.witness} {RULED_OUT}"
         return f"{self.witness} claims it; nobody could check"
 
     @property
     def events(self) -> int:
-        """How many events of the scenario have happened: they, and losses, open epochs."""
+        """Return how many events of the scenario have happened: they, and losses, open epochs."""
         return sum(not epoch.lost for epoch in self.epochs[:-1])
 
     @property

@@ -16,13 +16,13 @@ class CycleError(ValueError):
 
 
 def natural_key(name: str) -> tuple[tuple[int, str], ...]:
-    """A key for natural order: `Robot2.1` before `Robot10.1`. Numbers compare by length first, however long."""
+    """Return a key for natural order: `Robot2.1` before `Robot10.1`. Numbers compare by length first, however long."""
     parts = re.split(r"0*([0-9]+)", name)
     return tuple((len(part) if place % 2 else 0, part) for place, part in enumerate(parts))
 
 
 def priority_order(parents: Mapping[str, Iterable[str]]) -> tuple[str, ...]:
-    """The total order of the robots in `parents`: topological, ties broken by natural name order.
+    """Return the total order of the robots in `parents`: topological, ties broken by natural name order.
 
     Parents that are not themselves keys are ignored. Raises `CycleError` when there is no such order.
     """

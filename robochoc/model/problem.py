@@ -1,175 +1,75 @@
 """The problem a team solves, as data: the paper's tuple (A, X, D, C, psi) (Section 3.1).
 
-A :class:`Team` is a set of :class:`Robot` objects (A); each owns variables (X) with domains (D), which is
-psi; constraints (C) are *private* to a robot or *shared* between robots. Nothing here reads, writes, sends or
-searches: `formats` makes these objects from XML, `solver` compiles them, `protocols` see only what was compiled.
+A `Team` is a set of `Robot` objects (A). Each owns variables (X) with domains (D): that is psi. Constraints (C) are
+*private* to a robot, or *shared* between robots. Domains, variables and constraints stand in `model/constraint.py`
+and can be imported from here.
 
-Values are integers. Costs are integers or :data:`INFINITE`; a broken hard constraint costs `INFINITE`.
+These are plain data. `formats` makes them from XML, `solver` compiles them, `protocols` see only what was compiled.
+Values are integers. Costs are integers or `INFINITE`; a violated hard constraint costs `INFINITE`.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 
-from robochoc.model.expression import Expression, UndefinedValueError, evaluate
-from robochoc.model.ranges import merge_ranges
+from robochoc.model.constraint import (
+    INFINITE,
+    Assignment,
+    Constraint,
+    ConstraintModel,
+    Domain,
+    Predicate,
+    Relation,
+    Semantics,
+    Term,
+    Variable,
+)
+from robochoc.model.expression import Expression
 
-Assignment = Mapping[str, int]
-"""Values of variables, by name."""
-
-Term = str | int
-"""What may stand in a scope: a variable's name or an integer constant (Figure 2 writes `V1.1 V3.1 1 3`)."""
-
-INFINITE = math.inf
-"""The cost of breaking a hard constraint."""
+__all__ = [
+    "INFINITE",
+    "AddAgent",
+    "AddConstraint",
+    "AddValue",
+    "Assignment",
+    "Change",
+    "Child",
+    "Constraint",
+    "ConstraintModel",
+    "Domain",
+    "Parent",
+    "Predicate",
+    "ProblemKind",
+    "Relation",
+    "RemoveAgent",
+    "RemoveConstraint",
+    "RemoveValue",
+    "Robot",
+    "ScenarioEvent",
+    "Semantics",
+    "Team",
+    "Term",
+    "Topic",
+    "Variable",
+]
 
 
 class ProblemKind(StrEnum):
-    """What a team minimises: nothing (satisfaction), or the sum of costs."""
+    """The kind of a team's problem: satisfaction (DisCSP), or minimisation of the sum of costs (DisWCSP)."""
 
     DISCSP = "DisCSP"
     DISWCSP = "DisWCSP"
 
 
-class ConstraintModel(StrEnum):
-    """Who knows a shared constraint (Brito and Meseguer, CP 2003): all of it, or each robot its part."""
-
-    TKC = "TKC"
-    PKC = "PKC"
-
-
-class Semantics(StrEnum):
-    """What the tuples of a relation are: the allowed ones, the forbidden ones, or the ones with a cost."""
-
-    SUPPORTS = "supports"
-    CONFLICTS = "conflicts"
-    SOFT = "soft"
-
-
-@dataclass(frozen=True)
-class Domain:
-    """A finite set of integers, kept as disjoint ascending ranges so that a large one costs nothing.
-
-    Ranges that follow one another without a gap become one: equal sets are equal domains, however they are written.
-    """
-
-    name: str
-    ranges: tuple[range, ...]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "ranges", merge_ranges(self.ranges))
-
-    def __iter__(self) -> Iterator[int]:
-        for part in self.ranges:
-            yield from part
-
-    def __len__(self) -> int:
-        return sum(len(part) for part in self.ranges)
-
-    def __contains__(self, value: object) -> bool:
-        return any(value in part for part in self.ranges)
-
-
-@dataclass(frozen=True)
-class Variable:
-    """A decision of the robot that owns it. Names are unique in a team."""
-
-    name: str
-    domain: Domain
-
-
-@dataclass(frozen=True)
-class Relation:
-    """A constraint's meaning in extension: tuples of `arity` integers.
-
-    `costs` runs parallel to `tuples` and is empty unless the semantics is `soft`; tuples that a soft relation
-    does not list cost `default_cost`.
-    """
-
-    name: str
-    arity: int
-    semantics: Semantics
-    tuples: tuple[tuple[int, ...], ...]
-    costs: tuple[float, ...] = ()
-    default_cost: float = 0
-
-    @cached_property
-    def _listed(self) -> dict[tuple[int, ...], float]:
-        if self.semantics is Semantics.SOFT:
-            return dict(zip(self.tuples, self.costs, strict=True))
-        return dict.fromkeys(self.tuples, 0 if self.semantics is Semantics.SUPPORTS else INFINITE)
-
-    def cost(self, values: Sequence[int]) -> float:
-        """What the tuple `values` costs: 0 or `INFINITE` unless the relation is soft."""
-        listed = self._listed.get(tuple(values))
-        if listed is not None:
-            return listed
-        match self.semantics:
-            case Semantics.SUPPORTS:
-                return INFINITE
-            case Semantics.CONFLICTS:
-                return 0
-            case Semantics.SOFT:
-                return self.default_cost
-
-
-@dataclass(frozen=True)
-class Predicate:
-    """A constraint's meaning in intension: a Boolean expression over formal `parameters` (all integers)."""
-
-    name: str
-    parameters: tuple[str, ...]
-    body: Expression
-
-    def holds(self, arguments: Sequence[int]) -> bool:
-        """Whether the body is true of `arguments`; an undefined body (division by zero) is not."""
-        try:
-            return bool(evaluate(self.body, dict(zip(self.parameters, arguments, strict=True))))
-        except UndefinedValueError:
-            return False
-
-
-@dataclass(frozen=True)
-class Constraint:
-    """A relation or predicate applied to a scope of variables and integer constants.
-
-    `parameters` is what a predicate's formal parameters receive; for a relation it equals `scope`.
-    `cost` is what breaking a predicate costs (a `DisWCSP`'s; `INFINITE`: a hard constraint).
-    Names need not be unique: Figure 2 calls every constraint `C5`.
-    """
-
-    name: str
-    definition: Relation | Predicate
-    scope: tuple[Term, ...]
-    parameters: tuple[Term, ...]
-    model: ConstraintModel | None = ConstraintModel.TKC
-    cost: float = INFINITE
-    line: int = field(default=0, compare=False)
-
-    @cached_property
-    def variables(self) -> tuple[str, ...]:
-        """The distinct variables of the scope, in its order."""
-        return tuple(dict.fromkeys(term for term in self.scope if isinstance(term, str)))
-
-    def price(self, assignment: Assignment) -> float:
-        """What `assignment` (of at least the scope's variables) pays here: 0 where the constraint holds."""
-        values = [assignment[term] if isinstance(term, str) else term for term in self.parameters]
-        if isinstance(self.definition, Relation):
-            return self.definition.cost(values)
-        return 0 if self.definition.holds(values) else self.cost
-
-    def allows(self, assignment: Assignment) -> bool:
-        """Whether `assignment` does not break this constraint; a soft one it may pay for."""
-        return self.price(assignment) < INFINITE
-
-
 @dataclass(frozen=True)
 class Topic:
-    """Where a robot's decision is published (ROS Layer Unit); x, y and z say where it sends the robot."""
+    """A topic that a robot's decision is published under (ROS Layer unit).
+
+    `x`, `y`, `z` are the waypoint's position.
+    """
 
     name: str
     type: str = "geometry_msgs/PoseStamped"
@@ -180,7 +80,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class Parent:
-    """A neighbour of higher priority, and the constraints shared with it that this robot holds."""
+    """A neighbour of higher priority, and the shared constraints that this robot holds with it."""
 
     name: str
     constraints: tuple[Constraint, ...] = ()
@@ -189,11 +89,15 @@ class Parent:
 
 @dataclass(frozen=True)
 class Child:
-    """A neighbour of lower priority: the own variables it must be told, and this robot's part of PKCs.
+    """A neighbour of lower priority.
 
-    `copies` are TKC constraints that the child holds, and this robot's file repeats. Across machines the robot holds
-    the answer against them too; nobody else asks for them, they are no part of what makes two robots equal, and no
-    file is written with them.
+    Attributes:
+        name: The neighbour's name.
+        variables: The robot's own variables that the child must know.
+        constraints: The robot's parts of partially known constraints with the child.
+        line: The line of the robot's file that lists the child.
+        copies: TKC constraints that the child holds, and the robot's file repeats. Across machines the robot checks
+            the answer with them too. They do not count when robots are compared, and are not written to files.
     """
 
     name: str
@@ -205,7 +109,21 @@ class Child:
 
 @dataclass(frozen=True)
 class Robot:
-    """One agent: all that its own file says, and so all that it knows."""
+    """One agent: the contents of its own file, which is all that it knows.
+
+    Attributes:
+        name: Its name, unique in the team.
+        variables: Its decisions.
+        kind: The kind of problem, the same in the whole team.
+        private: Constraints on its own variables only.
+        parents: Neighbours of higher priority, with the constraints that it shares with them.
+        children: Neighbours of lower priority.
+        topics: Where its decisions are published.
+        file: The file that it was read from, if any.
+        shown: Variables that neighbours see although nothing else here says so: they stand in a parent's part of a
+            partially known constraint.
+        weight: How much its withdrawal counts: one robot of weight 3 as much as three of weight 1.
+    """
 
     name: str
     variables: tuple[Variable, ...]
@@ -216,18 +134,16 @@ class Robot:
     topics: tuple[Topic, ...] = ()
     file: str = field(default="", compare=False)
     shown: tuple[str, ...] = ()
-    """Own variables that neighbours see though nothing here says so: a parent's part of a PKC looks at them."""
     weight: int = 1
-    """What it counts when as few robots as possible are to step aside: one of weight 3 as much as three of 1."""
 
     @cached_property
     def shared(self) -> tuple[Constraint, ...]:
-        """The constraints this robot holds towards its parents: it is the lowest of each one's scope."""
+        """The shared constraints that this robot holds: those in whose scopes it is the lowest robot."""
         return tuple(constraint for parent in self.parents for constraint in parent.constraints)
 
     @cached_property
     def interface(self) -> tuple[str, ...]:
-        """The own variables that neighbours see: those in shared constraints, in the order of `variables`."""
+        """The interface variables: own variables that neighbours see, in the order of `variables`."""
         parts = (constraint for child in self.children for constraint in child.constraints)
         seen = {name for constraint in (*self.shared, *parts) for name in constraint.variables}
         seen.update(name for child in self.children for name in child.variables)
@@ -244,7 +160,7 @@ class RemoveAgent:
 
 @dataclass(frozen=True)
 class AddAgent:
-    """A robot comes, with the lowest priority: it names parents only."""
+    """A robot joins with the lowest priority. It has parents only."""
 
     robot: Robot
 
@@ -267,7 +183,7 @@ class AddValue:
 
 @dataclass(frozen=True)
 class AddConstraint:
-    """`agent` shares another constraint with `parent` from now on."""
+    """`agent` and `parent` share another constraint."""
 
     agent: str
     parent: str
@@ -276,7 +192,7 @@ class AddConstraint:
 
 @dataclass(frozen=True)
 class RemoveConstraint:
-    """All constraints called `name` that `agent` shares with `parent` go."""
+    """All constraints called `name` that `agent` and `parent` share are removed."""
 
     agent: str
     parent: str
@@ -288,9 +204,12 @@ Change = RemoveAgent | AddAgent | RemoveValue | AddValue | AddConstraint | Remov
 
 @dataclass(frozen=True)
 class ScenarioEvent:
-    """Changes that happen together, one after the other; they open an epoch.
+    """An event of a scenario: changes that happen together. It opens an epoch.
 
-    `after` so many messages of the epoch before (None, or if there are not so many: once that is solved).
+    Attributes:
+        changes: The changes, in their order.
+        after: The number of messages in the epoch before, after which the event happens. None, or fewer messages:
+            when the epoch before is solved.
     """
 
     changes: tuple[Change, ...]
@@ -299,12 +218,17 @@ class ScenarioEvent:
 
 @dataclass(frozen=True)
 class Team:
-    """Robots that belong together, in priority order (the highest first)."""
+    """The robots of one problem, in priority order (the highest first).
+
+    Attributes:
+        name: The team's name.
+        robots: The robots.
+        scenario: How the problem changes over time. With events it is a DDisCSP, and this is its function delta.
+    """
 
     name: str
     robots: tuple[Robot, ...]
     scenario: tuple[ScenarioEvent, ...] = ()
-    """How the problem changes over time: then it is a DDisCSP, and this its function delta."""
 
     @cached_property
     def _by_name(self) -> dict[str, Robot]:
@@ -317,17 +241,17 @@ class Team:
         return name in self._by_name
 
     def get(self, name: str) -> Robot | None:
-        """The robot called `name`, if it is in the team."""
+        """Return the robot called `name`. None: the team has none."""
         return self._by_name.get(name)
 
     @property
     def dynamic(self) -> bool:
-        """Whether a scenario changes the problem over time."""
+        """Return whether a scenario changes the problem over time."""
         return bool(self.scenario)
 
     @property
     def kind(self) -> ProblemKind:
-        """A team with costs is a DisWCSP as a whole; one that all have left is a DisCSP."""
+        """The kind of problem, the same for all robots. Without robots it is a DisCSP."""
         return self.robots[0].kind if self.robots else ProblemKind.DISCSP
 
     @cached_property
@@ -346,7 +270,7 @@ class Team:
         return {variable.name: variable for robot in self.robots for variable in robot.variables}
 
     def constraints(self) -> Iterator[Constraint]:
-        """C: every constraint of every file, the parts of partially known ones included."""
+        """Yield C: every constraint of every robot, and the parts of partially known ones."""
         for robot in self.robots:
             yield from robot.private
             yield from robot.shared

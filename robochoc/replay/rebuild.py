@@ -10,11 +10,12 @@ from typing import NamedTuple
 from robochoc.communication.host import Host
 from robochoc.communication.session import Epoch
 from robochoc.journal.events import Given, Lost
-from robochoc.journal.given import GivenProblemError, TeamReader, brief_of, void_of
+from robochoc.journal.given import GivenProblemError, TeamReader, invalidated_of, run_parameters_of
 from robochoc.journal.journal import Header
-from robochoc.model.change import ChangeError, keep_interfaces, team_after_events, without_robots
+from robochoc.model.change import team_after_events
 from robochoc.model.orders import Order, OrderError, compute_order, with_priorities
 from robochoc.model.problem import Robot, Team
+from robochoc.model.team_edits import ChangeError, keep_interfaces, without_robots
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.protocols.settings import SettingsError
 from robochoc.replay.steps import RecordedRun
@@ -143,7 +144,7 @@ class Rebuilder:
 
     def _as_given(self, given: Given) -> Epoch:
         compiled = self._compiled(self._reader.team(given))
-        return Epoch(compiled, void_of(given), frozenset(given.fresh), brief_of(given))
+        return Epoch(compiled, invalidated_of(given), frozenset(given.fresh), run_parameters_of(given))
 
     def _as_filed(self, run: RecordedRun, protocol: type[Protocol]) -> Epoch:
         """What the files say, for a run whose journal does not; robots that were lost before are left out."""

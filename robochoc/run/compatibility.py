@@ -102,6 +102,7 @@ OPTION_RULES = (
     _for_robots("--messages", lambda o: o.messages),
     _for_robots("--on-loss", lambda o: o.on_loss),
     _for_robots("--spare", lambda o: o.spares),
+    _for_robots("--kill", lambda o: o.kill),
     _for_robots("--channel", lambda o: o.channel),
     _for_robots("--filter", lambda o: o.filters),
     _for_robots("--order", lambda o: o.order is not None),
@@ -130,6 +131,11 @@ OPTION_RULES = (
         lambda o: (o.on_loss or o.spares) and o.runtime is Runtime.SIMULATOR,
         "--on-loss and --spare are for processes, which can die",
         "drop --runtime simulator, or write a scenario.xml",
+    ),
+    OptionRule(
+        lambda o: o.kill and o.runtime is Runtime.SIMULATOR,
+        "--kill ends a robot's process, and the simulator has none",
+        "drop --runtime simulator",
     ),
     OptionRule(
         lambda o: o.spares and o.on_loss is OnLoss.FAIL,
@@ -193,6 +199,11 @@ class Case:
         return tuple(team_after_events(self.team, events) for events in range(len(self.team.scenario) + 1))
 
     @property
+    def unknown_kills(self) -> set[str]:
+        """Robots that are to be killed, and are in the team at no time."""
+        return {kill.robot for kill in self.options.kill}.difference(*(epoch.order for epoch in self.epochs))
+
+    @property
     def max_total(self) -> float:
         """What all costs could add up to in any epoch."""
         return max(max_total(team, self.options) for team in self.epochs)
@@ -226,6 +237,7 @@ TEAM_RULES = (
     _not_with_scenario("--withdraw", lambda o: o.withdraw is not None),
     _not_with_scenario("--count", lambda o: o.count),
     _not_with_scenario("--runtime network", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.NETWORK),
+    TeamRule(lambda c: c.unknown_kills, "--kill names a robot that {team} does not have"),
     TeamRule(
         lambda c: c.options.count and c.has_costs,
         "{team} is a DisWCSP, where every assignment that breaks nothing hard is a solution; --count is for problems"

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
+from robochoc.communication.kill_schedule import KillSchedule
 from robochoc.communication.run_result import Progress
 from robochoc.journal.events import Observer
 from robochoc.run.options import Options
@@ -37,6 +38,7 @@ class RunContext:
         self.progress = progress
         self.solver = solver
         self.cache = SolutionCache() if options.cache else None
+        self.kills = KillSchedule(options.kill)
         self._began = time.monotonic()
         self.deadline = None if options.timeout is None else self._began + options.timeout
 

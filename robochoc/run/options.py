@@ -12,6 +12,7 @@ from robochoc.run.defaults import SATISFIES
 from robochoc.solver.compile import Limits
 
 if TYPE_CHECKING:
+    from robochoc.communication.kill_schedule import Kill
     from robochoc.communication.simulator.channel import ChannelModel
 
 CENTRAL = "central"
@@ -80,6 +81,7 @@ class Options:
             (None: it is waited for; on a network 10 seconds).
         channel: A channel model: the simulator counts seconds of computing and radio.
         settings: The protocol's settings, as text.
+        kill: Robots whose processes are killed, and when.
         filters: The names of the channel filters that messages on a network go through, in this order.
     """
 
@@ -102,6 +104,7 @@ class Options:
     channel: ChannelModel | None = None
     settings: Mapping[str, str] = field(default_factory=dict)
     filters: tuple[str, ...] = ()
+    kill: tuple[Kill, ...] = ()
 
     @property
     def survives_losses(self) -> bool:

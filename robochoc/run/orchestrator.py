@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from robochoc.communication.run_result import Progress
-from robochoc.formats import check_team, held_to_rules
+from robochoc.formats import check_team, with_checked_events
 from robochoc.journal.events import Observer
 from robochoc.model.orders import OrderError
 from robochoc.model.outcome import Outcome, Verdict
@@ -67,7 +67,7 @@ def solve(
         RefutedError: when the checker, or the central solver, refutes an answer.
     """
     check_team(team)
-    environment = environment and held_to_rules(environment)
+    environment = environment and with_checked_events(environment)
     refuse_options(options, environment=environment is not None)
     try:
         context = RunContext(options, observer, progress, solver)
@@ -103,6 +103,8 @@ def _solve_distributed(team: Team, context: RunContext, environment: Environment
         raise UnsupportedError(f"{refused}{alternatives(team, options, complete=True, costs=True)}") from None
     except (TooManySolutionsError, CompileTimeoutError, OutOfTimeError) as limit:
         return deployment.outcome(header, deployment.limit_reached(str(limit)))
+    finally:
+        context.kills.warn_of_pending()
 
 
 def _header(team: Team, options: Options) -> Outcome:

@@ -13,7 +13,13 @@ from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import FIRST_FIT, MINIMISES
 from robochoc.run.options import CENTRAL
 from robochoc.system.entry_points import EntryPoint
-from robochoc.system.installed import all_in, loaded, missing, named, names_in
+from robochoc.system.installed import (
+    all_entry_points,
+    entry_point_names,
+    entry_points_named,
+    load_entry_point,
+    not_installed_message,
+)
 
 GROUP = "robochoc.protocols"
 
@@ -49,7 +55,7 @@ class Offer:
 
 def protocol_names() -> tuple[str, ...]:
     """The names of all protocols that are installed, ours and others', sorted."""
-    return names_in(GROUP)
+    return entry_point_names(GROUP)
 
 
 def installed_spelling(name: str) -> str:
@@ -61,14 +67,14 @@ def installed_spelling(name: str) -> str:
 
 def offers() -> tuple[Offer, ...]:
     """All that installed packages offer, by name; what cannot be used too, with the reason."""
-    return tuple(_offer(entry, namesakes) for entry, namesakes in all_in(GROUP))
+    return tuple(_offer(entry, namesakes) for entry, namesakes in all_entry_points(GROUP))
 
 
 def offer_named(name: str) -> Offer:
     """What is offered as `name`. Raises `UnknownProtocolError`, which names those there are."""
-    found = named(GROUP, name)
+    found = entry_points_named(GROUP, name)
     if not found:
-        raise UnknownProtocolError(missing(GROUP, "protocol", name))
+        raise UnknownProtocolError(not_installed_message(GROUP, "protocol", name))
     return _offer(found[0], found)
 
 
@@ -102,7 +108,7 @@ def protocol_by_class(class_name: str, likely: Iterable[str] = ()) -> tuple[str,
 
 
 def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> Offer:
-    found = loaded(entry, namesakes, _fault)
+    found = load_entry_point(entry, namesakes, _fault)
     return Offer(entry, cast("type[Protocol] | None", found.what), found.broken)
 
 

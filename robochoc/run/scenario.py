@@ -19,18 +19,17 @@ from robochoc.communication.run_result import RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.formats import InvalidInputError, read_robot
 from robochoc.model.change import (
-    ChangeError,
     affected_robots,
     apply_changes,
     apply_possible_changes,
     describe_change,
-    rejoin,
     team_after_events,
-    without_robots,
 )
 from robochoc.model.orders import with_priorities
 from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import AddAgent, Change, Robot, ScenarioEvent, Team
+from robochoc.model.rejoin import rejoin
+from robochoc.model.team_edits import ChangeError, without_robots
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import Invalidated, invalidated_by

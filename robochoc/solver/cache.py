@@ -43,7 +43,7 @@ class SolutionCache:
 
     @cached_property
     def folder(self) -> Path:
-        """Where its files are; looked up when it is needed first: most robots need no solver."""
+        """Return where its files are; looked up when it is needed first: most robots need no solver."""
         return self._folder or cache_folder()
 
     @cached_property
@@ -51,11 +51,11 @@ class SolutionCache:
         return FORMAT, _solver_version()
 
     def key(self, network: Network) -> str:
-        """The name of `network`: equal for equal networks, whatever robot or team they belong to."""
+        """Return the name of `network`: equal for equal networks, whatever robot or team they belong to."""
         return _digest(msgspec.msgpack.encode((self._versions, network))).hex()
 
     def get(self, network: Network) -> tuple[Codes, ...] | None:
-        """All solutions of `network`, if they are known."""
+        """Return all solutions of `network`, if they are known."""
         path = self._path(self.key(network))
         try:
             content = path.read_bytes()
@@ -79,7 +79,7 @@ class SolutionCache:
             write_atomically(self._path(key), _digest(body) + body)
 
     def files(self) -> Iterator[Path]:
-        """The cache's files."""
+        """Yield the cache's files."""
         with suppress(OSError):
             yield from sorted(path for path in self.folder.glob(f"*{SUFFIX}") if path.is_file())
 
@@ -96,14 +96,14 @@ class SolutionCache:
 
 
 def cache_folder() -> Path:
-    """Where the user's cache is (`~/.cache/robochoc` on Linux; `XDG_CACHE_HOME` is respected)."""
+    """Return where the user's cache is (`~/.cache/robochoc` on Linux; `XDG_CACHE_HOME` is respected)."""
     from platformdirs import user_cache_path  # noqa: PLC0415 - only who solves has a cache
 
     return user_cache_path("robochoc")
 
 
 def _read(content: bytes, key: str, width: int) -> tuple[Codes, ...] | None:
-    """The solutions in a cache file; None if it is not what it should be."""
+    """Return the solutions in a cache file; None if it is not what it should be."""
     digest, body = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
     if _digest(body) != digest:
         return None
@@ -126,7 +126,7 @@ def _digest(content: bytes) -> bytes:
 
 
 def _solver_version() -> str:
-    """What pycsp3 says it is, without importing it (it patches built-in types), or package metadata (slow)."""
+    """Return what pycsp3 says it is, without importing it (it patches built-in types), or package metadata (slow)."""
     from importlib.util import find_spec  # noqa: PLC0415 - start-up: the same
 
     found = find_spec("pycsp3")

@@ -91,7 +91,7 @@ class CentralSolver:
         self._tables: dict[Network, tuple[Codes, ...] | None] = {}
 
     def judge(self, team: Team, *, count: bool = False, aside: int | None = None) -> CentralAnswer:
-        """The verdict on `team`, with a solution (of a DisWCSP: the cheapest) or (`count`) the number of all.
+        """Return the verdict on `team`, with a solution (of a DisWCSP: the cheapest) or (`count`) the number of all.
 
         With `aside`, robots may step aside, one of weight 1 at this price, and costs and prices are minimised; those
         that do have no values. `unknown` when the time was over, with the cheapest that was found until then. Raises
@@ -124,7 +124,7 @@ class CentralSolver:
         return CentralAnswer(Verdict.SOLUTION, {name: assignment[name] for name in team.variables})
 
     def _minimum(self, team: Team, parts: list[WeightedComponent]) -> CentralAnswer:
-        """The cheapest solution of all `parts`, which do not depend on each other."""
+        """Return the cheapest solution of all `parts`, which do not depend on each other."""
         parts.sort(key=lambda part: math.prod(len(domain) for domain in part.network.domains))
         cost = bound = constant_costs(team)
         assignment: dict[str, int] | None = {}
@@ -148,7 +148,7 @@ class CentralSolver:
         return CentralAnswer(Verdict.OPTIMAL if proven else Verdict.UNKNOWN, assignment, cost=cost, bound=bound)
 
     def _cheapest(self, part: WeightedComponent, ace: AceProcess) -> tuple[Codes | None, bool]:
-        """A solution, and whether none is cheaper; without one, whether there is none."""
+        """Return a solution, and whether none is cheaper; without one, whether there is none."""
         network = part.network
         if network.impossible:
             return None, True
@@ -178,7 +178,7 @@ class CentralSolver:
         return self._deadline is not None and time.monotonic() >= self._deadline
 
     def _solve(self, part: Component, ace: AceProcess, spare: AceProcess, *, count: bool) -> SolverAnswer:
-        """The number of solutions of one component, or its first one."""
+        """Return the number of solutions of one component, or its first one."""
         network = part.network
         if network.impossible:
             return NO_SOLUTIONS
@@ -201,7 +201,7 @@ class CentralSolver:
         return NO_SOLUTIONS if strong.impossible else self._race(strong, ace, spare, wanted)
 
     def _table(self, ace: AceProcess, clique: Network) -> tuple[Codes, ...] | None:
-        """All solutions of a clique; None when there are too many, or it takes too long."""
+        """Return all solutions of a clique; None when there are too many, or it takes too long."""
         if clique not in self._tables:
             self._tables[clique] = self._known_or_solved(ace, clique)
         return self._tables[clique]
@@ -225,7 +225,7 @@ class CentralSolver:
         return answer.solutions
 
     def _race(self, network: Network, first: AceProcess, second: AceProcess, wanted: _Wanted) -> SolverAnswer:
-        """The answer of whichever of two strategies is ready first; the second begins when the first takes long."""
+        """Return the answer of the faster of two strategies. The second starts when the first takes long."""
         usual, other = wanted.strategies
         if not first.begin(network, limit=wanted.limit, count_only=wanted.count_only, strategy=usual):
             return first.answer()

@@ -25,7 +25,7 @@ class Demand(StrEnum):
 
 
 def demands(network: Network) -> list[Demand]:
-    """What each table of `network` demands."""
+    """Return what each table of `network` demands."""
     known: dict[Hashable, Demand] = {}
     found = []
     for table in network.tables:
@@ -48,7 +48,7 @@ def _demand(network: Network, table: Table) -> Demand:
 
 
 def cliques(pairs: Iterable[Codes]) -> list[Codes]:
-    """Cliques that together cover all `pairs`, each grown as long as it covers something new."""
+    """Return cliques that together cover all `pairs`, each grown as long as it covers something new."""
     neighbours: dict[int, set[int]] = {}
     for left, right in pairs:
         neighbours.setdefault(left, set()).add(right)
@@ -65,7 +65,7 @@ def cliques(pairs: Iterable[Codes]) -> list[Codes]:
 
 
 def with_cliques(network: Network, solutions: Callable[[Network], tuple[Codes, ...] | None]) -> Network:
-    """`network` with allDifferent on cliques of `ne`, and with tables for the cliques that owe each other more.
+    """Return `network` with allDifferent on cliques of `ne`, and with tables for the cliques that owe each other more.
 
     Tables are for cliques that need every value there is: there they pay, as almost nothing is left to choose.
 
@@ -98,7 +98,7 @@ def with_cliques(network: Network, solutions: Callable[[Network], tuple[Codes, .
 
 
 def _grown(clique: list[int], neighbours: dict[int, set[int]], open_still: dict[int, set[int]]) -> list[int]:
-    """`clique`, with more members as long as one covers new edges; the one that covers most comes first."""
+    """Return `clique`, with more members as long as one covers new edges; the one that covers most comes first."""
     candidates = set.intersection(*(neighbours[name] for name in clique))
     while candidates:
         best = min(candidates, key=lambda name: (-len(open_still[name].intersection(clique)), name))
@@ -117,7 +117,7 @@ def _forbidden(network: Network, table: Table) -> set[Codes]:
 
 
 def _within(network: Network, clique: Codes) -> Network:
-    """The part of `network` on the variables of `clique` alone."""
+    """Return the part of `network` on the variables of `clique` alone."""
     place = {name: index for index, name in enumerate(clique)}
     tables = (
         replace(table, scope=tuple([place[name] for name in table.scope]))

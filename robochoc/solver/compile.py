@@ -107,7 +107,7 @@ class Compiler:
             self._own.close()
 
     def compile(self, robot: Robot) -> Compilation:
-        """The compiled domain of `robot`.
+        """Return the compiled domain of `robot`.
 
         Raises `TooManySolutionsError`, `CompileTimeoutError`, `CompileError`, `SolverMissingError`, and
         `UnsupportedError` when a constraint is too large; and `SolverTimeoutError` when the time for all together is
@@ -159,7 +159,7 @@ class Compiler:
             raise CompileError(robot, str(lost)) from lost
 
     def _solver(self) -> AceProcess:
-        """The solver that was lent, or one of our own, which is made when the first network asks for it."""
+        """Return the solver that was lent, or one of our own, which is made when the first network asks for it."""
         from robochoc.solver.ace import AceProcess  # noqa: PLC0415 - start-up: most robots need no solver
 
         if self._lent:

@@ -91,11 +91,11 @@ class LocalProblem:
         self._part = part
 
     def solution(self, index: int) -> dict[str, int]:
-        """Values of all own variables when the compiled variable takes `values[index]`; none when it steps aside."""
+        """Return the values of all own variables for `values[index]`. Empty if the robot is withdrawn."""
         return self._domain.solution(index)
 
     def conflict(self, index: int, view: Mapping[str, Value], since: int = -1) -> Conflict | None:
-        """Why `values[index]` is against `view`: what the first constraint that it breaks sees, or None.
+        """Return why `values[index]` is against `view`: what the first constraint that it breaks sees, or None.
 
         Constraints whose other variables are not all known in `view` are passed over, and so are those whose lowest
         robot stands higher in the order than place `since`: who asks knows that they hold. The order is that of their
@@ -106,17 +106,17 @@ class LocalProblem:
         return None if broken is None else broken[0].conflict(broken[1])
 
     def conflict_with_key(self, index: int, view: Mapping[str, Value], since: int = -1) -> tuple[Conflict, str] | None:
-        """Like `conflict`, with the key of the constraint that is broken."""
+        """Return what `conflict` returns, with the key of the violated constraint."""
         broken = self._broken(index, view, since)
         return None if broken is None else (broken[0].conflict(broken[1]), broken[0].key)
 
     def conflicts(self, index: int, view: Mapping[str, Value]) -> list[tuple[Conflict, str]]:
-        """Like `explained`, of every constraint that `values[index]` breaks: all that are known are checked."""
+        """Return what `conflict_with_key` returns, for every constraint that `values[index]` violates."""
         known = self._known(view)
         return [(c.conflict(others), c.key) for c, others in known if not c.mask(others) >> index & 1]
 
     def part_conflict(self, index: int, child: str, value: Value) -> Conflict | None:
-        """What cannot both be, by the own parts towards `child`: of `values[index]` and `value`, what the part sees.
+        """Return the conflict of `values[index]` with `value` of `child`, by this robot's parts of shared PKCs.
 
         None: the parts allow the pair. The pair is named like a conflict, but with this robot's own value in it.
         """
@@ -130,7 +130,7 @@ class LocalProblem:
         return None
 
     def filter(self, index: int, receiver: str) -> bytes:
-        """Which values of `receiver` go with `values[index]`, by all that this robot has to check towards it.
+        """Return which values of `receiver` go with `values[index]`, by all that this robot has to check towards it.
 
         That is, towards a child, what is totally known (where all robots of a scope know it) and the own parts;
         towards a parent the own parts; for anybody else everything goes. Every pair that a constraint can tell apart
@@ -146,20 +146,20 @@ class LocalProblem:
         return self._filters.places
 
     def violation_count(self, index: int, view: Mapping[str, Value]) -> int:
-        """How many constraints `values[index]` breaks, of those whose other variables are all known in `view`."""
+        """Return how many constraints `values[index]` violates. Those with unknown variables in `view` are left out."""
         return sum(not constraint.mask(others) >> index & 1 for constraint, others in self._known(view))
 
     def cost(self, index: int, view: Mapping[str, Value]) -> float:
-        """What `values[index]` costs in `view`: its charge, and all constraints whose other variables are known."""
+        """Return the cost of `values[index]` in `view`: its private cost, and constraints without unknown variables."""
         return sum([c.costs(others)[index] for c, others in self._known(view)], self.charges[index])
 
     def costs(self, view: Mapping[str, Value]) -> list[float]:
-        """Like `cost`, of every own value: as many checks for each constraint as there are values."""
+        """Return the `cost` of every own value: as many checks for each constraint as there are values."""
         known = [constraint.costs(others) for constraint, others in self._known(view, len(self.values))]
         return [sum(prices) for prices in zip(self.charges, *known, strict=True)]
 
     def lexicographic_costs(self, view: Mapping[str, Value]) -> list[LexicographicCost]:
-        """Like `costs`, for those who compare costs of assignments that break something."""
+        """Return the lexicographic cost of every own value: comparable also where hard constraints are violated."""
         costs = self.costs(view)
         if INFINITE not in costs:
             return [(0, cost) for cost in costs]
@@ -167,7 +167,7 @@ class LocalProblem:
         return [_lexicographic_cost(prices) for prices in zip(self.charges, *known, strict=True)]
 
     def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], float]]:
-        """Of each constraint whose other robots are all among `robots`: who these are, and the most that it charges.
+        """Return, for each constraint whose other robots are all in `robots`, these robots and its maximum cost.
 
         That is, short of being broken, and whatever values there are: nothing is checked. See `tables`.
         """
@@ -175,7 +175,9 @@ class LocalProblem:
         return [(c.agents, c.max_cost) for c in self._constraints if known.issuperset(c.agents)]
 
     def added(self, robot: str, view: Mapping[str, Value]) -> list[float] | None:
-        """What each own value pays once `robot` is known too, the lowest in `view`; None: no constraint waits for it.
+        """Return the additional cost of each own value when `robot`, the lowest in `view`, is known too.
+
+        None: no constraint becomes complete.
 
         So much are the `costs` in `view` more than without `robot`, if all others in it are higher. Checks are only
         those of the constraints that come in.
@@ -192,7 +194,7 @@ class LocalProblem:
         return _summed(len(self.values), [constraint.costs(others) for constraint, others in known])
 
     def lower_bounds(self, robots: Container[str]) -> list[float]:
-        """For each own value, what constraints whose other robots are all among `robots` charge at the very least.
+        """Return, for each own value, a lower bound on its cost in constraints whose other robots are all in `robots`.
 
         These may take any values that their files declare. Nothing is charged for sure where robots may step aside,
         and nothing is said of a constraint with more than `MAX_BOUNDED_ROWS` combinations of values.
@@ -210,7 +212,7 @@ class LocalProblem:
         return _summed(len(self.values), least)
 
     def tables(self, domains: Mapping[str, Sequence[Value]], lowest: str | None = None) -> list[CostTable]:
-        """What constraints charge for every combination of values, of those whose other robots are all in `domains`.
+        """Return a cost table for each constraint whose other robots are all in `domains`.
 
         With `lowest`, only of those among whose other robots that one is the lowest.
 
@@ -230,7 +232,7 @@ class LocalProblem:
         return found
 
     def interchangeable(self, value: Value) -> Sequence[int]:
-        """The places of all own values that agree with `value` wherever that is not None.
+        """Return the places of all own values that agree with `value` wherever that is not None.
 
         They are interchangeable to whoever looks at nothing else: neighbourhood partial interchangeability
         (Burke and Brown, "Applying interchangeability to complex local problems in distributed constraint
@@ -240,13 +242,13 @@ class LocalProblem:
         return [index for index, own in enumerate(self.values) if all(own[place] == part for place, part in wanted)]
 
     def _known(self, view: Mapping[str, Value], values: int = 1) -> list[tuple[SharedConstraint, OtherValues]]:
-        """The constraints whose other variables are all known, and what they see: for so many own `values`."""
+        """Return the constraints whose other variables are all known, and what they see: for so many own `values`."""
         known = [(c, others) for c in self._constraints if (others := c.other_values(view)) is not None]
         self.checks += len(known) * values
         return known
 
     def _broken(self, index: int, view: Mapping[str, Value], since: int) -> tuple[SharedConstraint, OtherValues] | None:
-        """The first constraint that `values[index]` breaks, and what it sees in `view`."""
+        """Return the first constraint that `values[index]` breaks, and what it sees in `view`."""
         if self._table is not None:
             checks, broken = self._table.look(index, view, bisect_left(self._depths, since))
             self.checks += checks
@@ -272,17 +274,17 @@ class LocalProblem:
 
 
 def _summed(size: int, rows: Sequence[Sequence[float]]) -> list[float]:
-    """The sum of `rows`, each of `size` values."""
+    """Return the sum of `rows`, each of `size` values."""
     return [sum(prices) for prices in zip(*rows, strict=True)] if rows else [0] * size
 
 
 def _lexicographic_cost(prices: Sequence[float]) -> LexicographicCost:
-    """What `prices` come to."""
+    """Return what `prices` come to."""
     return prices.count(INFINITE), sum([price for price in prices if price < INFINITE])
 
 
 def _by_robot(constraints: Iterable[SharedConstraint]) -> dict[str, list[SharedConstraint]]:
-    """Those that are shared with one other robot, by its name."""
+    """Return those that are shared with one other robot, by its name."""
     found: dict[str, list[SharedConstraint]] = {}
     for constraint in constraints:
         if len(constraint.agents) == 1:

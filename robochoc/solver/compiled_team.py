@@ -66,5 +66,5 @@ def ensure_compiled(team: Team | CompiledTeam) -> CompiledTeam:
 
 
 def _decisive(robot: Robot) -> tuple[object, ...]:
-    """All of `robot` that its compiled domain depends on."""
+    """Return all of `robot` that its compiled domain depends on."""
     return robot.variables, robot.private, robot.interface

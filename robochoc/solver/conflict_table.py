@@ -53,7 +53,7 @@ class ConflictTable:
     def look(
         self, index: int, view: Mapping[str, Value], first: int = 0
     ) -> tuple[int, tuple[SharedConstraint, OtherValues] | None]:
-        """How many constraints are checked for the value at `index`, and which one it breaks in `view`, if any.
+        """Return how many constraints are checked for the value at `index`, and which one it breaks in `view`, if any.
 
         Constraints before the one numbered `first`, which begins a group, are left out.
         """
@@ -88,7 +88,7 @@ class _Group:
         self._kept: OrderedDict[_Seen, _Broken] = OrderedDict()
 
     def broken(self, view: Mapping[str, Value]) -> _Broken:
-        """The first constraint that each own value breaks, among those that `view` knows enough for."""
+        """Return the first constraint that each own value breaks, among those that `view` knows enough for."""
         seen = tuple([constraint.other_values(view) for constraint in self._constraints])
         kept = self._kept.get(seen)
         if kept is None:

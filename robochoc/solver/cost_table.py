@@ -35,7 +35,7 @@ class CostTable(NamedTuple):
 def cost_table(
     constraint: SharedConstraint, domains: Mapping[str, Sequence[Value]], size: int
 ) -> tuple[int, CostTable]:
-    """How many checks it takes, and the table of `constraint` over `domains` and the `size` own values.
+    """Return how many checks it takes, and the table of `constraint` over `domains` and the `size` own values.
 
     Raises `UnsupportedError` when that is too large.
     """

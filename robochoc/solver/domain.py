@@ -55,11 +55,11 @@ class CompiledDomain:
         return sum(self.counts)
 
     def solution(self, index: int) -> dict[str, int]:
-        """The values of all variables behind the value at `index`; none behind the last, which is to step aside."""
+        """Return the values of all variables for the value at `index`. Empty for the last index: withdrawal."""
         return {} if index == len(self.values) else dict(zip(self.variables, self.solutions[index], strict=True))
 
     def behind(self, value: Value) -> dict[str, int]:
-        """The same for `value`, as neighbours see it: one that the robot does not have is to step aside."""
+        """Return the same for `value`, as neighbours see it: one that the robot does not have is to step aside."""
         return self.solution(self.values.index(value) if value in self.values else len(self.values))
 
 
@@ -77,7 +77,7 @@ class _Group:
 
 
 def compile_domain(robot: Robot, solve: SolveNetwork | None = None, limit: int = MAX_SOLUTIONS) -> CompiledDomain:
-    """The compiled domain of `robot`, values in the order of its variables and their values.
+    """Return the compiled domain of `robot`, values in the order of its variables and their values.
 
     `solve` is asked for the solutions of what private constraints connect; a robot without such needs none. Raises
     `TooManySolutionsError`, and `UnsupportedError` when there is a part to solve and no `solve`.
@@ -110,14 +110,14 @@ def _solutions(robot: Robot, part: Component, solve: SolveNetwork | None, limit:
 
 
 def _is_paid_in(constraint: Constraint, part: Component, first: Component) -> bool:
-    """Whether `constraint` is on variables of `part`; one that is on constants only is paid in the `first`."""
+    """Return whether `constraint` is on variables of `part`; one that is on constants only is paid in the `first`."""
     return part is first if not constraint.variables else constraint.variables[0] in part.names
 
 
 def _grouped(
     part: Component, seen: set[str], soft: Iterable[Constraint], solutions: Iterable[Sequence[int]]
 ) -> list[_Group]:
-    """Solutions of one part that agree on its variables in `seen`, joined."""
+    """Return solutions of one part that agree on its variables in `seen`, joined."""
     shown = [place for place, name in enumerate(part.names) if name in seen]
     prices = [cost_function(constraint, part.names) for constraint in soft]
     groups: dict[Codes, _Group] = {}
@@ -130,7 +130,7 @@ def _grouped(
 
 
 def _joined(robot: Robot, names: Sequence[Sequence[str]], grouped: Sequence[Sequence[_Group]]) -> CompiledDomain:
-    """Every combination of the parts' groups."""
+    """Return every combination of the parts' groups."""
     variables = tuple(variable.name for variable in robot.variables)
     place = {name: index for index, name in enumerate(itertools.chain.from_iterable(names))}
     order = [place[name] for name in variables]

@@ -55,7 +55,7 @@ class Network:
 
     @property
     def impossible(self) -> bool:
-        """Whether it can be seen without a search that there is no solution."""
+        """Return whether it can be seen without a search that there is no solution."""
         return not all(self.domains) or any(table.allowed and not table.rows for table in self.tables)
 
 
@@ -68,14 +68,14 @@ class Component:
     network: Network
 
     def decoded(self, codes: Sequence[int]) -> tuple[int, ...]:
-        """The values behind a solution of the network."""
+        """Return the values behind a solution of the network."""
         return tuple([self.values[code] for code in codes])
 
 
 def components(
     variables: Iterable[Variable], constraints: Iterable[Constraint], together: Iterable[Sequence[str]] = ()
 ) -> list[Component]:
-    """The problem of `variables` and the hard part of `constraints`, split into what does not depend on each other.
+    """Return the connected components of `variables` under the hard part of `constraints`.
 
     Components are in the order of their first variables, variables within in their given order. Constraints are on
     `variables` only; so are the scopes in `together`, each of which is to be in one component. Raises
@@ -100,7 +100,7 @@ def components(
 
 
 def allows_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
-    """`constraint` as a test of the values of the variables `names`; what is soft is allowed."""
+    """Return `constraint` as a test of the values of the variables `names`; what is soft is allowed."""
     definition = constraint.definition
     if not isinstance(definition, Predicate):
         price = cost_function(constraint, names)
@@ -111,7 +111,10 @@ def allows_function(constraint: Constraint, names: Sequence[str]) -> Callable[[S
 
 
 def cost_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], float]:
-    """What values of the variables `names` pay at `constraint`: 0 where it holds, `INFINITE` where it is hard."""
+    """Return the cost of `constraint` as a function of the values of `names`.
+
+    The function returns 0 where the constraint holds, and `INFINITE` where a hard one is violated.
+    """
     definition = constraint.definition
     if isinstance(definition, Predicate):
         holds = _truth_on(constraint, definition, names)
@@ -122,7 +125,7 @@ def cost_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Seq
 
 
 def max_cost(constraint: Constraint) -> float:
-    """The most that `constraint` charges short of being broken."""
+    """Return the most that `constraint` charges short of being broken."""
     definition = constraint.definition
     if isinstance(definition, Predicate):
         prices: tuple[float, ...] = (constraint.cost,)
@@ -132,13 +135,13 @@ def max_cost(constraint: Constraint) -> float:
 
 
 def is_soft(constraint: Constraint) -> bool:
-    """Whether `constraint` may cost something without being broken."""
+    """Return whether `constraint` may cost something without being broken."""
     definition = constraint.definition
     return definition.semantics is Semantics.SOFT if isinstance(definition, Relation) else constraint.cost < INFINITE
 
 
 def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
-    """Whether the predicate of `constraint` is true of values of `names`; where it is undefined, it is not."""
+    """Return whether the predicate of `constraint` is true of values of `names`; where it is undefined, it is not."""
     arguments = _arguments(constraint, names)
     body = compile_expression(predicate.body, predicate.parameters)
 
@@ -152,7 +155,7 @@ def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]
 
 
 def _arguments(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], list[int]]:
-    """What the definition of `constraint` receives, of values of the variables `names`."""
+    """Return what the definition of `constraint` receives, of values of the variables `names`."""
     place = {name: index for index, name in enumerate(names)}
     terms = [(place[term], 0) if isinstance(term, str) else (None, term) for term in constraint.parameters]
     return lambda values: [constant if index is None else values[index] for index, constant in terms]
@@ -173,7 +176,7 @@ def _fold(constraint: Constraint, domains: dict[str, list[int]]) -> None:
 
 
 def _connected(names: Iterable[str], scopes: Iterable[Sequence[str]]) -> list[list[str]]:
-    """The connected components of the graph that `scopes` make, in the order of `names`."""
+    """Return the connected components of the graph that `scopes` make, in the order of `names`."""
     root = {name: name for name in names}
 
     def find(name: str) -> str:
@@ -236,7 +239,7 @@ class _Tables:
         self._made: dict[Hashable, _Rows | None] = {}
 
     def of(self, constraint: Constraint) -> _Rows | None:
-        """The tuples that `constraint` allows (of a large one: or forbids); None when it allows everything."""
+        """Return the tuples that `constraint` allows (of a large one: or forbids); None when it allows everything."""
         scope = constraint.variables
         terms = tuple([scope.index(term) if isinstance(term, str) else (term,) for term in constraint.parameters])
         alike = id(constraint.definition), terms, tuple([tuple(self._domains[name]) for name in scope])
@@ -272,7 +275,7 @@ def _rows(constraint: Constraint, domains: Mapping[str, list[int]]) -> _Rows | N
 
 
 def _listed(constraint: Constraint, relation: Relation, domains: Mapping[str, list[int]]) -> Iterable[tuple[int, ...]]:
-    """The tuples of `relation` as values of the scope: those that fit its constants, repetitions and domains."""
+    """Yield the tuples of `relation` as values of the scope: those that fit its constants, repetitions and domains."""
     scope = constraint.variables
     known = {name: set(domains[name]) for name in scope}
     for row in relation.tuples:

@@ -114,7 +114,7 @@ class _Search:
         self._left = [(1 << len(table.rows)) - 1 for table in network.tables]
 
     def _by_value(self, table: Table) -> list[dict[int, int]]:
-        """For each variable of `table` and each bit of its domain, the rows that have the value."""
+        """Return, for each variable of `table` and each bit of its domain, the rows with that value."""
         if not table.allowed:  # propagation leaves only those of which more is allowed than anybody should list
             self._budget.spend(self._budget.steps + 1)
         weight = 1 + len(table.rows) // ROWS_A_STEP
@@ -166,7 +166,7 @@ class _Search:
         return best
 
     def _below(self, domains: list[int], left: list[int], costs: Codes, least: int) -> bool:
-        """Whether something may cost less than `least`; what cannot is taken from the domains of the costs."""
+        """Return whether something may cost less than `least`; what cannot is taken from the domains of the costs."""
         spare = least - 1 - self._bound(domains, costs)
         if spare < 0:
             return False
@@ -183,11 +183,11 @@ class _Search:
         return self._propagates(domains, left, shrunk) and self._bound(domains, costs) < least
 
     def _bound(self, domains: Sequence[int], costs: Codes) -> int:
-        """What the variables at `costs` come to at least."""
+        """Return what the variables at `costs` come to at least."""
         return sum([self._code[place][domains[place] & -domains[place]] for place in costs])
 
     def _next(self, domains: Sequence[int]) -> tuple[int, bool]:
-        """A variable of more than one value, few for its degree (the first, if none has any); and if there are more."""
+        """Return the variable to branch on (dom/deg; the first if all are assigned), and whether there are others."""
         best, least, found = 0, 0.0, 0
         for place, domain in enumerate(domains):
             if domain & (domain - 1):

@@ -30,7 +30,7 @@ class Invalidated(NamedTuple):
 
 
 def held_above(robot: Robot) -> Iterator[KeyedConstraint]:
-    """The constraints that `robot` holds towards its parents.
+    """Yield the constraints that `robot` holds towards its parents.
 
     Constraints of one name with one parent share a key: a scenario that removes one of them removes all.
     """
@@ -40,19 +40,19 @@ def held_above(robot: Robot) -> Iterator[KeyedConstraint]:
 
 
 def held_below(robot: Robot) -> Iterator[tuple[str, KeyedConstraint]]:
-    """The parts of partially known constraints that `robot` holds towards its children, each with the child's name."""
+    """Yield the parts of partially known constraints that `robot` holds, each with the child's name."""
     for child in robot.children:
         for constraint in child.constraints:
             yield child.name, KeyedConstraint(f"{robot.name}>{child.name}:{constraint.name}", constraint)
 
 
 def domain_key(agent: str) -> str:
-    """The key of an agent's domain: that it has no other values than those it has."""
+    """Return the key of an agent's domain: that it has no other values than those it has."""
     return f"{agent}="
 
 
 def invalidated_by(old: Team, new: Team) -> Invalidated:
-    """What of `old` does not stand in `new`: constraints that are gone, domains that have grown, robots that left."""
+    """Return what `new` invalidates of `old`: constraints that are gone, domains that have grown, robots that left."""
     keys = set()
     agents = set()
     for robot in old.robots:
@@ -71,7 +71,7 @@ def _all_held(robot: Robot) -> list[KeyedConstraint]:
 
 
 def _has_grown(old: Robot, new: Robot) -> bool:
-    """Whether `new` may have a local solution that `old` did not have."""
+    """Return whether `new` may have a local solution that `old` did not have."""
     if [variable.name for variable in old.variables] != [variable.name for variable in new.variables]:
         return True
     if any(constraint not in new.private for constraint in old.private):

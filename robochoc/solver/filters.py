@@ -44,7 +44,7 @@ class Filters:
         """For each own value its bit in a filter."""
 
     def of(self, index: int, receiver: str) -> tuple[int, bytes]:
-        """How many pairs were evaluated, and the filter of `receiver` under the own value at `index`."""
+        """Return how many pairs were evaluated, and the filter of `receiver` under the own value at `index`."""
         made = self._made.get((index, receiver))
         if made is None:
             made = self._made[index, receiver] = self._filter(index, receiver)
@@ -73,5 +73,5 @@ def _place(value: Value, ranks: Sequence[Mapping[int | None, int]]) -> int:
 
 
 def allows(allowed: bytes, place: int) -> bool:
-    """Whether the filter `allowed` has the bit at `place`; one that is too short has no more bits."""
+    """Return whether the filter `allowed` has the bit at `place`; one that is too short has no more bits."""
     return place >> 3 < len(allowed) and bool(allowed[place >> 3] >> (place & 7) & 1)

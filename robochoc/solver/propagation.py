@@ -20,7 +20,7 @@ LARGEST_PERMUTATION = 5
 
 
 def propagate(network: Network) -> Network:
-    """`network` with the same variables and the same solutions, arc consistent; impossible, if that shows it.
+    """Return `network` with the same variables and the same solutions, arc consistent; impossible, if that shows it.
 
     Every domain has at least two values wherever a table or a `different` looks at it, and of forbidden tuples there
     are tables only where those allowed would be more than `MAX_ALLOWED_ROWS`.
@@ -55,7 +55,7 @@ class _Filter:
                 self._looking[place].append(number)
 
     def run(self) -> bool:
-        """Filter; False when a domain has run empty."""
+        """Remove values without support. Return False when a domain is empty."""
         if not all(self.domains):
             return False
         while True:
@@ -94,7 +94,7 @@ class _Filter:
             self._waiting.update(dict.fromkeys(self._looking[place]))
 
     def _tell_fixed_values(self) -> bool:
-        """Where all values differ, one that is taken is taken from the others."""
+        """Return where all values differ, one that is taken is taken from the others."""
         before = -1
         while before != (before := sum(map(len, self.domains))):
             for scope in self._different:
@@ -110,7 +110,7 @@ class _Filter:
 
 
 def is_small_permutation(scope: Codes, domains: Sequence[Codes]) -> bool:
-    """Whether variables that all differ are few, and need every value there is.
+    """Return whether variables that all differ are few, and need every value there is.
 
     ACE makes a table of these itself, and fails where a variable lacks one of the values.
     """
@@ -124,7 +124,7 @@ def _spelt_out(scope: Codes, domains: Sequence[Codes]) -> Table:
 
 
 def _allowing(table: Table, domains: Sequence[Codes]) -> Table:
-    """`table` by its allowed tuples, unless they are too many."""
+    """Return `table` by its allowed tuples, unless they are too many."""
     if table.allowed or math.prod(len(domains[place]) for place in table.scope) > MAX_ALLOWED_ROWS:
         return table
     forbidden = set(table.rows)
@@ -133,7 +133,7 @@ def _allowing(table: Table, domains: Sequence[Codes]) -> Table:
 
 
 def _without_fixed(table: Table, domains: Sequence[Codes]) -> Table:
-    """`table` on those of its variables that have a choice; all its rows agree with the values of the others."""
+    """Return `table` on those of its variables that have a choice; all its rows agree with the values of the others."""
     kept = [index for index, place in enumerate(table.scope) if len(domains[place]) > 1]
     if len(kept) == len(table.scope):
         return table

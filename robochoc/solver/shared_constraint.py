@@ -30,12 +30,12 @@ class OwnValues:
         self._coded: dict[tuple[int, ...], tuple[list[int], list[Value]]] = {}
 
     def seen(self, scope: Container[str]) -> tuple[tuple[int, ...], list[str]]:
-        """The places and names of the own variables in `scope`."""
+        """Return the places and names of the own variables in `scope`."""
         places = tuple([place for place, name in enumerate(self._names) if name in scope])
         return places, [self._names[place] for place in places]
 
     def codes(self, places: tuple[int, ...]) -> tuple[list[int], list[Value]]:
-        """For each value its code, and for each code what it stands for, when only `places` are looked at."""
+        """Return the code of each value, and the values of `places` that each code stands for."""
         if places not in self._coded:
             codes: dict[Value, int] = {}
             coded = [codes.setdefault(tuple([value[place] for place in places]), len(codes)) for value in self._values]
@@ -43,7 +43,7 @@ class OwnValues:
         return self._coded[places]
 
     def shown(self, index: int, places: Container[int]) -> Value:
-        """The value at `index`, where only `places` matter."""
+        """Return the value at `index`, where only `places` matter."""
         return tuple([part if place in places else None for place, part in enumerate(self._values[index])])
 
 
@@ -89,7 +89,7 @@ class SharedConstraint:
         self.codes, self._distinct = own.codes(self._places)
 
     def other_values(self, view: Mapping[str, Value]) -> OtherValues | None:
-        """What the constraint sees in `view`; None as long as a part of it is unknown, or has stepped aside."""
+        """Return what the constraint sees in `view`; None as long as a part of it is unknown, or has stepped aside."""
         try:
             seen = [view[agent][place] for agent, place in self._seen]
         except KeyError:
@@ -97,11 +97,11 @@ class SharedConstraint:
         return None if None in seen else tuple(seen)  # type: ignore[arg-type]
 
     def holds(self, others: OtherValues) -> list[bool]:
-        """For each code of own values, whether it goes with `others`."""
+        """Return, for each code of own values, whether it is consistent with `others`."""
         return [self._holds((*others, *own)) for own in self._distinct]
 
     def _holds(self, values: Sequence[int | None]) -> bool:
-        """Whether the constraint holds on `values`; of a robot that steps aside (None) it asks nothing."""
+        """Return whether the constraint holds on `values`; of a robot that steps aside (None) it asks nothing."""
         return None in values or self._test(values)  # type: ignore[arg-type]
 
     @property
@@ -110,7 +110,7 @@ class SharedConstraint:
         return max_cost(self._constraint)
 
     def costs(self, others: OtherValues) -> list[float]:
-        """What each own value pays when the others are as `others` says."""
+        """Return what each own value pays when the others are as `others` says."""
         prices = self._costs.get(others)
         if prices is None:
             paid = [0 if None in own else self._price((*others, *own)) for own in self._distinct]  # type: ignore[arg-type]
@@ -118,7 +118,7 @@ class SharedConstraint:
         return prices
 
     def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[float]]:
-        """How many checks it takes, and what each own value pays at the least; the others' variables are in `domains`.
+        """Return the number of checks, and a lower bound on the cost of each own value over the others' `domains`.
 
         With more than `wide` combinations nobody looks, and it is 0.
         """
@@ -136,7 +136,7 @@ class SharedConstraint:
         return checks, least
 
     def mask(self, others: OtherValues) -> int:
-        """The own values that go with `others`: bit i for the i-th."""
+        """Return the own values that go with `others`: bit i for the i-th."""
         mask = self._masks.get(others)
         if mask is None:
             holds = self.holds(others)
@@ -145,11 +145,11 @@ class SharedConstraint:
         return mask
 
     def own_part(self, index: int) -> Value:
-        """What the constraint looks at of the own value at `index`; None elsewhere."""
+        """Return what the constraint looks at of the own value at `index`; None elsewhere."""
         return self._own.shown(index, self._places)
 
     def row(self, index: int, columns: Sequence[Sequence[int]]) -> tuple[int, list[bool]]:
-        """Which values of the one other robot go with the own value at `index`; and how many pairs were evaluated.
+        """Return which values of the one other robot go with the own value at `index`, and the number of checks.
 
         `columns` are the values of that robot's variables; the answers follow their product, as `itertools` makes it.
         Every pair that the constraint can tell apart is evaluated once, whatever the answers are.
@@ -162,7 +162,7 @@ class SharedConstraint:
         return len(holds), [holds[tuple([value[place] for place in places])] for value in values]
 
     def conflict(self, others: OtherValues) -> Conflict:
-        """`others` as a nogood's left side: one object for one combination, not to be changed."""
+        """Return `others` as a nogood's left side: one object for one combination, not to be changed."""
         conflict = self._conflicts.get(others)
         if conflict is None:
             parts: dict[str, list[int | None]] = {agent: [None] * self._widths[agent] for agent in self.agents}
@@ -175,7 +175,7 @@ class SharedConstraint:
 def sorted_by_lowest_agent(
     constraints: Iterable[SharedConstraint], rank: Mapping[str, int]
 ) -> tuple[SharedConstraint, ...]:
-    """`constraints` in the order of their lowest other robot, the highest first."""
+    """Return `constraints` in the order of their lowest other robot, the highest first."""
     return tuple(
         sorted(constraints, key=lambda c: (max((rank[agent] for agent in c.agents), default=-1), len(c.agents)))
     )

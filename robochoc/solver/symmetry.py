@@ -27,11 +27,11 @@ class Symmetry(NamedTuple):
     reflects: bool
 
     def then(self, other: Symmetry) -> Symmetry:
-        """First this one, then `other`."""
+        """Return the composition: first this one, then `other`."""
         return Symmetry(tuple([other.image[place] for place in self.image]), self.reflects != other.reflects)
 
     def applied(self, solution: Codes, highest: int) -> Codes:
-        """What `solution` becomes; `highest` is the largest code of the network."""
+        """Return what `solution` becomes; `highest` is the largest code of the network."""
         moved = [0] * len(solution)
         for place, code in zip(self.image, solution, strict=True):
             moved[place] = highest - code if self.reflects else code
@@ -39,7 +39,7 @@ class Symmetry(NamedTuple):
 
 
 def symmetries(part: Component) -> tuple[Symmetry, ...]:
-    """A group of symmetries of the network of `part`, without the identity; empty when none was found."""
+    """Return a group of symmetries of the network of `part`, without the identity; empty when none was found."""
     network = part.network
     identity = Symmetry(tuple(range(len(part.names))), reflects=False)
     is_symmetry = _verifier(network)
@@ -55,7 +55,7 @@ def symmetries(part: Component) -> tuple[Symmetry, ...]:
 
 
 def break_symmetries(network: Network, group: Sequence[Symmetry]) -> Network:
-    """`network` without most of those solutions that are not the first of their orbit.
+    """Return `network` without most of those solutions that are not the first of their orbit.
 
     x is the first if x <= g(x) for every g. Of that the first place where g may change something is demanded: all
     before it are equal, whatever x is.
@@ -80,7 +80,7 @@ def break_symmetries(network: Network, group: Sequence[Symmetry]) -> Network:
 
 
 def orbits(solutions: Sequence[Codes], group: Sequence[Symmetry], network: Network) -> set[Codes]:
-    """`solutions` and all that `group` makes of them."""
+    """Return `solutions` and all that `group` makes of them."""
     highest = _highest(network)
     return {image for one in solutions for image in (one, *(g.applied(one, highest) for g in group))}
 
@@ -90,7 +90,7 @@ def _highest(network: Network) -> int:
 
 
 def _guesses(names: Sequence[str]) -> Iterator[Symmetry]:
-    """Symmetries that a problem whose variables are called `names` might have."""
+    """Yield symmetries that a problem whose variables are called `names` might have."""
     yield Symmetry(tuple(range(len(names))), reflects=True)
     coordinates = [tuple(map(int, _NUMBER.findall(name)[:3])) for name in names]
     place = {coordinate: index for index, coordinate in enumerate(coordinates)}
@@ -102,7 +102,7 @@ def _guesses(names: Sequence[str]) -> Iterator[Symmetry]:
 
 
 def _moves(coordinates: Sequence[tuple[int, ...]]) -> Iterator[list[tuple[int, ...]]]:
-    """Every axis turned around, and every two exchanged."""
+    """Yield every axis turned around, and every two exchanged."""
     axes = range(len(coordinates[0]))
     for axis in axes:
         seen = {coordinate[axis] for coordinate in coordinates}
@@ -114,7 +114,7 @@ def _moves(coordinates: Sequence[tuple[int, ...]]) -> Iterator[list[tuple[int, .
 
 
 def _verifier(network: Network) -> Callable[[Symmetry], bool]:
-    """A test whether a guess turns `network` into itself."""
+    """Yield a test whether a guess turns `network` into itself."""
     highest = _highest(network)
     content: dict[Hashable, frozenset[Codes]] = {}
 

@@ -19,7 +19,7 @@ MAX_SPREAD = 2**31 - 1
 
 
 def team_network(team: Team) -> tuple[Network, Codes]:
-    """All variables of `team`, in its order, with all its constraints; codes are values.
+    """Return all variables of `team`, in its order, with all its constraints; codes are values.
 
     Unary constraints are folded into domains, cliques of `ne` are said outright. What soft constraints charge are
     variables too, after the others: those at the places that are returned, whose sum is what the problem costs.
@@ -93,7 +93,7 @@ def _refuse_far_values(team: Team, domains: Mapping[str, Codes]) -> None:
 
 
 def _charges(part: Component, places: Sequence[int], soft: Sequence[Constraint]) -> Iterator[Table]:
-    """Tables of values and what they are charged, in a column whose variable is still to come."""
+    """Return tables of values and their costs, the latter in a column whose variable is not there yet."""
     for scope, prices in costs_by_scope(part, part.network, soft).items():
         if prices:
             rows = tuple((*part.decoded(codes), int(price)) for codes, price in prices.items())
@@ -101,7 +101,7 @@ def _charges(part: Component, places: Sequence[int], soft: Sequence[Constraint])
 
 
 def identifiers(names: Sequence[str]) -> list[str]:
-    """Names as XCSP3 takes them (letters, digits, `_`, a letter first), each a different one."""
+    """Return names as XCSP3 takes them (letters, digits, `_`, a letter first), each a different one."""
     taken: set[str] = set()
     found = []
     for name in names:

@@ -48,18 +48,18 @@ class WeightedComponent:
     unit: int
 
     def cost(self, codes: Sequence[int]) -> int:
-        """What a solution of `network` costs."""
+        """Return what a solution of `network` costs."""
         return self.base + self.unit * sum(codes[place] for place in self.costs)
 
     def decoded(self, codes: Sequence[int]) -> dict[str, int]:
-        """The values of the variables behind a solution of `network`; those that are aside have none."""
+        """Return the values of the variables behind a solution of `network`; those that are aside have none."""
         values = self.part.values
         own = zip(self.part.names, codes, strict=False)
         return {name: values[code] for name, code in own if code < len(values)}
 
 
 def weighted_components(variables: Iterable[Variable], constraints: Sequence[Constraint]) -> list[WeightedComponent]:
-    """The problem of `variables` and `constraints`, split into what does not depend on each other.
+    """Return the problem of `variables` and `constraints`, split into what does not depend on each other.
 
     What constraints on constants charge is left out. Raises `UnsupportedError` when a constraint has too many tuples,
     or charges are too high.
@@ -74,7 +74,7 @@ def weighted_components(variables: Iterable[Variable], constraints: Sequence[Con
 
 
 def constant_costs(team: Team) -> int:
-    """What soft constraints on constants only charge."""
+    """Return what soft constraints on constants only charge."""
     fixed = (cost_function(constraint, ())(()) for constraint in team.constraints() if not constraint.variables)
     return int(sum(price for price in fixed if price < INFINITE))
 
@@ -87,7 +87,7 @@ def _priced(part: Component, soft: Iterable[Constraint]) -> WeightedComponent:
 
 
 def costs_by_scope(part: Component, network: Network, soft: Iterable[Constraint]) -> dict[Codes, CostRows]:
-    """What `soft` constraints on variables of `part` charge, by scope, for the codes that `network` leaves."""
+    """Return what `soft` constraints on variables of `part` charge, by scope, for the codes that `network` leaves."""
     together = _by_scope(part, soft)
     _join_unary(together)
     return {scope: _prices(part, network, scope, held) for scope, held in together.items()}
@@ -102,7 +102,7 @@ def _by_scope(part: Component, soft: Iterable[Constraint]) -> dict[Codes, list[C
 
 
 def with_cost_variables(part: Component, network: Network, charges: Mapping[Codes, CostRows]) -> WeightedComponent:
-    """`network`, which is that of `part`, with a variable for every scope that is charged.
+    """Return `network`, which is that of `part`, with a variable for every scope that is charged.
 
     Combinations of codes that a scope has no price for are forbidden. Raises `UnsupportedError` when they are too high.
     """
@@ -126,7 +126,9 @@ def with_cost_variables(part: Component, network: Network, charges: Mapping[Code
 
 
 def components_with_withdrawal(team: Team, aside: int) -> list[WeightedComponent]:
-    """The problem of `team`, where a robot of weight 1 may step aside for the price `aside`, with all its constraints.
+    """Return the components of `team`, where robots may withdraw, with all their constraints.
+
+    `aside` is the cost of withdrawing a robot of weight 1.
 
     Its variables then have a code that stands for no value.
     """
@@ -158,7 +160,7 @@ def components_with_withdrawal(team: Team, aside: int) -> list[WeightedComponent
 
 
 def _unless_absent(table: Table, domains: Sequence[Codes], absent: int) -> Table:
-    """`table`, which says nothing where one of its variables has the code `absent`."""
+    """Return `table`, which says nothing where one of its variables has the code `absent`."""
     if not table.allowed:
         return table
     return replace(table, rows=(*table.rows, *_absences([domains[place] for place in table.scope], absent)))
@@ -170,13 +172,13 @@ def _free_if_absent(prices: CostRows, scope: Codes, network: Network, absent: in
 
 
 def _absences(domains: Sequence[Codes], absent: int) -> Iterable[Codes]:
-    """All combinations of codes of `domains` in which at least one is replaced by `absent`."""
+    """Return all combinations of codes of `domains` in which at least one is replaced by `absent`."""
     wider = itertools.product(*((*domain, absent) for domain in domains))
     return (row for row in wider if absent in row)
 
 
 def _all_or_none(network: Network, first: int, others: Iterable[int], absent: int) -> Iterable[Table]:
-    """The variables of one robot are absent together."""
+    """Yield the variables of one robot are absent together."""
     for other in others:
         rows = itertools.product(network.domains[first], network.domains[other])
         alike = tuple(row for row in rows if (row[0] == absent) == (row[1] == absent))
@@ -191,7 +193,7 @@ def _join_unary(together: dict[Codes, list[Constraint]]) -> None:
 
 
 def _prices(part: Component, network: Network, scope: Codes, charging: Iterable[Constraint]) -> CostRows:
-    """What constraints on variables at places of `scope` charge for each combination of their codes."""
+    """Return what constraints on variables at places of `scope` charge for each combination of their codes."""
     size = math.prod(len(network.domains[place]) for place in scope)
     if size > MAX_COST_ROWS:
         names = ", ".join(constraint.name for constraint in charging)

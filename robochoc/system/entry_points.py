@@ -72,13 +72,13 @@ def entry_points(group: str) -> Sequence[EntryPoint]:
 
 
 def _unusual() -> bool:
-    """Whether packages may stand elsewhere than in folders on `sys.path`."""
+    """Return whether packages may stand elsewhere than in folders on `sys.path`."""
     others = (finder for finder in sys.meta_path if finder is not PathFinder)
     return any(hasattr(finder, "find_distributions") for finder in others) or any(map(os.path.isfile, sys.path))
 
 
 def _folders() -> Iterator[str]:
-    """The metadata folders of packages, in the order of `sys.path`."""
+    """Yield the metadata folders of packages, in the order of `sys.path`."""
     known = set()
     for place in sys.path:
         try:

@@ -30,7 +30,7 @@ def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
     os.close(_replaced(resolved(path), content, mode))
 
 
-class Growing:
+class AppendableFile:
     """A file that takes the place of `path` once its `beginning` is written, and then grows.
 
     Whoever looks sees the old file, or the beginning and whatever was appended since. Otherwise as
@@ -79,11 +79,11 @@ class Growing:
         self._torn = False
 
     def close(self) -> None:
-        """Nothing more will come."""
+        """Close the file."""
         os.close(self._descriptor)
 
 
-class Unfinished:
+class PendingFile:
     """A file that takes the place of `path` when it is complete: write to `stream`, then `keep` or `discard` it.
 
     Whoever looks meanwhile sees the old file. Where Linux allows it the new one has no name until then, so that not
@@ -126,7 +126,7 @@ class Unfinished:
             self._named = None
 
     def _copied(self) -> Path:
-        """The same once more, with a name: for systems that give none to what had none."""
+        """Return the same once more, with a name: for systems that give none to what had none."""
         import shutil  # noqa: PLC0415 - start-up: seldom needed
 
         self._named = _beside(self._target)
@@ -164,7 +164,7 @@ def _replaced(target: Path, content: bytes, mode: int) -> int:
 
 
 def _stream_to(path: Path) -> int | None:
-    """The standard stream that goes to `path`: to replace the file would take away what was written there."""
+    """Return the standard stream that goes to `path`: to replace the file would take away what was written there."""
     for stream in (1, 2):
         with suppress(OSError):
             if os.path.samestat(path.stat(), os.fstat(stream)):
@@ -173,7 +173,7 @@ def _stream_to(path: Path) -> int | None:
 
 
 def _written_unnamed(target: Path, content: bytes, mode: int) -> tuple[int, Path] | None:
-    """The complete file beside `target`, named at the last moment; None where the system cannot do that."""
+    """Return the complete file beside `target`, named at the last moment; None where the system cannot do that."""
     descriptor = _unnamed(target, mode)
     if descriptor is None:
         return None
@@ -190,7 +190,7 @@ def _written_unnamed(target: Path, content: bytes, mode: int) -> tuple[int, Path
 
 
 def _unnamed(target: Path, mode: int) -> int | None:
-    """A file without a name in the folder of `target`, open for writing and reading; None where there are none."""
+    """Return a descriptor of an unnamed file in the folder of `target`. None: the system has no unnamed files."""
     if not hasattr(os, "O_TMPFILE"):
         return None
     try:
@@ -202,7 +202,7 @@ def _unnamed(target: Path, mode: int) -> int | None:
 
 
 def _linked(descriptor: int, target: Path) -> Path | None:
-    """A hidden name beside `target` for the file that has none; None where the system cannot do that."""
+    """Return a hidden name beside `target` for the file that has none; None where the system cannot do that."""
     complete = _beside(target)
     try:
         # Only with a folder's descriptor does Python ask the kernel to follow the link in /proc.
@@ -231,7 +231,7 @@ def _write_all(descriptor: int, content: bytes) -> None:
 
 
 def _beside(target: Path) -> Path:
-    """A hidden name in the same folder that nobody has; short enough whatever `target` is called."""
+    """Return a hidden name in the same folder that nobody has; short enough whatever `target` is called."""
     import secrets  # noqa: PLC0415 - start-up: who only reads needs no names
 
     return target.with_name(f".{secrets.token_hex(8)}.part")

@@ -21,8 +21,8 @@ class Loaded(NamedTuple):
     broken: str
 
 
-def entries(group: str) -> Sequence[EntryPoint]:
-    """All that is offered under `group`, in no order.
+def installed_entry_points(group: str) -> Sequence[EntryPoint]:
+    """Return all that is offered under `group`, in no order.
 
     What every installed package offers takes as long to read as a small run takes. It is read anew where a package may
     have come or gone, which changes the folder that holds it.
@@ -42,34 +42,34 @@ def _changed_ns(place: str) -> int:
         return 0
 
 
-def names_in(group: str) -> tuple[str, ...]:
-    """The names of all that is installed, ours and others', sorted."""
-    return tuple(sorted({entry.name for entry in entries(group)}))
+def entry_point_names(group: str) -> tuple[str, ...]:
+    """Return the names of all that is installed, ours and others', sorted."""
+    return tuple(sorted({entry.name for entry in installed_entry_points(group)}))
 
 
-def all_in(group: str) -> list[tuple[EntryPoint, list[EntryPoint]]]:
-    """Every entry, by name, with those of its name (itself among them)."""
-    found = sorted(entries(group), key=lambda entry: entry.name)
+def all_entry_points(group: str) -> list[tuple[EntryPoint, list[EntryPoint]]]:
+    """Return every entry, by name, with those of its name (itself among them)."""
+    found = sorted(installed_entry_points(group), key=lambda entry: entry.name)
     return [(entry, [other for other in found if other.name == entry.name]) for entry in found]
 
 
-def named(group: str, name: str) -> list[EntryPoint]:
-    """All entries of that name; more than one where packages do not agree whose it is."""
-    return [entry for entry in entries(group) if entry.name == name]
+def entry_points_named(group: str, name: str) -> list[EntryPoint]:
+    """Return all entries of that name; more than one where packages do not agree whose it is."""
+    return [entry for entry in installed_entry_points(group) if entry.name == name]
 
 
-def missing(group: str, kind: str, name: str) -> str:
-    """That nothing of that name is installed, what is, and what may have been meant."""
+def not_installed_message(group: str, kind: str, name: str) -> str:
+    """Return that nothing of that name is installed, what is, and what may have been meant."""
     import difflib  # noqa: PLC0415 - start-up: only mistakes need it
 
-    names = names_in(group)
+    names = entry_point_names(group)
     near = difflib.get_close_matches(name.lower(), names, 1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     return f"no {kind} {name!r} is installed, only: {', '.join(names) or 'none'}{hint}"
 
 
-def loaded(entry: EntryPoint, namesakes: Sequence[EntryPoint], fault: Fault) -> Loaded:
-    """What stands behind `entry`. Whatever goes wrong is told: one broken package must not hide the others."""
+def load_entry_point(entry: EntryPoint, namesakes: Sequence[EntryPoint], fault: Fault) -> Loaded:
+    """Return what stands behind `entry`. Whatever goes wrong is told: one broken package must not hide the others."""
     if len(namesakes) > 1:
         places = " and ".join(sorted(f"{one.value} ({one.dist.name if one.dist else 'unknown'})" for one in namesakes))
         return Loaded(None, f"is offered by several packages, and only one may: {places}")

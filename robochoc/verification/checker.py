@@ -20,7 +20,7 @@ class RefutedError(Exception):
 
 
 def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = ()) -> Iterator[str]:
-    """Why `assignment` is no answer for the robots of `team` that have not withdrawn; nothing when it is one.
+    """Yield why `assignment` is no answer for the robots of `team` that have not withdrawn; nothing when it is one.
 
     Every variable of a flying robot has a value of its domain and every constraint among flying robots holds.
     """
@@ -41,13 +41,13 @@ def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = 
 
 
 def assignment_cost(team: Team, assignment: Assignment) -> float:
-    """What `assignment` pays in all, over the constraints whose variables it covers."""
+    """Return what `assignment` pays in all, over the constraints whose variables it covers."""
     met = (c for c in team.constraints() if all(name in assignment for name in c.variables))
     return sum(constraint_cost(constraint, assignment) for constraint in met)
 
 
 def needlessly_withdrawn(team: Team, assignment: Assignment, withdrawn: Collection[str]) -> Iterator[str]:
-    """Robots that stepped aside although they had a place beside those that fly.
+    """Yield robots that stepped aside although they had a place beside those that fly.
 
     A robot of many variables is given `MAX_TRIES` tries; who has found no place by then is believed.
     """
@@ -60,7 +60,7 @@ def needlessly_withdrawn(team: Team, assignment: Assignment, withdrawn: Collecti
 
 
 def has_local_solution(robot: Robot) -> bool | None:
-    """Whether the private constraints leave `robot` a solution, by trying; None when `MAX_TRIES` tries were too few."""
+    """Return whether the private constraints of `robot` have a solution. None: `MAX_TRIES` tries were too few."""
     tries = [MAX_TRIES]
     if _has_a_place(robot.variables, {}, robot.private, tries):
         return True
@@ -70,7 +70,7 @@ def has_local_solution(robot: Robot) -> bool | None:
 def _has_a_place(
     open_still: Sequence[Variable], assignment: Assignment, own: Sequence[Constraint], tries: list[int]
 ) -> bool:
-    """Whether values for `open_still` can be added to `assignment` without breaking one of `own`."""
+    """Return whether values for `open_still` can be added to `assignment` without breaking one of `own`."""
     if not open_still:
         return True
     first, *rest = open_still
@@ -88,7 +88,7 @@ def _has_a_place(
 
 
 def constraint_cost(constraint: Constraint, assignment: Assignment) -> float:
-    """What `assignment` pays at `constraint`: 0 where it holds, `INFINITE` where it is broken and hard."""
+    """Return what `assignment` pays at `constraint`: 0 where it holds, `INFINITE` where it is broken and hard."""
     values = tuple(assignment[term] if isinstance(term, str) else term for term in constraint.parameters)
     definition = constraint.definition
     if isinstance(definition, Relation):

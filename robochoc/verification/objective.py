@@ -34,7 +34,7 @@ class Objective:
         self._absent = set(self._weights)
 
     def change(self, own: Mapping[str, Mapping[str, int]]) -> None:
-        """Some robots have their `own` values from now on."""
+        """Set the values of some robots to `own`."""
         touched: dict[int, None] = {}
         for robot, values in own.items():
             for name in self._variables[robot]:
@@ -58,12 +58,12 @@ class Objective:
 
     @property
     def cost(self) -> float:
-        """What it comes to now."""
+        """Return what it comes to now."""
         if self._absent and self._aside is None:
             return INFINITE
         return sum(self._paid) + sum(self._weights[name] for name in self._absent) * (self._aside or 0)
 
 
 def withdrawal_cost(team: Team) -> float:
-    """What stepping aside has to cost, for a robot of weight 1, so that nobody does so to spare others their costs."""
+    """Return the cost of withdrawing a robot of weight 1. It is so high that no robot withdraws to save costs."""
     return 1 + sum(max_cost(constraint) for constraint in team.constraints())

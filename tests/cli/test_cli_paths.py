@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.system.files import Growing, Unfinished, resolved, write_atomically
+from robochoc.system.files import AppendableFile, PendingFile, resolved, write_atomically
 from tests.support.program import robochoc_within
 
 RESULT = {
@@ -114,7 +114,7 @@ def test_links_in_a_circle_are_one_line(words: tuple[str, ...], circle: Path, fo
 
 
 @pytest.mark.parametrize(
-    "write", [resolved, Unfinished, lambda path: write_atomically(path, b""), lambda path: Growing(path, b"")]
+    "write", [resolved, PendingFile, lambda path: write_atomically(path, b""), lambda path: AppendableFile(path, b"")]
 )
 def test_what_writes_files_says_it_as_an_os_error(write: Callable[[Path], object], circle: Path) -> None:
     with pytest.raises(OSError, match="Too many levels"):

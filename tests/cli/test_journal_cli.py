@@ -18,7 +18,7 @@ from click.testing import CliRunner, Result
 from robochoc.cli.group import cli
 from robochoc.cli.reports.failures import INVALID, USAGE
 from robochoc.journal.events import AnyEvent, Began, Decided, Received, Sent, Settled
-from robochoc.journal.journal import Header, Journal, Recorder, read_journal
+from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
 from robochoc.sniffer.acl import parse
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.export import MOST_ARROWS, drawable, mermaid
@@ -31,7 +31,7 @@ NAME = "R;#1\nend"
 
 
 def content_of(journal: Journal) -> bytes:
-    recorder = Recorder(journal.header)
+    recorder = JournalRecorder(journal.header)
     for event in journal.events:
         recorder(event)
     recorder.outcome = journal.outcome
@@ -70,7 +70,7 @@ def test_show_says_what_is_in_it(file: Path) -> None:
 
 
 def test_show_tells_of_an_end_that_is_missing_and_keeps_names_on_their_lines(tmp_path: Path) -> None:
-    recorder = Recorder(Header(team="x\n\x1b[2Jy", protocol="abt", runtime="network", seed=1, order=("a", "b")))
+    recorder = JournalRecorder(Header(team="x\n\x1b[2Jy", protocol="abt", runtime="network", seed=1, order=("a", "b")))
     recorder(Settled(t=0, robot="a\nb", clock=0, checks=0))
     path = tmp_path / "broken.journal"
     path.write_bytes(recorder.content())

@@ -15,7 +15,7 @@ from robochoc.cli.reports.failures import INVALID, LOST, USAGE
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Sent
-from robochoc.journal.journal import Journal, Recorder, lines_of
+from robochoc.journal.journal import Journal, JournalRecorder, lines_of
 from robochoc.model.outcome import Verdict
 from robochoc.run.options import Options, Runtime, Withdrawal
 from tests.support.replays import recorded, with_events, without_given
@@ -37,7 +37,7 @@ def two() -> Journal:
 
 def written(journal: Journal, path: Path) -> Path:
     """The journal as a file."""
-    recorder = Recorder(journal.header)
+    recorder = JournalRecorder(journal.header)
     for event in journal.events:
         recorder(event)
     recorder.outcome = journal.outcome
@@ -96,7 +96,7 @@ def test_the_same_in_json(two: Journal, tmp_path: Path) -> None:
 
 
 def test_one_that_breaks_off(two: Journal, tmp_path: Path) -> None:
-    recorder = Recorder(two.header)
+    recorder = JournalRecorder(two.header)
     for event in two.events[: len(two.events) // 2]:
         recorder(event)
     (tmp_path / "journal").write_bytes(recorder.content())
@@ -140,7 +140,7 @@ def test_one_without_its_end_says_how_far_it_goes(two: Journal, tmp_path: Path) 
 
 def many_blocks(journal: Journal) -> bytes:
     """The journal of a run that told of each event at once."""
-    recorder = Recorder(journal.header)
+    recorder = JournalRecorder(journal.header)
     for event in journal.events:
         recorder(event)
         recorder.flush()

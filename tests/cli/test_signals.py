@@ -26,7 +26,7 @@ from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import Registered, Sent
-from robochoc.journal.journal import Follower, Line, read_journal
+from robochoc.journal.journal import Follower, JournalEntry, read_journal
 from robochoc.model.problem import Team
 from tests.support.faults import PROGRAM, Run, gone_within_s, ignores_ctrl_c, running, wait_until
 
@@ -173,7 +173,7 @@ class Watched:
         self._journal = run.home / "run.journal"
         self._file: BinaryIO | None = None
         self._follower: Follower | None = None
-        self._kinds: set[type[Line]] = set()
+        self._kinds: set[type[JournalEntry]] = set()
         self._solvers: set[int] = set()
 
     def __enter__(self) -> Self:
@@ -223,7 +223,7 @@ class Watched:
             self._solvers.add(solver)
         return len(self._solvers) > 1
 
-    def told(self, kind: type[Line]) -> bool:
+    def told(self, kind: type[JournalEntry]) -> bool:
         """Whether the journal has told of such an event."""
         if self._follower is None:
             if not self._journal.exists():

@@ -136,7 +136,7 @@ def test_many_values_are_looked_up_as_few_are(monkeypatch: pytest.MonkeyPatch) -
         seed = chance.getrandbits(32)
         results = []
         for large in (1, 10**9):
-            monkeypatch.setattr(compiled, "LARGE", large)
+            monkeypatch.setattr(compiled, "MIN_TABLE_VALUES", large)
             results.append(Simulation(by_itself, protocol_named("abt"), Concurrent(seed, 20)).run(60))
         walked, tables = (replace(result, metrics=replace(result.metrics, wall_s=0)) for result in results)
         assert walked == tables

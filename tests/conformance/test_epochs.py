@@ -7,7 +7,7 @@ from random import Random
 
 import pytest
 
-from robochoc.journal.journal import Header, Recorder, metrics_of, read_journal
+from robochoc.journal.journal import Header, JournalRecorder, metrics_of, read_journal
 from robochoc.model.orders import Order
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import (
@@ -180,7 +180,7 @@ def test_a_problem_that_does_not_change_has_no_epochs() -> None:
 @pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 def test_the_journal_says_what_the_metrics_say(runtime: Runtime) -> None:
     team = random_changing_team(Random(5), 6)
-    recorder = Recorder(Header(team=team.name, protocol="dynabt", runtime=runtime, seed=0))
+    recorder = JournalRecorder(Header(team=team.name, protocol="dynabt", runtime=runtime, seed=0))
     outcome = solve(team, replace(SIMULATED, runtime=runtime), observer=recorder)
     told = metrics_of(read_journal(recorder.content()).events)
     assert (told.messages, told.bytes, told.ncccs) == (

@@ -18,8 +18,8 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.flight.mission import mission_of
 from robochoc.formats import InvalidInputError, read_team, write_team
 from robochoc.formats.result import ResultError, read_result, result_json
-from robochoc.journal.blocks import BEGINNING, PREAMBLE, JournalDamagedError, Unframer, framed
-from robochoc.journal.journal import Header, JournalError, Recorder, lines_of, read_journal
+from robochoc.journal.blocks import BEGINNING, PREAMBLE, BlockReader, JournalDamagedError, frame_block
+from robochoc.journal.journal import Header, JournalError, JournalRecorder, lines_of, read_journal
 from robochoc.model.outcome import EpochOutcome, Metrics, Outcome, PseudoTreeNode, Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.abt import ABT
@@ -213,7 +213,9 @@ def journals() -> Sequence[bytes]:
 def _journal(team: Team, protocol: type[ABT | DPOP]) -> bytes:
     blocks: list[bytes] = []
     name = protocol.__name__.lower()
-    recorder = Recorder(Header(team=team.name, protocol=name, runtime="simulator", seed=0), sinks=[blocks.append])
+    recorder = JournalRecorder(
+        Header(team=team.name, protocol=name, runtime="simulator", seed=0), sinks=[blocks.append]
+    )
     result = Simulation(team, protocol, Concurrent(seed=0), observer=recorder).run()
     recorder.flush()
     recorder.outcome = Outcome(team.name, name, "simulator", 0, result.verdict or Verdict.SOLUTION)
@@ -231,7 +233,7 @@ def spoilt_journal(chance: Random, content: bytes) -> bytes:
     """Spoil what a block holds and give it a right checksum again, or spoil the file."""
     if chance.random() < 0.2:
         return spoilt_bytes(chance, content)
-    unframer = Unframer()
+    unframer = BlockReader()
     unframer.feed(content)
     try:
         contents = list(iter(unframer.next, None))
@@ -243,7 +245,7 @@ def spoilt_journal(chance: Random, content: bytes) -> bytes:
     contents[at] = one_of(spoilt_msgpack, spoilt_msgpack, spoilt_bytes)(chance, contents[at])
     journal, digest = PREAMBLE, BEGINNING
     for each in contents:
-        block, digest = framed(each, digest)
+        block, digest = frame_block(each, digest)
         journal += block
     return journal
 

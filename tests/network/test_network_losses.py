@@ -8,12 +8,16 @@ from pathlib import Path
 
 import pytest
 
+from robochoc.communication.kill_schedule import Kill
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.formats import PREDEFINED
+from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Lost, Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint
+from robochoc.run.options import OnLoss, Options, Runtime
+from robochoc.run.orchestrator import solve
 from robochoc.run.registry import protocol_named
 from robochoc.run.scenario import FinishedEpoch, ScenarioRun
 from robochoc.solver.agent_problem import RunParameters
@@ -70,3 +74,10 @@ def test_who_is_asked_to_show_more_is_not_misread() -> None:
         result = network.search(60)
     assert result.verdict is Verdict.SOLUTION
     assert not list(violations(team, {**result.assignments["A"], **result.assignments["B"]}))
+
+
+def test_a_robot_that_is_killed_at_a_set_time() -> None:
+    options = Options(runtime=Runtime.NETWORK, kill=(Kill("Robot2.2", 0),), on_loss=OnLoss.WITHDRAW)
+    outcome = solve(queens3d(4), options)
+    assert outcome.epochs[0].lost == ("Robot2.2",)
+    assert len(outcome.epochs[1].robots) == 15

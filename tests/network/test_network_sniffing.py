@@ -22,7 +22,7 @@ from robochoc.communication.network.framing import MASTER, Framing
 from robochoc.communication.network.inbox import Arrived
 from robochoc.communication.network.journal_server import ANSWERED_AT_MOST, Publication, piece_in, question
 from robochoc.communication.network.transport import CannotConnectError
-from robochoc.journal.blocks import BEGINNING, PREAMBLE, framed
+from robochoc.journal.blocks import BEGINNING, PREAMBLE, frame_block
 from robochoc.model.outcome import Verdict
 from robochoc.run.networked.address import Address
 from robochoc.run.networked.consult import NoAnswerError
@@ -58,7 +58,7 @@ def blocks(count: int) -> list[bytes]:
     """The first `count` blocks of a journal; what they hold is nobody's concern here."""
     made, digest = [], BEGINNING
     for number in range(count):
-        framing, digest = framed(Random(number).randbytes(BLOCK), digest)
+        framing, digest = frame_block(Random(number).randbytes(BLOCK), digest)
         made.append(framing)
     return [PREAMBLE + made[0], *made[1:]]
 

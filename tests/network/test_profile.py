@@ -32,8 +32,8 @@ from robochoc.communication.network.profile import (
 )
 from robochoc.formats import read_team
 from robochoc.formats.extension import MAX_VALUES
-from robochoc.model.change import without_robots
 from robochoc.model.problem import Domain, ProblemKind, Robot, Team
+from robochoc.model.team_edits import without_robots
 from robochoc.protocols.traits import Traits
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters, agent_problems
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam

@@ -204,7 +204,7 @@ def unsaid(team: Team, name: str) -> list[tuple[str, Message]]:
 
 
 def test_a_domain_too_large_for_a_filter_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(filters, "LARGEST", 2)
+    monkeypatch.setattr(filters, "MAX_FILTER_BITS", 2)
     Simulation(pkc_pair(pkc_part("AB"), None), DisFC, Concurrent(0))
     with pytest.raises(UnsupportedError, match="RA shows its neighbours 3 combinations of values"):
         Simulation(triangle(), DisFC, Concurrent(0))

@@ -239,7 +239,7 @@ def test_tables_in_lists_and_in_numpy_say_the_same(arity: int, monkeypatch: pyte
 
 
 def test_a_table_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cost_table, "MOST_TUPLES", 3)
+    monkeypatch.setattr(cost_table, "MAX_TUPLES", 3)
     robot = middle(chain())
     with pytest.raises(UnsupportedError, match="has 4 entries, more than 3"):
         replies(robot, ("RA", TWO))

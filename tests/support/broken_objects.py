@@ -389,7 +389,7 @@ OF_OBJECTS: dict[str, Wrong] = {
         ("robot Robot2", "variables: a list where a tuple should stand"),
     ),
     "a kind that is a word": wrong(
-        robot("Robot2", kind="DisCSP"), ("robot Robot2", "kind: 'DisCSP' where one of Kind should stand")
+        robot("Robot2", kind="DisCSP"), ("robot Robot2", "kind: 'DisCSP' where one of ProblemKind should stand")
     ),
     "a value that is True": wrong(
         relation((1, cast("Any", True))),

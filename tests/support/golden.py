@@ -7,7 +7,7 @@ from functools import cache
 from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Given
-from robochoc.journal.journal import Header, Recorder, lines_of, read_journal
+from robochoc.journal.journal import Header, JournalRecorder, lines_of, read_journal
 from robochoc.model.problem import Constraint, ProblemKind, Relation, Semantics, Team
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
@@ -55,7 +55,7 @@ def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
     options = Options(
         protocol=protocol, runtime=Runtime.SIMULATOR, schedule=schedule, withdraw=withdraw, settings=settings
     )
-    recorder = Recorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=0))
+    recorder = JournalRecorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=0))
     solve(team, options, observer=lambda event: None if isinstance(event, Given) else recorder(event))
     return b"".join(lines_of(read_journal(recorder.content())))
 

@@ -15,5 +15,6 @@ def install_entry_points(monkeypatch: pytest.MonkeyPatch, group: str, **places: 
         for place in ([some] if isinstance(some, str) else some)
     ]
     monkeypatch.setattr(
-        "robochoc.system.installed.entries", lambda asked: [entry for entry in found if entry.group == asked]
+        "robochoc.system.installed.installed_entry_points",
+        lambda asked: [entry for entry in found if entry.group == asked],
     )

@@ -6,7 +6,7 @@ from functools import cache
 from random import Random
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.journal.journal import Header, Journal, Recorder, read_journal
+from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
 from robochoc.model.problem import Team
 from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import protocol_named
@@ -17,7 +17,9 @@ from tests.support.cost_problems import random_cost_team
 
 def record(team: Team, options: Options) -> Journal:
     """The journal of a run, written and read again."""
-    recorder = Recorder(Header(team=team.name, protocol=options.protocol, runtime=options.runtime, seed=options.seed))
+    recorder = JournalRecorder(
+        Header(team=team.name, protocol=options.protocol, runtime=options.runtime, seed=options.seed)
+    )
     recorder.outcome = solve(team, options, observer=recorder)
     return read_journal(recorder.content())
 

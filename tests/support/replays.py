@@ -9,7 +9,7 @@ from random import Random
 import msgspec
 
 from robochoc.journal.events import AnyEvent, Began, Given
-from robochoc.journal.journal import Header, Journal, Recorder, read_journal
+from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
 from robochoc.model.orders import Order
 from robochoc.model.problem import ConstraintModel, ProblemKind, Team
 from robochoc.run import Options, Withdrawal, solve
@@ -68,7 +68,7 @@ def withdrawal(protocol: str, team: Team, chance: Random) -> Withdrawal | None:
 
 def recorded(team: Team, options: Options, solver: AceProcess | None = None) -> Journal:
     """The journal of a run, as it is read."""
-    recorder = Recorder(header_of(team, options))
+    recorder = JournalRecorder(header_of(team, options))
     recorder.outcome = solve(team, options, observer=recorder, solver=solver)
     return read_journal(recorder.content())
 
@@ -95,7 +95,7 @@ def with_events(journal: Journal, events: Sequence[AnyEvent]) -> Journal:
 def with_events_as_observed(team: Team, options: Options) -> tuple[Journal, list[AnyEvent]]:
     """The journal of a run, and its events as they were told: in the order in which a journal has them."""
     told: list[AnyEvent] = []
-    recorder = Recorder(header_of(team, options))
+    recorder = JournalRecorder(header_of(team, options))
 
     def observe(event: AnyEvent) -> None:
         told.append(event)

@@ -14,7 +14,7 @@ import msgspec
 
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent
-from robochoc.journal.journal import Header, Recorder
+from robochoc.journal.journal import Header, JournalRecorder
 from robochoc.model.outcome import Outcome
 from robochoc.run import solve
 from robochoc.run.options import Options, Runtime, Withdrawal
@@ -37,7 +37,7 @@ def header(runtime: str = "simulator", team: str = "queens3d-4") -> Header:
 
 
 def journal_of(events: list[AnyEvent], outcome: Outcome | None, of: Header | None = None) -> bytes:
-    recorder = Recorder(of or header())
+    recorder = JournalRecorder(of or header())
     for event in events:
         recorder(event)
     recorder.outcome = outcome

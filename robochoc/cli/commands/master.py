@@ -28,7 +28,7 @@ from robochoc.cli.reports.progress import print_above, progress_line
 if TYPE_CHECKING:
     from robochoc.communication.network.journal_server import Publication
     from robochoc.journal.events import AnyEvent
-    from robochoc.journal.journal import Header, Recorder
+    from robochoc.journal.journal import Header, JournalRecorder
     from robochoc.model.outcome import Outcome
     from robochoc.run.networked.address import Address
     from robochoc.run.networked.lead import Led, Plan
@@ -183,7 +183,7 @@ def _publication(*, sniffable: bool) -> Iterator[Publication | None]:
         yield publication
 
 
-def _led(plan: Plan, recorder: Recorder | None, publication: Publication | None) -> Led:
+def _led(plan: Plan, recorder: JournalRecorder | None, publication: Publication | None) -> Led:
     """The run, with whatever watches it."""
     from robochoc.run.networked.lead import lead
 

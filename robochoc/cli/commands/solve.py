@@ -24,7 +24,7 @@ from robochoc.cli.options.ros import (
     situation_options,
     take_ros_options,
 )
-from robochoc.cli.options.ros_setup import closed_loop
+from robochoc.cli.options.ros_setup import closed_loop, sink_places, source_places
 from robochoc.cli.options.sections import COMMON, Sections
 from robochoc.cli.options.solve import (
     Products,
@@ -32,6 +32,7 @@ from robochoc.cli.options.solve import (
     Wanted,
     check_products,
     filter_option,
+    kill_option,
     messages_option,
     options_of,
     protocol_option,
@@ -44,7 +45,7 @@ from robochoc.cli.reports.live_sniffer import Watch, check_chosen, watching
 from robochoc.run.defaults import default_protocol
 
 if TYPE_CHECKING:
-    from robochoc.journal.journal import Header, Recorder
+    from robochoc.journal.journal import Header, JournalRecorder
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
     from robochoc.ros.closed_loop import ClosedLoop
@@ -59,7 +60,7 @@ _SECTIONS: Sections = {
         "--json", "--html", "--journal", "--sniff", "--help",
     ),
     "Search": ("--order", "--set", "--messages", "--count"),
-    "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience"),
+    "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
     "Messages on their way": ("--schedule", "--delay", "--channel", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
     "Output": ("--explain", "--serve", "--open"),
@@ -140,6 +141,7 @@ _SECTIONS: Sections = {
     metavar="[=N]",
     help="Restart up to N lost robots (1 without a number). Implies --on-loss withdraw.",
 )
+@kill_option
 @filter_option
 @click.option("--explain", is_flag=True, help="Print the pseudo-tree, if the robots have built one.")
 @click.option("--count", is_flag=True, help="With --protocol central: count all solutions.")
@@ -185,7 +187,11 @@ def solve(
     products = Products(html, journal, serve, watching(settings["sniff"], open_browser=settings["open_browser"]))
     folders = teams_at(paths)
     refuse_same_places(
-        {"--html": html, "--journal": journal}, given, teams=folders, sinks=ros.sinks, situation=ros.situation
+        {"--html": html, "--journal": journal},
+        given,
+        teams=folders,
+        more_outputs=sink_places(ros.sinks),
+        more_inputs=source_places(ros.situation),
     )
     check_products(products, wanted, options, teams=len(folders))
     context.exit(worst([_solve_one(folder, options, products, wanted) for folder in folders]))
@@ -238,7 +244,7 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     return LIMIT
 
 
-def _run(team: Team, options: Options, recorder: Recorder | None, loop: ClosedLoop | None) -> Outcome:
+def _run(team: Team, options: Options, recorder: JournalRecorder | None, loop: ClosedLoop | None) -> Outcome:
     """Run with whatever watches, a journal, a line on the terminal, and where decisions go."""
     from robochoc.cli.reports.progress import progress_line, waiting
     from robochoc.run.options import CENTRAL

@@ -14,7 +14,7 @@ from robochoc.cli.reports.failures import INVALID, Failure
 
 if TYPE_CHECKING:
     from robochoc.communication.run_result import Progress
-    from robochoc.journal.journal import Header, Recorder, Sink
+    from robochoc.journal.journal import BlockSink, Header, JournalRecorder
     from robochoc.verification.objective import Objective
 
 
@@ -31,8 +31,8 @@ def recording(
     path: Path | None,
     header: Callable[[], Header],
     objective: Callable[[], Objective] | None = None,
-    sinks: Sequence[Sink] = (),
-) -> Iterator[Recorder | None]:
+    sinks: Sequence[BlockSink] = (),
+) -> Iterator[JournalRecorder | None]:
     """A recorder that writes to `path`, and to other `sinks`, while the run goes on; None if there is neither.
 
     When the file cannot be written, the run goes on. That is told at the end, and then it is what the command fails
@@ -41,10 +41,10 @@ def recording(
     if path is None and not sinks:
         yield None
         return
-    from robochoc.journal.journal import JournalFile, Recorder
+    from robochoc.journal.journal import JournalFile, JournalRecorder
 
     file = JournalFile(path) if path else None
-    recorder = Recorder(header(), objective, [file.write, *sinks] if file else sinks)
+    recorder = JournalRecorder(header(), objective, [file.write, *sinks] if file else sinks)
     try:
         yield recorder
     except BaseException:
@@ -63,7 +63,7 @@ def recording(
 
 
 def shown_and_flushed(
-    recorder: Recorder | None, show: Callable[[Progress], None] | None
+    recorder: JournalRecorder | None, show: Callable[[Progress], None] | None
 ) -> Callable[[Progress], None] | None:
     """What is to be told of a run's progress: `show`, and the recorder, which may have had no event for long."""
     if recorder is None:
@@ -77,7 +77,7 @@ def shown_and_flushed(
     return told
 
 
-def _failures(recorder: Recorder) -> list[Failure]:
+def _failures(recorder: JournalRecorder) -> list[Failure]:
     from robochoc.formats import on_one_line
 
     return [

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -18,6 +20,7 @@ from robochoc.cli.options.ros import RosOptions
 from robochoc.cli.options.sections import SectionedCommand
 from robochoc.cli.reports.failures import failures_told
 from robochoc.cli.reports.live_sniffer import Watching
+from robochoc.communication.kill_schedule import Kill
 from robochoc.run.defaults import MINIMISES, SATISFIES
 
 if TYPE_CHECKING:
@@ -68,6 +71,30 @@ messages_option = click.option(
     type=click.IntRange(1),
     metavar="N",
     help="Stop after about N messages (unknown, status 3).",
+)
+
+
+class KillType(click.ParamType[Kill]):
+    """`ROBOT@SECONDS`."""
+
+    name = "kill"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> Kill:
+        """Return the robot and the time. Fail, as wrong usage, where they are none."""
+        robot, _, seconds = value.rpartition("@")
+        with suppress(ValueError):
+            after_s = float(seconds)
+            if robot and 0 <= after_s < math.inf:
+                return Kill(robot, after_s)
+        return self.fail(f"{value!r} is not ROBOT@SECONDS, such as Robot2.6@0.5", param, ctx)
+
+
+kill_option = click.option(
+    "--kill",
+    type=KillType(),
+    multiple=True,
+    metavar="ROBOT@SECONDS",
+    help="Kill the robot's process so many seconds after the search began, to show a loss. Repeatable.",
 )
 filter_option = click.option(
     "--filter",

@@ -33,8 +33,8 @@ from robochoc.communication.resources import require_descriptors, signals_held
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.journal.events import Observer
-from robochoc.model.change import keep_interfaces
 from robochoc.model.problem import Team
+from robochoc.model.team_edits import keep_interfaces
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
@@ -165,6 +165,11 @@ class LocalNetwork(Session):
             with signals_held():
                 self._end_processes()
                 self._master.__exit__(None, None, None)
+
+    def kill(self, name: str) -> None:
+        """Kill the robot's process, if it has one."""
+        if name in self._processes:
+            self._processes[name].kill()
 
     def _launch(self) -> None:
         """Start the robots' processes, and somebody who watches for their ends."""

@@ -14,16 +14,13 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
-from queue import Empty
 from typing import Self
 
 from robochoc.authority.admission import Admission
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Events, Failed, OfEpoch, Pause, Wave
 from robochoc.communication.master_loop import TICK_S, MasterLoop
-from robochoc.communication.network.access import ALL, journal_key
 from robochoc.communication.network.audited_state import AuditedSearchState
-from robochoc.communication.network.connection_policy import ConnectionPolicy
 from robochoc.communication.network.control_messages import (
     Ask,
     Bye,
@@ -42,17 +39,16 @@ from robochoc.communication.network.control_messages import (
     Word,
 )
 from robochoc.communication.network.facilitator import DirectoryFacilitator
-from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing
+from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.gaps import TO_MASTER, Gaps
-from robochoc.communication.network.inbox import Arrived, Inbox, Missed, Presence, Woken
-from robochoc.communication.network.journal_server import JournalServer, Publication
+from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
+from robochoc.communication.network.journal_server import Publication
+from robochoc.communication.network.master_connection import MasterConnection
 from robochoc.communication.network.master_events import MasterEvents
 from robochoc.communication.network.members import Member, Members
 from robochoc.communication.network.registrar import Registrar
 from robochoc.communication.network.requests import Requests
-from robochoc.communication.network.router import Refusal
 from robochoc.communication.network.settings import NetworkSettings
-from robochoc.communication.network.transport import Transport
 from robochoc.communication.run_result import Progress, RobotsLostError, RunResult
 from robochoc.communication.session import over
 from robochoc.journal.events import Observer
@@ -99,41 +95,28 @@ class Master(MasterLoop):
         self.run = secrets.token_hex(8)
         self.members = members
         self.state = AuditedSearchState()
-        self._identity, self._settings = identity, settings
+        self._settings = settings
         self._registry_read = 0.0
-        self._framing = Framing(MASTER, self.run)
-        self._facilitator = DirectoryFacilitator(endpoint, settings.protocol)
         self.events = MasterEvents(observer)
-        note_refusal, listen = self._note_refusal if observer else None, settings.listen or endpoint
-        lease_ms, scratch = settings.lease_ms, settings.scratch
-        self._policy = ConnectionPolicy(admission, identity, listen, note_refusal, lease_ms, members.ways, scratch)
-        self._journal_server = JournalServer(self.run, self._policy.may_sniff, self.events)
-        self._requests = Requests(self._journal_server, self._facilitator, self._send, self.events.refuse)
-        self._registrar = Registrar(
-            members, self._framing, self._policy, self._facilitator, self.events, self._send, settings, watched=watched
+        self._connection = MasterConnection(
+            self.run, identity, admission, endpoint, members.ways, settings, self.events
         )
+        self._send = self._connection.send
+        self._policy = self._connection.policy
+        self._journal_server = self._connection.journal_server
+        self._facilitator = DirectoryFacilitator(endpoint, settings.protocol)
+        self._requests = Requests(self._journal_server, self._facilitator, self._send, self.events.refuse)
+        self._registrar = Registrar(members, self._connection, self._facilitator, self.events, settings, watched)
         self._dead: dict[str, str] = {}
         self._gaps = Gaps(members, self.events.refuse, self._lose)
 
     def __enter__(self) -> Self:
         """Listen. Raises `RouterError` and `CannotConnectError`."""
-        try:
-            self._policy.open()
-            inbox, lease_ms = Inbox(self._policy.share_of), self._settings.lease_ms
-            admitted = self._policy.admitted
-            self._transport = Transport(self.endpoint, self._identity, heard=admitted, inbox=inbox, lease_ms=lease_ms)
-            if self._journal_server.publication:
-                self._transport.answer(journal_key(ALL), self._journal_server.answer)
-        except BaseException:
-            self._policy.close()
-            raise
+        self._connection.open()
         return self
 
     def __exit__(self, *_error: object) -> None:
-        try:
-            self._transport.close()
-        finally:
-            self._policy.close()
+        self._connection.close()
 
     @property
     def is_private(self) -> bool:
@@ -142,9 +125,7 @@ class Master(MasterLoop):
 
     def publish(self, publication: Publication) -> None:
         """Offer `publication`, this run's journal, to those who may sniff. To be called before the master listens."""
-        publication.run = self.run
-        self._journal_server.publication = publication
-        self._policy.sniffable = True
+        self._connection.publish(publication)
 
     # The course of a run
 
@@ -241,34 +222,30 @@ class Master(MasterLoop):
     def lose(self, name: str, why: str) -> None:
         """Note that the robot's process has ended, as somebody else has seen. May be called from any thread."""
         self._dead[name] = why
-        self._transport.wake()
+        self._connection.wake()
 
     # The loop
 
     def _serve(self, patience_s: float, deadline: float | None) -> None:  # noqa: ARG002 - it never takes long
-        with suppress(Empty):
-            self._read_inbox(patience_s)
+        until = time.monotonic() + TICK_S
+        item = self._connection.receive(max(patience_s, 0.001))
+        while item is not None:
+            self._handle_item(item)
+            item = self._connection.receive(0) if time.monotonic() < until else None
         while self._dead:
             self._lose(*self._dead.popitem(), for_good=True)
 
-    def _read_inbox(self, patience_s: float) -> None:
-        """Handle what has come, for `TICK_S` at most. Raises `Empty` when nothing is left."""
-        until = time.monotonic() + TICK_S
-        item = self._transport.inbox.get(timeout=max(patience_s, 0.001))
-        while True:
-            match item:
-                case Arrived(sender, content):
-                    self._read(sender, content)
-                case Presence(name, there):
-                    if member := self.members.robots.get(name):
-                        member.note_presence(there=there)
-                case Missed():
-                    self._gaps.at_the_master(item)
-                case Woken():
-                    return
-            if time.monotonic() >= until:
-                return
-            item = self._transport.inbox.get_nowait()
+    def _handle_item(self, item: Item) -> None:
+        match item:
+            case Arrived(sender, content):
+                self._read(sender, content)
+            case Presence(name, there):
+                if member := self.members.robots.get(name):
+                    member.note_presence(there=there)
+            case Missed():
+                self._gaps.at_the_master(item)
+            case Woken():
+                pass
 
     def _check_robots(self, now: float) -> None:
         """Find robots that have been away for too long, and those that may take part no more."""
@@ -293,8 +270,7 @@ class Master(MasterLoop):
                 self._send_all(Revoked(name))
                 self._policy.follow()
                 self._lose(name, "its certificate was revoked")
-        self._policy.follow()
-        self._transport.hear(self._policy.admitted)
+        self._connection.follow_registry()
 
     def _detect_end(self, now: float) -> None:
         """See `MasterLoop._detect_end`. The search also ends when messages are missing that nobody has lost."""
@@ -306,9 +282,6 @@ class Master(MasterLoop):
 
     # Control messages
 
-    def _send(self, name: str, message: ToRobot) -> None:
-        self._transport.send(name, self._framing.write(name, message))
-
     def _send_all(self, message: ToRobot) -> None:
         for name in self.members.listening:
             self._send(name, message)
@@ -317,12 +290,9 @@ class Master(MasterLoop):
         self._send_all(wave)
 
     def _read(self, sender: str, content: bytes) -> None:
-        try:
-            opened = self._framing.read(sender, content)
-        except FrameRefusedError as refused:
-            self.events.refuse(sender, TO_MASTER, str(refused))
+        opened = self._connection.read(sender, content)
+        if opened is None:
             return
-        self._framing.take(sender, opened.number)
         member = self.members.robots.get(sender)
         match opened.word:
             case Register(profile, incarnation):
@@ -382,8 +352,3 @@ class Master(MasterLoop):
         self.state.lose(name, why)
         if not self._settings.survive or not self.members.closed:
             raise RobotsLostError({name: why})
-
-    def _note_refusal(self, refusal: Refusal) -> None:
-        """Report what the router has refused, but not to robots that have been enrolled since, and will try again."""
-        if refusal.what != "connect" or not self._policy.admits(refusal.who):
-            self.events.refuse(*refusal)

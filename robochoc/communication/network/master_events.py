@@ -23,6 +23,11 @@ class MasterEvents:
         self.refuse = Refusals(self._refused).note
         """Told who was refused, what, and why."""
 
+    @property
+    def observed(self) -> bool:
+        """Whether there is an observer."""
+        return self._observer is not None
+
     def begin(self) -> None:
         """A search begins: times are since then from now on, as those of its robots are."""
         self._began = time.monotonic()

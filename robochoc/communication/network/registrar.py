@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-from robochoc.communication.network.connection_policy import ConnectionPolicy
-from robochoc.communication.network.control_messages import Denied, ToRobot, Welcome
+from robochoc.communication.network.control_messages import Denied, Welcome
 from robochoc.communication.network.facilitator import DirectoryFacilitator
-from robochoc.communication.network.framing import Framing
+from robochoc.communication.network.master_connection import MasterConnection
 from robochoc.communication.network.master_events import MasterEvents
 from robochoc.communication.network.members import Members, RegistrationRefusedError
 from robochoc.communication.network.profile import Profile
@@ -19,11 +16,9 @@ class Registrar:
 
     Args:
         members: Robots that are registered.
-        framing: The master's framing; frames of a new incarnation are numbered anew.
-        policy: Which identities are robots.
+        connection: The master's connection; frames of a new incarnation are numbered anew.
         facilitator: The directory that robots are entered in.
         events: Receives registrations and refusals.
-        send: Sends a control message to a robot.
         settings: What a welcome tells the robot of the run.
         watched: The robots' events are wanted.
     """
@@ -31,21 +26,16 @@ class Registrar:
     def __init__(
         self,
         members: Members,
-        framing: Framing,
-        policy: ConnectionPolicy,
+        connection: MasterConnection,
         facilitator: DirectoryFacilitator,
         events: MasterEvents,
-        send: Callable[[str, ToRobot], None],
         settings: NetworkSettings,
-        *,
-        watched: bool,
+        watched: bool,  # noqa: FBT001 - the master passes all of it on
     ) -> None:
         self._members = members
-        self._framing = framing
-        self._policy = policy
+        self._connection = connection
         self._facilitator = facilitator
         self._events = events
-        self._send = send
         self._settings = settings
         self._watched = watched
 
@@ -53,13 +43,13 @@ class Registrar:
         """Register a robot and welcome it, or refuse it; return whether it was not registered before."""
         known = self._members.robots.get(name)
         try:
-            member = self._members.register(name, profile, incarnation, admitted=self._policy.is_robot(name))
+            member = self._members.register(name, profile, incarnation, admitted=self._connection.policy.is_robot(name))
         except RegistrationRefusedError as refusal:
             self._events.refuse(name, "register", str(refusal))
-            self._send(name, Denied(incarnation, str(refusal)))
+            self._connection.send(name, Denied(incarnation, str(refusal)))
             return False
         if member is not known:
-            self._framing.forget(name)
+            self._connection.framing.forget(name)
             if unfit := self._facilitator.enter(profile):
                 self._events.refuse(name, "be in the directory", unfit)
             self._events.registered(name)
@@ -73,5 +63,5 @@ class Registrar:
 
     def _welcome(self, name: str, incarnation: str) -> None:
         settings = self._settings
-        welcome = Welcome(incarnation, self._framing.run, settings.filters, self._watched, settings.private)
-        self._send(name, welcome)
+        welcome = Welcome(incarnation, self._connection.framing.run, settings.filters, self._watched, settings.private)
+        self._connection.send(name, welcome)

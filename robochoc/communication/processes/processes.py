@@ -139,6 +139,11 @@ class ProcessesRun(Session, MasterLoop):
             else:
                 self._send(robot, Change(self.state.epoch, sealed(part, epoch.void), left))
 
+    def kill(self, name: str) -> None:
+        """Kill the robot's process, if it has one."""
+        if name in self._pool.robots:
+            self._pool.robots[name].process.kill()
+
     def close(self) -> None:
         """End all processes."""
         self._pool.end_all(self.state.has_reported)

@@ -15,7 +15,7 @@ Closure = Callable[[Sequence[int]], int]
 
 
 def compile_expression(expression: Expression, names: Sequence[str]) -> Closure:
-    """`expression` as a function of the values of `names`, in their order: what `evaluate` says, but faster.
+    """Return `expression` as a function of the values of `names`, in their order: what `evaluate` says, but faster.
 
     The function raises `UndefinedValueError` where `evaluate` does. Raises `ValueError` when a name is not in `names`.
     """

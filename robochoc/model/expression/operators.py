@@ -17,7 +17,7 @@ def _bounded(value: int) -> int:
 
 
 def _quotient(dividend: int, divisor: int) -> int:
-    """Truncated toward zero."""
+    """Return the quotient, truncated toward zero."""
     if divisor == 0:
         raise UndefinedValueError
     size = abs(dividend) // abs(divisor)
@@ -25,12 +25,12 @@ def _quotient(dividend: int, divisor: int) -> int:
 
 
 def _remainder(dividend: int, divisor: int) -> int:
-    """With the dividend's sign."""
+    """Return the remainder, with the dividend's sign."""
     return dividend - divisor * _quotient(dividend, divisor)
 
 
 def _power(base: int, exponent: int) -> int:
-    """Checked before it is computed: a power grows faster than memory."""
+    """Return the power. It is checked before it is computed: a power grows faster than memory."""
     if exponent < 0:
         raise UndefinedValueError
     if abs(base) > 1 and exponent >= BOUND.bit_length():
@@ -82,7 +82,7 @@ ALIASES = {"neq": "ne", "minus": "sub", "plus": "add"}
 
 
 def evaluate(expression: Expression, environment: Mapping[str, int]) -> int:
-    """The value of `expression` where names have the values of `environment`; Booleans are 0 and 1.
+    """Return the value of `expression` where names have the values of `environment`; Booleans are 0 and 1.
 
     Raises `UndefinedValueError` on a division by zero, a negative exponent, and a result beyond +-2**63.
     """

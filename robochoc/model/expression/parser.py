@@ -174,7 +174,7 @@ class _Parser:
         return self._applied(resolved, arguments, name.position)
 
     def _arguments(self, level: int) -> tuple[_Parsed, ...]:
-        """What stands between a function's parentheses; parentheses around the whole list are no more than that."""
+        """Return the arguments of a function. A second pair of parentheses around them is ignored."""
         closing = self._closing[self._next] + 1
         pairs = 0
         while self._closing.get(self._next) == closing - 1:
@@ -225,7 +225,7 @@ class _Parser:
 
 
 def _tokens(text: str) -> list[_Token]:
-    """The tokens of `text`; the last is empty and stands for its end."""
+    """Return the tokens of `text`; the last is empty and stands for its end."""
     tokens = []
     for match in _TOKEN.finditer(text):
         if match[2]:
@@ -239,7 +239,7 @@ def _tokens(text: str) -> list[_Token]:
 
 
 def _parentheses(tokens: Sequence[_Token]) -> dict[int, int]:
-    """Where each opening parenthesis, by its index among the tokens, is closed."""
+    """Return where each opening parenthesis, by its index among the tokens, is closed."""
     closing: dict[int, int] = {}
     opened: list[int] = []
     for index, token in enumerate(tokens):
@@ -255,7 +255,7 @@ def _parentheses(tokens: Sequence[_Token]) -> dict[int, int]:
 
 
 def _operands(name: _Token, operator: Operator, only: _Parsed) -> tuple[_Parsed, ...]:
-    """The arguments of a function that wants two and was given one infix term: `minus(i-j)`."""
+    """Return the arguments of a function that wants two and was given one infix term: `minus(i-j)`."""
     if only.infix and only.infix == operator.infix:
         return only.operands
     shown = _shortened(text(only.expression))

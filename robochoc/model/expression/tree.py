@@ -47,7 +47,7 @@ class UndefinedValueError(ArithmeticError):
 
 
 def text(expression: Expression) -> str:
-    """`expression` in XCSP 2.1's functional form, which `parse` reads back: `ne(abs(sub(X,Y)),1)`."""
+    """Return `expression` in XCSP 2.1's functional form, which `parse` reads back: `ne(abs(sub(X,Y)),1)`."""
     match expression:
         case Constant(value):
             return str(value)
@@ -58,7 +58,7 @@ def text(expression: Expression) -> str:
 
 
 def names(expression: Expression) -> tuple[str, ...]:
-    """The distinct names in `expression`, in the order in which they appear."""
+    """Return the distinct names in `expression`, in the order in which they appear."""
     return tuple(dict.fromkeys(_every_name(expression)))
 
 

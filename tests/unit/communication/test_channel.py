@@ -19,7 +19,7 @@ from robochoc.formats import read_team
 from robochoc.formats.result import read_result, result_json
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Sent, Settled
-from robochoc.journal.journal import Header, Recorder, lines_of, metrics_of, read_journal
+from robochoc.journal.journal import Header, JournalRecorder, lines_of, metrics_of, read_journal
 from robochoc.model.message import Envelope
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
@@ -53,7 +53,9 @@ def simulated(channel: ChannelModel, protocol: str = "abt", seed: int = 0) -> Op
 
 
 def recorded(team: Team, options: Options) -> list[bytes]:
-    recorder = Recorder(Header(team=team.name, protocol=options.protocol, runtime="simulator", seed=options.seed))
+    recorder = JournalRecorder(
+        Header(team=team.name, protocol=options.protocol, runtime="simulator", seed=options.seed)
+    )
     solve(team, options, observer=recorder)
     return [*lines_of(read_journal(recorder.content()))]
 
@@ -266,7 +268,7 @@ def test_a_chain_of_messages_takes_latencies_and_checks() -> None:
 
 def test_journals_have_the_simulated_times() -> None:
     model = CHANNELS["wman"]
-    recorder = Recorder(Header(team="four", protocol="abt", runtime="simulator", seed=0, channel="wman"))
+    recorder = JournalRecorder(Header(team="four", protocol="abt", runtime="simulator", seed=0, channel="wman"))
     spent = solve(queens3d(3), simulated(model), observer=recorder).metrics
     journal = read_journal(recorder.content())
     assert journal.header.channel == "wman"
@@ -334,7 +336,7 @@ def test_a_channel_is_not_ignored(options: Options) -> None:
 
 
 def test_times_grow_from_one_event_to_the_next_of_a_robot() -> None:
-    recorder = Recorder(Header(team="t", protocol="abt", runtime="simulator", seed=0))
+    recorder = JournalRecorder(Header(team="t", protocol="abt", runtime="simulator", seed=0))
     solve(queens3d(2), simulated(CHANNELS["wlan"]), observer=recorder)
     for robot in queens3d(2).order:
         events = read_journal(recorder.content()).events

@@ -10,10 +10,10 @@ import pytest
 
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Given
-from robochoc.journal.given import GivenProblemError, TeamReader, TeamWriter, brief_of, void_of
-from robochoc.model.change import without_robots
+from robochoc.journal.given import GivenProblemError, TeamReader, TeamWriter, invalidated_of, run_parameters_of
 from robochoc.model.orders import Order, OrderError, with_order
 from robochoc.model.problem import Constraint, Domain, ProblemKind, Relation, Robot, Semantics, Team, Variable
+from robochoc.model.team_edits import without_robots
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.explanation import invalidated_by
 from tests.support.complex_changes import random_complex_changing_team
@@ -99,7 +99,12 @@ def test_what_stands_beside_the_problem_comes_back() -> None:
     team, brief = queens3d(2), RunParameters(7, {"cycles": "3"}, 12)
     stale = invalidated_by(team, without_robots(team, ["Robot1.1"]))
     given = through(TeamWriter().given(team, brief, stale, fresh=["Robot2.1"], quiet=False))
-    assert (brief_of(given), void_of(given), given.fresh, given.quiet) == (brief, stale, ("Robot2.1",), False)
+    assert (run_parameters_of(given), invalidated_of(given), given.fresh, given.quiet) == (
+        brief,
+        stale,
+        ("Robot2.1",),
+        False,
+    )
     assert isinstance(given.aside, int)
 
 

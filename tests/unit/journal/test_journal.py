@@ -17,20 +17,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.journal.blocks import LARGEST_BLOCK
+from robochoc.journal.blocks import MAX_BLOCK_BYTES
 from robochoc.journal.events import AnyEvent, Began, Decided, Given, Heard, Improved, Received, Refused, Sent, Settled
 from robochoc.journal.journal import (
     Follower,
     Header,
+    JournalEntry,
     JournalError,
     JournalFile,
-    Line,
-    Recorder,
-    in_order,
+    JournalRecorder,
     is_journal,
     lines_of,
     metrics_of,
     read_journal,
+    sorted_by_time,
 )
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics
@@ -45,7 +45,7 @@ OUTCOME = Outcome("four", "abt", "simulator", 0, Verdict.SOLUTION)
 
 def told(events: list[AnyEvent], every: int = 3, header: Header = HEADER) -> bytes:
     """The journal of `events`, a block every so many."""
-    recorder = Recorder(header)
+    recorder = JournalRecorder(header)
     for number, event in enumerate(events):
         recorder(event)
         if number % every == 0:
@@ -63,7 +63,7 @@ def settled(number: int, t: float | None = None) -> Settled:
 @given(header=headers, events=st.lists(any_event, max_size=12), outcome=st.none() | outcomes)
 @settings(max_examples=100, deadline=None)
 def test_what_goes_in_comes_out_in_both_forms(header: Header, events: list[AnyEvent], outcome: Outcome | None) -> None:
-    recorder = Recorder(header)
+    recorder = JournalRecorder(header)
     recorder.outcome = outcome
     for event in events:
         recorder(event)
@@ -74,7 +74,7 @@ def test_what_goes_in_comes_out_in_both_forms(header: Header, events: list[AnyEv
     assert lines[1 : 1 + len(events)] == events
     journal = read_journal(content)
     assert (journal.header, journal.outcome, journal.damage) == (header, outcome, None)
-    assert journal.events == tuple(in_order(events))
+    assert journal.events == tuple(sorted_by_time(events))
     text = b"".join(lines_of(journal))
     assert is_journal(text)
     again = read_journal(text)
@@ -108,7 +108,7 @@ def test_events_are_in_order_within_a_run_and_each_robots_own_stay_so() -> None:
 def test_improvements_come_at_the_end_of_each_run_that_minimises() -> None:
     soft = Relation("soft", 2, Semantics.SOFT, ((1, 1),), (5.0,))
     team = team_of({"A": (1, 2), "B": (1, 2)}, [Constraint("C", soft, ("A", "B"), ("A", "B"))])
-    recorder = Recorder(HEADER, lambda: Objective(team))
+    recorder = JournalRecorder(HEADER, lambda: Objective(team))
 
     def decide(t: float, robot: str, name: str, value: int) -> None:
         recorder(Decided(t=t, robot=robot, assignment={name: value}, clock=0))
@@ -131,7 +131,7 @@ def test_improvements_come_at_the_end_of_each_run_that_minimises() -> None:
 
 
 def test_what_is_too_large_for_a_block_is_left_out_and_said() -> None:
-    large = "x" * (LARGEST_BLOCK + 1)
+    large = "x" * (MAX_BLOCK_BYTES + 1)
     sent = Sent(t=0, sender="A", receiver="B", type="Util", content={"table": large}, bytes=1, clock=0)
     given_ = Given(t=0, order=("A",), robots={"A": large})
     events = read_journal(told([settled(0), sent, given_, settled(1)], every=10)).events
@@ -169,7 +169,7 @@ def test_what_could_not_be_read_again_spoils_nothing(poison: AnyEvent) -> None:
 def test_without_any_event_nothing_is_written(tmp_path: Path) -> None:
     (tmp_path / "run.journal").write_bytes(b"old")
     file = JournalFile(tmp_path / "run.journal")
-    recorder = Recorder(HEADER, sinks=[file.write])
+    recorder = JournalRecorder(HEADER, sinks=[file.write])
     empty = [recorder.is_empty]
     recorder(settled(0))
     assert [*empty, recorder.is_empty] == [True, False]
@@ -180,7 +180,7 @@ def test_it_is_followed_while_it_is_written_through_the_same_descriptor(tmp_path
     path = tmp_path / "run.journal"
     path.write_bytes(b"old")
     file = JournalFile(path)
-    recorder = Recorder(HEADER, sinks=[file.write])
+    recorder = JournalRecorder(HEADER, sinks=[file.write])
     recorder.flush()
     with path.open("rb") as following:
         follower = Follower(following)
@@ -210,7 +210,7 @@ def test_it_is_followed_byte_by_byte(text: bool) -> None:  # noqa: FBT001 - a pa
     with os.fdopen(read, "rb", buffering=0) as pipe, os.fdopen(write, "wb", buffering=0) as writer:
         os.set_blocking(read, False)
         follower = Follower(cast("BinaryIO", _Patient(pipe)))
-        lines: list[Line] = []
+        lines: list[JournalEntry] = []
         for place in range(len(content)):
             writer.write(content[place : place + 1])
             lines += follower.read()
@@ -236,7 +236,7 @@ def test_reading_stops_where_the_reader_wants() -> None:
 
 
 def test_threads_may_tell_at_the_same_time() -> None:
-    recorder = Recorder(HEADER)
+    recorder = JournalRecorder(HEADER)
 
     def tell(robot: int) -> None:
         for number in range(2000):
@@ -275,7 +275,7 @@ class _Interrupted:
 @pytest.mark.parametrize("at", range(2, 6))
 def test_an_interrupt_costs_no_event(at: int) -> None:
     sink, other = _Interrupted(at), io.BytesIO()
-    recorder = Recorder(HEADER, sinks=[other.write, sink])
+    recorder = JournalRecorder(HEADER, sinks=[other.write, sink])
     taken = 0
     try:
         for number in range(10):
@@ -294,7 +294,7 @@ def test_a_sink_that_fails_does_not_harm_the_others() -> None:
     def full(_: bytes) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    recorder = Recorder(HEADER, sinks=[full, good.write])
+    recorder = JournalRecorder(HEADER, sinks=[full, good.write])
     recorder(settled(0))
     recorder.close()
     assert [failure.errno for failure in recorder.failures] == [errno.ENOSPC]
@@ -304,7 +304,7 @@ def test_a_sink_that_fails_does_not_harm_the_others() -> None:
 def test_a_full_disk_leaves_whole_blocks(tmp_path: Path) -> None:
     path = tmp_path / "run.journal"
     file = JournalFile(path)
-    recorder = Recorder(HEADER, sinks=[file.write])
+    recorder = JournalRecorder(HEADER, sinks=[file.write])
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
     try:
@@ -323,7 +323,7 @@ def test_a_full_disk_leaves_whole_blocks(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_replaced_stays(tmp_path: Path) -> None:
-    recorder = Recorder(HEADER, sinks=[JournalFile(tmp_path / "no" / "run.journal").write])
+    recorder = JournalRecorder(HEADER, sinks=[JournalFile(tmp_path / "no" / "run.journal").write])
     recorder(settled(0))
     assert [failure.errno for failure in recorder.failures] == [errno.ENOENT]
     assert list(tmp_path.iterdir()) == []
@@ -336,7 +336,7 @@ def test_a_pipe_gets_the_blocks_as_they_come(tmp_path: Path) -> None:
     reader = threading.Thread(target=lambda: found.append(pipe.read_bytes()))
     reader.start()
     file = JournalFile(pipe)
-    recorder = Recorder(HEADER, sinks=[file.write])
+    recorder = JournalRecorder(HEADER, sinks=[file.write])
     recorder(settled(0))
     recorder.close()
     file.close()
@@ -350,7 +350,7 @@ def test_a_pipe_gets_the_blocks_as_they_come(tmp_path: Path) -> None:
 @pytest.mark.parametrize("runtime", [Runtime.SIMULATOR, Runtime.PROCESSES])
 def test_a_runs_journal_is_small_and_has_everything(runtime: Runtime) -> None:
     team = queens3d(4)
-    recorder = Recorder(Header(team=team.name, protocol="abt", runtime=runtime, seed=0))
+    recorder = JournalRecorder(Header(team=team.name, protocol="abt", runtime=runtime, seed=0))
     outcome = solve(team, Options(runtime=runtime), observer=recorder)
     recorder.outcome = outcome
     content = recorder.content()

@@ -17,11 +17,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robochoc.journal.blocks import BEGINNING, LARGEST_BLOCK, PREAMBLE, framed
+from robochoc.journal.blocks import BEGINNING, MAX_BLOCK_BYTES, PREAMBLE, frame_block
 from robochoc.journal.columns import BlockError, columns_of, entries_of
 from robochoc.journal.entries import Ended
 from robochoc.journal.events import AnyEvent, Began, Decided, Lost, Received, Sent, Settled
-from robochoc.journal.journal import Follower, Header, JournalError, Line, Recorder, lines_of, read_journal
+from robochoc.journal.journal import (
+    Follower,
+    Header,
+    JournalEntry,
+    JournalError,
+    JournalRecorder,
+    lines_of,
+    read_journal,
+)
 from robochoc.model.outcome import Outcome, Verdict
 
 HEADER = Header(team="four", protocol="abt", runtime="simulator", seed=0)
@@ -50,7 +58,7 @@ def run(seed: int, number: int) -> list[AnyEvent]:
 def blocks_of(seed: int, number: int = 10, every: int = 5) -> list[bytes]:
     """The journal of a run: its blocks, the first with the preamble."""
     blocks: list[bytes] = []
-    recorder = Recorder(HEADER, sinks=[blocks.append])
+    recorder = JournalRecorder(HEADER, sinks=[blocks.append])
     for place, event in enumerate(run(seed, number)):
         recorder(event)
         if place % every == 0:
@@ -60,7 +68,7 @@ def blocks_of(seed: int, number: int = 10, every: int = 5) -> list[bytes]:
     return blocks
 
 
-def lines_in(content: bytes) -> tuple[list[Line], str | None]:
+def lines_in(content: bytes) -> tuple[list[JournalEntry], str | None]:
     """All entries that can be read, in the file's order, and the damage."""
     follower = Follower(io.BytesIO(content))
     lines = follower.read()
@@ -69,7 +77,7 @@ def lines_in(content: bytes) -> tuple[list[Line], str | None]:
 
 
 @cache
-def whole(text: bool = False) -> tuple[bytes, list[Line]]:  # noqa: FBT001, FBT002 - one of two forms
+def whole(text: bool = False) -> tuple[bytes, list[JournalEntry]]:  # noqa: FBT001, FBT002 - one of two forms
     content = b"".join(blocks_of(0))
     if text:
         content = b"".join(lines_of(read_journal(content)))
@@ -79,7 +87,7 @@ def whole(text: bool = False) -> tuple[bytes, list[Line]]:  # noqa: FBT001, FBT0
     return content, lines
 
 
-def holds_no_lie(content: bytes, lines: list[Line], where: str) -> bool:
+def holds_no_lie(content: bytes, lines: list[JournalEntry], where: str) -> bool:
     """What comes of reading `content`, of which `lines` are true; whether anything could be read."""
     try:
         found, damage = lines_in(content)
@@ -200,7 +208,7 @@ def made(*contents: bytes, preamble: bytes = PREAMBLE) -> bytes:
     digest = BEGINNING if preamble == PREAMBLE else blake2b(preamble, digest_size=16).digest()
     journal = preamble
     for content in contents:
-        block, digest = framed(content, digest)
+        block, digest = frame_block(content, digest)
         journal += block
     return journal
 
@@ -209,7 +217,7 @@ VALUES = 9
 """The place of the messages' values among a block's columns."""
 
 
-def columns(*lines: Line) -> bytes:
+def columns(*lines: JournalEntry) -> bytes:
     return columns_of(lines, exact=True)
 
 
@@ -228,7 +236,7 @@ def test_a_block_that_unpacks_to_more_than_it_says_is_refused_unread() -> None:
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize("sizes", [(100, LARGEST_BLOCK + 1), (2**32 - 1, 100)])
+@pytest.mark.parametrize("sizes", [(100, MAX_BLOCK_BYTES + 1), (2**32 - 1, 100)])
 def test_a_block_that_claims_too_much_is_refused(sizes: tuple[int, int]) -> None:
     journal = made(columns(HEADER)) + struct.pack("<II", *sizes) + bytes(100)
     assert "claims to have" in str(read_journal(journal).damage)
@@ -296,5 +304,5 @@ def test_columns_that_were_altered_are_entries_or_refused(place: int, within: in
     except BlockError:
         return
     text = msgspec.json.encode(lines)
-    assert len(msgspec.json.decode(text, type=list[Line])) == len(lines)
+    assert len(msgspec.json.decode(text, type=list[JournalEntry])) == len(lines)
     assert entries_of(columns_of(lines, exact=True))[:2] == lines[:2] or lines[:2] != lines[:2]  # NaN in a message

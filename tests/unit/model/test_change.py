@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from robochoc.model.change import ChangeError, apply_changes, rejoin, team_after_events, without_robots
+from robochoc.model.change import apply_changes, team_after_events
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
@@ -26,6 +26,8 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
+from robochoc.model.rejoin import rejoin
+from robochoc.model.team_edits import ChangeError, without_robots
 from tests.support.problems import team_of
 from tests.support.small_teams import differ, named_constraint, newcomer, triangle
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from robochoc.formats import PREDEFINED
-from robochoc.model.change import apply_changes, without_robots
+from robochoc.model.change import apply_changes
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
@@ -24,6 +24,7 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
+from robochoc.model.team_edits import without_robots
 from robochoc.solver.explanation import domain_key, invalidated_by
 from tests.support.problems import team_of
 from tests.support.small_teams import differ, named_constraint, newcomer, triangle

@@ -26,7 +26,7 @@ from robochoc.journal.events import (
     Settled,
     actor,
 )
-from robochoc.journal.journal import Header, Journal, Recorder, read_journal
+from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
 from robochoc.model.message import Message, Value
 from robochoc.protocols.abt import ABT, Nogood
 from robochoc.protocols.dynabt import DynABT
@@ -171,7 +171,7 @@ def test_robots_are_lost_and_come_back(spares: int, tmp_path: Path) -> None:
     team = read_team(tmp_path / "team")
     Meteor.flag = tmp_path / "hit"
     journey = ScenarioRun(team, None, CompiledTeam, lambda: None, spares=spares, parameters=RunParameters(0, {}))
-    recorder = Recorder(Header(team="team", protocol="dynabt", runtime="processes", seed=0))
+    recorder = JournalRecorder(Header(team="team", protocol="dynabt", runtime="processes", seed=0))
     events = StartEvents(recorder)
     with ProcessesRun(journey.compiled(), Meteor, observer=recorder, survive=True) as session:
         played = list(journey.epochs(session, lambda opening: events.report(Meteor, opening, session)))

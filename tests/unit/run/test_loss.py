@@ -14,9 +14,9 @@ import pytest
 
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.change import without_robots
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
+from robochoc.model.team_edits import without_robots
 from robochoc.run import Options, Runtime, solve
 from tests.support.faults import PROGRAM, Run, running
 

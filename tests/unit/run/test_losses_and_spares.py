@@ -11,7 +11,7 @@ import pytest
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.formats import PREDEFINED, read_team, write_team
-from robochoc.model.change import apply_changes, team_after_events, without_robots
+from robochoc.model.change import apply_changes, team_after_events
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import (
     AddAgent,
@@ -25,6 +25,7 @@ from robochoc.model.problem import (
     ScenarioEvent,
     Team,
 )
+from robochoc.model.team_edits import without_robots
 from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
 from tests.support.small_teams import named_constraint, triangle

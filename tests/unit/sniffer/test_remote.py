@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.network.journal_server import PIECE_BYTES, Piece
-from robochoc.journal.blocks import BEGINNING, PREAMBLE, JournalDamagedError, framed
+from robochoc.journal.blocks import BEGINNING, PREAMBLE, JournalDamagedError, frame_block
 from robochoc.journal.entries import JournalError
 from robochoc.run.networked.address import Address
 from robochoc.sniffer.remote import Arriving, Followed, WholeBlocks
@@ -22,7 +22,7 @@ RUN = "run"
 def blocks(count: int) -> list[bytes]:
     made, digest = [PREAMBLE], BEGINNING
     for number in range(count):
-        block, digest = framed(Random(number).randbytes(50 * number), digest)
+        block, digest = frame_block(Random(number).randbytes(50 * number), digest)
         made.append(block)
     return made
 

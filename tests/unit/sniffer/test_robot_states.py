@@ -14,7 +14,7 @@ import pytest
 
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Sent, Settled
-from robochoc.journal.journal import Journal, Recorder, lines_of
+from robochoc.journal.journal import Journal, JournalRecorder, lines_of
 from robochoc.protocols.sfb import SFB
 from robochoc.replay.channels import MessageDecoder
 from robochoc.run.options import Options, Runtime, Withdrawal
@@ -47,7 +47,7 @@ def written(journal: Journal, path: Path, *, text: bool) -> Path:
     if text:
         path.write_bytes(b"".join(lines_of(journal)))
         return path
-    recorder = Recorder(journal.header)
+    recorder = JournalRecorder(journal.header)
     for event in journal.events:
         recorder(event)
     recorder.outcome = journal.outcome

@@ -124,19 +124,19 @@ def test_forbidden_tuples_and_a_single_value_are_counted_right(warm: AceProcess,
 
 def test_ace_alone_still_counts_wrongly(warm: AceProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     """Once this fails, ACE has been mended, and `propagate` has less to do."""
-    monkeypatch.setattr(front, "propagated", lambda network: network)
+    monkeypatch.setattr(front, "propagate", lambda network: network)
     assert warm.solve(MISCOUNTED).found == 6
 
 
 def test_ace_alone_still_dies_of_an_emptied_table(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(front, "propagated", lambda network: network)  # see above
+    monkeypatch.setattr(front, "propagate", lambda network: network)  # see above
     with AceProcess(always=True) as solver, pytest.raises(SolverLostError):
         solver.solve(EMPTIED)
 
 
 @pytest.mark.parametrize("longest", TABLES_AT_MOST)
 def test_what_is_propagated_keeps_its_solutions(longest: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(propagation, "LONGEST_ALLOWED", longest)
+    monkeypatch.setattr(propagation, "MAX_ALLOWED_ROWS", longest)
     chance = Random(f"propagated {longest}")
     solvable = smaller = forbidding = 0
     for _ in range(1500):
@@ -159,7 +159,7 @@ def test_what_is_propagated_keeps_its_solutions(longest: int, monkeypatch: pytes
 def test_both_strategies_find_what_brute_force_finds(
     warm: AceProcess, longest: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(propagation, "LONGEST_ALLOWED", longest)
+    monkeypatch.setattr(propagation, "MAX_ALLOWED_ROWS", longest)
     chance = Random(f"strategies {longest}")
     found = 0
     for _ in range(60):

@@ -219,7 +219,7 @@ def test_another_version_of_pycsp3_has_other_files(
 
 
 def test_what_is_too_large_is_not_kept(cache: SolutionCache, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache_module, "LARGEST_BYTES", 4 * 2 * len(SMALL_SOLUTIONS) - 1)
+    monkeypatch.setattr(cache_module, "MAX_BYTES", 4 * 2 * len(SMALL_SOLUTIONS) - 1)
     cache.put(SMALL_NETWORK, SMALL_SOLUTIONS)
     assert not cache.folder.exists()
     cache.put(SMALL_NETWORK, SMALL_SOLUTIONS[1:])

@@ -14,10 +14,10 @@ from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats import PREDEFINED
 from robochoc.journal.events import Began, Decided, Improved, Lost
-from robochoc.journal.journal import Header, Recorder, read_journal
-from robochoc.model.change import keep_interfaces, without_robots
+from robochoc.journal.journal import Header, JournalRecorder, read_journal
 from robochoc.model.orders import with_dom_deg_order, with_priorities
 from robochoc.model.problem import AddConstraint, Child, Constraint, Parent, Robot, ScenarioEvent, Team
+from robochoc.model.team_edits import keep_interfaces, without_robots
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.traits import Traits
 from robochoc.replay.rebuild import Rebuilder, ReplayOptions
@@ -122,7 +122,9 @@ def test_what_robots_have_heard_of_is_told_by_the_variables_that_they_show(proto
     """It was told by those that they show in the files: an error, where these are more."""
     team = with_costs(turned_interface())
     order = ("C", "A", "B")
-    recorder = Recorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=0), lambda: Objective(team))
+    recorder = JournalRecorder(
+        Header(team=team.name, protocol=protocol, runtime="simulator", seed=0), lambda: Objective(team)
+    )
     solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR, order=order), observer=recorder)
     improved = [event for event in read_journal(recorder.content()).events if isinstance(event, Improved)]
     assert improved

@@ -118,7 +118,7 @@ def test_the_first_conflict_is_the_one_that_is_explained(batch: int, monkeypatch
     for _ in range(30):
         team = random_complex_team(chance)
         for part in agent_problems(_any_domains(team, chance), shared_scopes=True).values():
-            monkeypatch.setattr(compiled, "LARGE", chance.choice((1, 1000)))
+            monkeypatch.setattr(compiled, "MIN_TABLE_VALUES", chance.choice((1, 1000)))
             _compare(part, chance)
 
 
@@ -177,7 +177,7 @@ def test_the_least_is_what_the_cheapest_values_of_the_others_cost(batch: int, mo
                         )
                 assert least[index] == expected
                 seen[expected > 0] += 1
-            monkeypatch.setattr(compiled, "WIDE", 0)
+            monkeypatch.setattr(compiled, "MAX_BOUNDED_ROWS", 0)
             assert problem.lower_bounds(robots) == [0] * len(problem.values)
             monkeypatch.undo()
     assert min(seen.values()) > 50, seen

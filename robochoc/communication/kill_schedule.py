@@ -1,0 +1,54 @@
+"""Robots whose processes are killed at set times, so that a loss can be shown whenever it is wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+
+class Kill(NamedTuple):
+    """The process of `robot` is to end with SIGKILL, `after_s` seconds after the search began."""
+
+    robot: str
+    after_s: float
+
+
+class KillSchedule:
+    """The kills of one run that are still to come. All times are in seconds, on the monotonic clock."""
+
+    def __init__(self, kills: Iterable[Kill] = ()) -> None:
+        self._pending = sorted(kills, key=lambda kill: kill.after_s)
+        self._began: float | None = None
+        self._took_s = 0.0
+
+    def begin(self, now: float) -> None:
+        """Note that the run's first search begins. Later searches change nothing."""
+        self._began = now if self._began is None else self._began
+
+    def end(self, now: float) -> None:
+        """Note that a search is over."""
+        if self._began is not None:
+            self._took_s = now - self._began
+
+    def wait_s(self, now: float) -> float | None:
+        """Return how many seconds are left until the next kill; None if there is none."""
+        if self._began is None or not self._pending:
+            return None
+        return max(0.0, self._began + self._pending[0].after_s - now)
+
+    def due(self, now: float) -> list[str]:
+        """Return the robots to kill now. They are no longer pending."""
+        names = []
+        while self.wait_s(now) == 0:
+            names.append(self._pending.pop(0).robot)
+        return names
+
+    def warn_of_pending(self) -> None:
+        """Say, by Python's `logging`, which robots were not killed because the search was over before."""
+        if not self._pending:
+            return
+        import logging  # noqa: PLC0415 - nearly no run has anything to report
+
+        for robot, after_s in self._pending:
+            text = f"{robot} was to be killed after {after_s:g} s; the search took {self._took_s:.1f} s"
+            logging.getLogger("robochoc").warning("%s", text)

@@ -1,0 +1,120 @@
+"""The master's connection to the network: its router, its transport, its frames, and the journal that it offers."""
+
+from __future__ import annotations
+
+from queue import Empty
+
+from robochoc.authority.admission import Admission
+from robochoc.authority.identity import Identity
+from robochoc.communication.network.access import ALL, journal_key
+from robochoc.communication.network.connection_policy import ConnectionPolicy, Reach
+from robochoc.communication.network.control_messages import ToRobot
+from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing, Opened
+from robochoc.communication.network.gaps import TO_MASTER
+from robochoc.communication.network.inbox import Inbox, Item
+from robochoc.communication.network.journal_server import JournalServer, Publication
+from robochoc.communication.network.master_events import MasterEvents
+from robochoc.communication.network.router import Refusal
+from robochoc.communication.network.settings import NetworkSettings
+from robochoc.communication.network.transport import Transport
+
+
+class MasterConnection:
+    """The connection of the master of the run `run`.
+
+    Attributes:
+        policy: Who may connect, and write to whom.
+        framing: The master's frames.
+        journal_server: Offers the run's journal to those who may sniff.
+
+    Args:
+        run: The name of the run.
+        identity: The master's certificate and key.
+        admission: Which identities are admitted.
+        endpoint: Where robots reach the master (`HOST:PORT`).
+        ways: To whom robots may write, if that is known before they come.
+        settings: What the run is like.
+        events: Receives what is granted and refused.
+    """
+
+    def __init__(
+        self,
+        run: str,
+        identity: Identity,
+        admission: Admission,
+        endpoint: str,
+        ways: Reach,
+        settings: NetworkSettings,
+        events: MasterEvents,
+    ) -> None:
+        self._endpoint = endpoint
+        self._identity = identity
+        self._settings = settings
+        self._events = events
+        note_refusal, listen = self._note_refusal if events.observed else None, settings.listen or endpoint
+        self.policy = ConnectionPolicy(
+            admission, identity, listen, note_refusal, settings.lease_ms, ways, settings.scratch
+        )
+        self.framing = Framing(MASTER, run)
+        self.journal_server = JournalServer(run, self.policy.may_sniff, events)
+
+    def open(self) -> None:
+        """Listen. Raises `RouterError` and `CannotConnectError`."""
+        try:
+            self.policy.open()
+            inbox, lease_ms = Inbox(self.policy.share_of), self._settings.lease_ms
+            heard = self.policy.admitted
+            self._transport = Transport(self._endpoint, self._identity, heard=heard, inbox=inbox, lease_ms=lease_ms)
+            if self.journal_server.publication:
+                self._transport.answer(journal_key(ALL), self.journal_server.answer)
+        except BaseException:
+            self.policy.close()
+            raise
+
+    def close(self) -> None:
+        """End all links."""
+        try:
+            self._transport.close()
+        finally:
+            self.policy.close()
+
+    def publish(self, publication: Publication) -> None:
+        """Offer `publication`, this run's journal, to those who may sniff. To be called before `open`."""
+        publication.run = self.framing.run
+        self.journal_server.publication = publication
+        self.policy.sniffable = True
+
+    def send(self, name: str, message: ToRobot) -> None:
+        """Send a control message to a robot."""
+        self._transport.send(name, self.framing.write(name, message))
+
+    def receive(self, patience_s: float) -> Item | None:
+        """Return the oldest item of the inbox; None when nothing comes within `patience_s` seconds."""
+        try:
+            return self._transport.inbox.get(timeout=patience_s)
+        except Empty:
+            return None
+
+    def read(self, sender: str, content: bytes) -> Opened | None:
+        """Return what is in a frame; None if it was refused, which is reported."""
+        try:
+            opened = self.framing.read(sender, content)
+        except FrameRefusedError as refused:
+            self._events.refuse(sender, TO_MASTER, str(refused))
+            return None
+        self.framing.take(sender, opened.number)
+        return opened
+
+    def wake(self) -> None:
+        """End a wait for the inbox. May be called from any thread."""
+        self._transport.wake()
+
+    def follow_registry(self) -> None:
+        """Let in identities that were enrolled since, and exclude revoked ones."""
+        self.policy.follow()
+        self._transport.hear(self.policy.admitted)
+
+    def _note_refusal(self, refusal: Refusal) -> None:
+        """Report what the router has refused, except to identities that were admitted since, and will try again."""
+        if refusal.what != "connect" or not self.policy.admits(refusal.who):
+            self._events.refuse(*refusal)

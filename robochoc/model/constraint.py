@@ -1,0 +1,166 @@
+"""Variables with their domains, and constraints as data: in extension (relations) and in intension (predicates)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import cached_property
+
+from robochoc.model.expression import Expression, UndefinedValueError, evaluate
+from robochoc.model.ranges import merge_ranges
+
+Assignment = Mapping[str, int]
+"""Values of variables, by name."""
+
+Term = str | int
+"""A term of a scope: a variable's name or an integer constant (Figure 2 writes `V1.1 V3.1 1 3`)."""
+
+INFINITE = math.inf
+"""The cost of breaking a hard constraint."""
+
+
+class ConstraintModel(StrEnum):
+    """How much robots know of a shared constraint (Brito and Meseguer, CP 2003).
+
+    Totally known (TKC): its holder knows all of it. Partially known (PKC): each robot knows its own part.
+    """
+
+    TKC = "TKC"
+    PKC = "PKC"
+
+
+class Semantics(StrEnum):
+    """The meaning of a relation's tuples: they are allowed (supports), forbidden (conflicts), or have a cost (soft)."""
+
+    SUPPORTS = "supports"
+    CONFLICTS = "conflicts"
+    SOFT = "soft"
+
+
+@dataclass(frozen=True)
+class Domain:
+    """A finite set of integers, as disjoint ascending ranges.
+
+    Adjacent ranges are merged, so equal sets are equal domains.
+    """
+
+    name: str
+    ranges: tuple[range, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ranges", merge_ranges(self.ranges))
+
+    def __iter__(self) -> Iterator[int]:
+        for part in self.ranges:
+            yield from part
+
+    def __len__(self) -> int:
+        return sum(len(part) for part in self.ranges)
+
+    def __contains__(self, value: object) -> bool:
+        return any(value in part for part in self.ranges)
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A decision of the robot that owns it. Names are unique in a team."""
+
+    name: str
+    domain: Domain
+
+
+@dataclass(frozen=True)
+class Relation:
+    """A constraint's definition in extension: tuples of integers.
+
+    Attributes:
+        name: Its name.
+        arity: The length of each tuple.
+        semantics: What the tuples mean.
+        tuples: The tuples.
+        costs: The cost of each tuple. Empty unless the semantics is `soft`.
+        default_cost: The cost of the tuples that a soft relation does not list.
+    """
+
+    name: str
+    arity: int
+    semantics: Semantics
+    tuples: tuple[tuple[int, ...], ...]
+    costs: tuple[float, ...] = ()
+    default_cost: float = 0
+
+    @cached_property
+    def _listed(self) -> dict[tuple[int, ...], float]:
+        if self.semantics is Semantics.SOFT:
+            return dict(zip(self.tuples, self.costs, strict=True))
+        return dict.fromkeys(self.tuples, 0 if self.semantics is Semantics.SUPPORTS else INFINITE)
+
+    def cost(self, values: Sequence[int]) -> float:
+        """Return the cost of the tuple `values`: 0 or `INFINITE` unless the relation is soft."""
+        listed = self._listed.get(tuple(values))
+        if listed is not None:
+            return listed
+        match self.semantics:
+            case Semantics.SUPPORTS:
+                return INFINITE
+            case Semantics.CONFLICTS:
+                return 0
+            case Semantics.SOFT:
+                return self.default_cost
+
+
+@dataclass(frozen=True)
+class Predicate:
+    """A constraint's definition in intension: a Boolean expression over formal integer `parameters`."""
+
+    name: str
+    parameters: tuple[str, ...]
+    body: Expression
+
+    def holds(self, arguments: Sequence[int]) -> bool:
+        """Return whether the body is true for `arguments`. An undefined body (division by zero) is false."""
+        try:
+            return bool(evaluate(self.body, dict(zip(self.parameters, arguments, strict=True))))
+        except UndefinedValueError:
+            return False
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A relation or predicate, applied to a scope of variables and integer constants.
+
+    Attributes:
+        name: Its name, which need not be unique: Figure 2 calls every constraint `C5`.
+        definition: The relation or predicate.
+        scope: The variables and constants.
+        parameters: The actual parameters of a predicate. For a relation they equal `scope`.
+        model: How much robots know of a shared constraint. None: the constraint is private.
+        cost: The cost of violating a predicate, in a DisWCSP. `INFINITE`: a hard constraint.
+        line: The line of the file that it was read from.
+    """
+
+    name: str
+    definition: Relation | Predicate
+    scope: tuple[Term, ...]
+    parameters: tuple[Term, ...]
+    model: ConstraintModel | None = ConstraintModel.TKC
+    cost: float = INFINITE
+    line: int = field(default=0, compare=False)
+
+    @cached_property
+    def variables(self) -> tuple[str, ...]:
+        """The distinct variables of the scope, in its order."""
+        return tuple(dict.fromkeys(term for term in self.scope if isinstance(term, str)))
+
+    def price(self, assignment: Assignment) -> float:
+        """Return the cost of `assignment`, which has values for the scope. 0: the constraint holds."""
+        values = [assignment[term] if isinstance(term, str) else term for term in self.parameters]
+        if isinstance(self.definition, Relation):
+            return self.definition.cost(values)
+        return 0 if self.definition.holds(values) else self.cost
+
+    def allows(self, assignment: Assignment) -> bool:
+        """Return whether the cost of `assignment` is finite."""
+        return self.price(assignment) < INFINITE

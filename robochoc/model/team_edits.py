@@ -1,0 +1,141 @@
+"""Edits of a team that several changes are made of, and the checks that come with them.
+
+Nothing is changed in place: every function returns another team.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from robochoc.model.problem import Child, Constraint, Parent, Robot, Team
+
+MAX_SHOWN = 60
+"""So many characters of a name, or of a list, stand in a message."""
+
+
+class ChangeError(ValueError):
+    """A change that the team as it stands cannot take: what is wrong, and what was expected.
+
+    Attributes:
+        message: What is wrong.
+        hint: What was expected.
+        missing: The name that does not exist in the team, if that is the mistake.
+        line: The line of the mistake in an added robot's file. 0: it is not in one line.
+    """
+
+    def __init__(self, message: str, hint: str, *, missing: str = "", line: int = 0) -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+        self.missing = missing
+        self.line = line
+
+
+def without_robots(team: Team, names: Iterable[str]) -> Team:
+    """Return `team` without the robots `names`, their variables, and every constraint that they share."""
+    gone = set(names)
+    lost = {variable.name for name in gone for variable in team[name].variables}
+
+    def kept(constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
+        return tuple(constraint for constraint in constraints if lost.isdisjoint(constraint.variables))
+
+    robots = []
+    for robot in team.robots:
+        if robot.name not in gone:
+            parents = [replace(one, constraints=kept(one.constraints)) for one in robot.parents if one.name not in gone]
+            below = [replace(one, constraints=kept(one.constraints)) for one in robot.children if one.name not in gone]
+            robots.append(replace(robot, parents=tuple(parents), children=tuple(below)))
+    return keep_needed_interfaces(replace(team, robots=tuple(robots)))
+
+
+def keep_interfaces(team: Team, before: Team) -> Team:
+    """Return `team`, a part of `before`, in which robots have the same interface variables as in `before`."""
+    return replace(team, robots=tuple(replace(robot, shown=before[robot.name].interface) for robot in team.robots))
+
+
+def keep_needed_interfaces(team: Team) -> Team:
+    """Return `team`, in which every variable in a parent's part of a partially known constraint is shown."""
+    for robot in team.robots:
+        for child in robot.children:
+            needed = {name for part in child.constraints for name in part.variables if team.owner[name] == child.name}
+            hidden = needed.difference(team[child.name].interface) if needed else ()
+            if hidden:
+                below = team[child.name]
+                team = replace_robot(team, replace(below, shown=(*below.shown, *sorted(hidden))))
+    return team
+
+
+def check_variables_free(team: Team, robot: Robot) -> None:
+    """Raise `ChangeError` if a variable of `robot` belongs to another robot of `team`."""
+    for variable in robot.variables:
+        owner = team.owner.get(variable.name, robot.name)
+        if owner != robot.name:
+            raise ChangeError(f"the variable {quoted(variable.name)} belongs to {quoted(owner)}", "rename one of them")
+
+
+def check_holder(team: Team, agent: str, parent: str, constraint: Constraint) -> None:
+    """Raise `ChangeError` unless `agent` is the lowest robot of the scope, and `parent` the second lowest."""
+    robot_named(team, agent), robot_named(team, parent)
+    if agent == parent:
+        raise ChangeError(f"{quoted(agent)} is no parent of its own", "a shared constraint is one with another robot")
+    for name in constraint.variables:
+        check_variable(team, name)
+    owners = {team.owner[name] for name in constraint.variables}
+    what = quoted(constraint.name)
+    if agent not in owners or parent not in owners:
+        message = f"the scope of {what} is not of {quoted(agent)} and {quoted(parent)}"
+        raise ChangeError(message, "name variables of both")
+    *_, above, lowest = (name for name in team.order if name in owners)
+    if (above, lowest) != (parent, agent):
+        hint = f"the lowest robot of its scope holds it, {quoted(lowest)}, under the next, {quoted(above)}"
+        raise ChangeError(f"{what} does not stand with {quoted(agent)} under {quoted(parent)}", hint)
+
+
+def link(team: Team, child: str, parent: str, variables: tuple[str, ...]) -> Team:
+    """Return `team`, in which `parent` and `child` are linked. `parent` also shows `variables` to the child."""
+    below, above = team[child], team[parent]
+    if not any(one.name == parent for one in below.parents):
+        below = replace(below, parents=(*below.parents, Parent(parent)))
+    if not any(one.name == child for one in above.children):
+        above = replace(above, children=(*above.children, Child(child)))
+    children = (
+        replace(one, variables=tuple(dict.fromkeys((*one.variables, *variables)))) if one.name == child else one
+        for one in above.children
+    )
+    return replace_robot(replace_robot(team, below), replace(above, children=tuple(children)))
+
+
+def check_variable(team: Team, variable: str) -> None:
+    """Raise `ChangeError` unless a robot of `team` has `variable`."""
+    if variable not in team.owner:
+        hint = "name a variable of the robots that are there"
+        raise ChangeError(f"no robot has the variable {quoted(variable)}", hint, missing=variable)
+
+
+def replace_robot(team: Team, robot: Robot) -> Team:
+    """Return `team` with `robot` in place of the robot of the same name."""
+    return replace(team, robots=tuple(robot if one.name == robot.name else one for one in team.robots))
+
+
+def robot_named(team: Team, name: str) -> Robot:
+    """Return the robot called `name`. Raises `ChangeError` if there is none."""
+    if name not in team:
+        raise no_robot(name)
+    return team[name]
+
+
+def no_robot(name: str, line: int = 0) -> ChangeError:
+    """Return the error that there is no robot called `name`."""
+    hint = "name a robot that is there at that time"
+    return ChangeError(f"there is no robot {quoted(name)}", hint, missing=name, line=line)
+
+
+def quoted(name: str) -> str:
+    """Return `name` in quotes, short enough for a message."""
+    return f"'{shortened(name)}'"
+
+
+def shortened(text: str) -> str:
+    """Return `text` cut off so that it fits into a message."""
+    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."

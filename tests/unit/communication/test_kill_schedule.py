@@ -1,0 +1,79 @@
+"""Robots that are killed at set times: when, and what is said of those that were not."""
+
+from __future__ import annotations
+
+import pytest
+
+from robochoc.communication.kill_schedule import Kill, KillSchedule
+from robochoc.communication.run_result import RobotsLostError
+from robochoc.formats import read_team
+from robochoc.model.outcome import Verdict
+from robochoc.run.options import OnLoss, Options, Runtime
+from robochoc.run.orchestrator import solve
+from robochoc.solver.encoding import UnsupportedError
+from tests.support.problems import team_of
+from tests.support.program import ROOT
+
+TEAM = team_of({"A": (1, 2), "B": (1, 2)}, [])
+SEVEN = read_team(ROOT / "instances" / "queens3d-7")
+"""49 robots with files, which search for longer than it takes to notice a loss."""
+AT_ONCE = (Kill("Robot2.6", 0),)
+
+
+def test_each_is_due_once_after_the_search_began() -> None:
+    schedule = KillSchedule([Kill("B", 2), Kill("A", 0.5)])
+    assert (schedule.wait_s(7), schedule.due(7)) == (None, [])
+    schedule.begin(10)
+    assert schedule.wait_s(10.25) == 0.25
+    assert schedule.due(10.25) == []
+    assert schedule.due(10.5) == ["A"]
+    schedule.begin(11)  # a later search
+    assert schedule.wait_s(11) == 1
+    assert schedule.due(20) == ["B"]
+    assert schedule.wait_s(20) is None
+
+
+def test_a_search_that_was_over_before_is_reported(caplog: pytest.LogCaptureFixture) -> None:
+    schedule = KillSchedule([Kill("A", 5)])
+    schedule.begin(10)
+    schedule.end(10.3)
+    schedule.warn_of_pending()
+    assert caplog.messages == ["A was to be killed after 5 s; the search took 0.3 s"]
+
+
+def test_nothing_is_reported_without_kills(caplog: pytest.LogCaptureFixture) -> None:
+    KillSchedule().warn_of_pending()
+    assert caplog.messages == []
+
+
+def test_a_run_reports_it(caplog: pytest.LogCaptureFixture) -> None:
+    assert solve(TEAM, Options(kill=(Kill("RA", 60),))).verdict is Verdict.SOLUTION
+    (text,) = caplog.messages
+    assert text.startswith("RA was to be killed after 60 s; the search took ")
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (Options(kill=(Kill("RA", 1),), runtime=Runtime.SIMULATOR), "the simulator has none"),
+        (Options(kill=(Kill("RA", 1),), protocol="central"), "--kill is for robots .*not for --protocol central"),
+        (Options(kill=(Kill("RZ", 1),)), "names a robot that .* does not have"),
+    ],
+)
+def test_kills_that_cannot_be(options: Options, why: str) -> None:
+    with pytest.raises(UnsupportedError, match=why):
+        solve(TEAM, options)
+
+
+def test_by_default_a_loss_ends_the_run() -> None:
+    with pytest.raises(RobotsLostError, match=r"^Robot2\.6 was lost: its process was killed by SIGKILL$"):
+        solve(SEVEN, Options(kill=AT_ONCE))
+
+
+@pytest.mark.parametrize("spares", [0, 1])
+def test_the_others_continue_and_it_may_come_back(spares: int) -> None:
+    options = Options(protocol="dynabt", kill=AT_ONCE, on_loss=OnLoss.WITHDRAW, spares=spares)
+    outcome = solve(SEVEN, options)
+    assert outcome.verdict is Verdict.SOLUTION
+    assert outcome.epochs[0].lost == ("Robot2.6",)
+    assert [len(epoch.robots) for epoch in outcome.epochs] == [49, 48 + spares]
