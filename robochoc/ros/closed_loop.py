@@ -144,8 +144,8 @@ class ClosedLoop:
     @property
     def notes(self) -> list[str]:
         """Sentences about reports that could not be used."""
-        heard = self.feedback.notes if self.feedback else []
-        return [*heard, *(self._situation.notes if self._situation else [])]
+        received = self.feedback.notes if self.feedback else []
+        return [*received, *(self._situation.notes if self._situation else [])]
 
     # Decisions
 

@@ -84,9 +84,9 @@ def mapping_of(topic: str, robot: str, kind: str) -> WaypointMapping:
     found = mapping_for(kind)
     if found is None:
         who = f"topic {topic!r} of {robot}" if robot else f"topic {topic!r}"
-        told = f"{who} has the type {kind!r}, and nobody says how a waypoint becomes one"
+        problem = f"{who} has the type {kind!r}, and there is no mapping from waypoints to it"
         known = f"known are {', '.join(kinds())}; a package may offer others ({GROUP})"
-        raise NoMappingError(on_one_line(f"{told}: {known}"))
+        raise NoMappingError(on_one_line(f"{problem}: {known}"))
     return found
 
 

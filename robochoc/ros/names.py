@@ -53,7 +53,8 @@ class TopicNames:
         owners: dict[str, int] = {}
         for number, topic in self._topics():
             if len(topic) > NAME_MAX:
-                raise NameClashError(on_one_line(f"{_told(drones[number])}: the name is too long for ROS: shorten it"))
+                what = _described(drones[number])
+                raise NameClashError(on_one_line(f"{what}: the name is too long for ROS: shorten it"))
             other = owners.setdefault(topic, number)
             if other != number:
                 raise NameClashError(_clash(topic, drones[other], drones[number]))
@@ -120,12 +121,12 @@ def _namespaces(drones: Sequence[Drone], waypoints: Sequence[str | None]) -> Ite
 def _clash(topic: str, first: Drone, second: Drone) -> str:
     if first.topic and second.topic and first.topic.name == second.topic.name:
         who = [f"{drone.name} ({drone.robot})" if drone.robot else drone.name for drone in (first, second)]
-        told = f"{who[0]} and {who[1]} both publish on {second.topic.name!r}: give each a topic of its own"
+        clash = f"{who[0]} and {who[1]} both publish on {second.topic.name!r}: give each a topic of its own"
     else:
-        told = f"{_told(first)} and {_told(second)} would both publish on {topic} in ROS: rename one of them"
-    return on_one_line(told)
+        clash = f"{_described(first)} and {_described(second)} would both publish on {topic} in ROS: rename one of them"
+    return on_one_line(clash)
 
 
-def _told(drone: Drone) -> str:
+def _described(drone: Drone) -> str:
     what = f"drone {drone.name!r}" if drone.topic is None else f"topic {drone.topic.name!r}"
     return f"{what} of {drone.robot}" if drone.robot else what

@@ -43,9 +43,9 @@ class Publisher:
 
     def __init__(self, team: str, drones: Sequence[Drone], sinks: Sequence[Sink], frame: str = "map") -> None:
         if all(drone.topic is None for drone in drones):
-            told = f"no drone of {team or 'the team'} has a topic to publish its waypoints on"
+            problem = f"no drone of {team or 'the team'} has a topic to publish its waypoints on"
             raise NothingToPublishError(
-                on_one_line(f"{told}: give its robot's file a <topic> (docs/reference/format.md)")
+                on_one_line(f"{problem}: give its robot's file a <topic> (docs/reference/format.md)")
             )
         self.names = TopicNames(drones)
         self._drones = drones
@@ -99,8 +99,8 @@ class Publisher:
         try:
             return self._mappings[waypoint.kind].fields(waypoint)
         except Exception as error:
-            told = f"what is installed for waypoints as {waypoint.kind} failed: {type(error).__name__}: {error}"
-            raise NoMappingError(on_one_line(told)) from error
+            problem = f"what is installed for waypoints as {waypoint.kind} failed: {type(error).__name__}: {error}"
+            raise NoMappingError(on_one_line(problem)) from error
 
     def _header(self, at_ns: int) -> Fields:
         return {"stamp": at_ns, "frame_id": self._frame}

@@ -90,6 +90,6 @@ def _lacking(entry: EntryPoint) -> str:
         if entry.dist and entry.name in extras:
             wanted = f"{entry.dist.name}[{entry.name}]"
             return f"{entry.name} needs {error.name}, which is not installed: pip install '{wanted}'"
-    except (Exception, SystemExit):  # noqa: BLE001 - told by whoever loads it once more
+    except (Exception, SystemExit):  # noqa: BLE001 - raised when it is loaded once more
         return ""
     return ""

@@ -102,10 +102,10 @@ class Situation:
             self._note(f"more than {OBSTACLES_MAX:,} places are blocked: further ones are passed over")
             return ()
         self._obstacles.add(place)
-        told = len(self.notes)
+        noted = len(self.notes)
         found = tuple(self._taking(team, place))
-        if not found and len(self.notes) == told:
-            self._note(f"nobody is ever sent to the obstacle at {_shown(place)}: it changes nothing")
+        if not found and len(self.notes) == noted:
+            self._note(f"no drone is ever sent to the obstacle at {_shown(place)}: it changes nothing")
         return found
 
     def _cleared(self, team: Team, place: Point) -> tuple[Change, ...]:

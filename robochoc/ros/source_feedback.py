@@ -63,7 +63,7 @@ class SourceFeedback(Feedback):
         """Return the wall clock's time, or that of the recording."""
         return time.time_ns() if self._source.live or self._now_ns is None else self._now_ns
 
-    def on_decision(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - the robots were told
+    def on_decision(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - the decision was published
         """Take note of a decision: reports are awaited from now on."""
         limits = [left_s, self._patience_s if self._source.live else None]
         wait_s = min((limit for limit in limits if limit is not None), default=None)

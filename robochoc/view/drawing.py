@@ -138,8 +138,8 @@ def _from_where_to_see(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float
     back: npt.NDArray[np.float64] = _EYE / np.linalg.norm(_EYE)
     right = np.cross([0, 0, 1], back)
     right /= np.linalg.norm(right)
-    aside = np.abs(corners @ np.column_stack([right, np.cross(back, right)])).max(axis=1)
-    distance = corners @ back + _ROOM * aside / math.tan(math.radians(_FIELD_OF_VIEW_DEG / 2))
+    across = np.abs(corners @ np.column_stack([right, np.cross(back, right)])).max(axis=1)
+    distance = corners @ back + _ROOM * across / math.tan(math.radians(_FIELD_OF_VIEW_DEG / 2))
     return back * float(distance.max())
 
 

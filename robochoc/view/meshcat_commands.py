@@ -120,7 +120,7 @@ class MeshcatCommands:
     def _keep(self, message: dict[str, Any]) -> None:
         import umsgpack  # noqa: PLC0415 - comes with meshcat, and like it only when a scene is drawn
 
-        # Key frames are many, and finer than single precision nobody sees.
+        # Key frames are many, and single precision is fine enough to see.
         precision = "single" if message["type"] == "set_animation" else "double"
         self.commands.append(umsgpack.packb(message, force_float_precision=precision))
 

@@ -94,14 +94,14 @@ def playback_of(mission: Mission, flown: FlightLog) -> Playback:
 
 def fell(flown: FlightLog) -> dict[int, FlightEvent]:
     """Return the drones that have fallen, with the cause: their last event before they hit the ground."""
-    told: dict[int, list[FlightEvent]] = {}
+    events: dict[int, list[FlightEvent]] = {}
     for event in flown.events:
         if np.isnan(flown.errors_m[event.drone]):
-            told.setdefault(event.drone, []).append(event)
-    for own in told.values():
+            events.setdefault(event.drone, []).append(event)
+    for own in events.values():
         if len(own) > 1 and own[-1].what == _HIT:
             own.pop()
-    return {number: own[-1] for number, own in told.items()}
+    return {number: own[-1] for number, own in events.items()}
 
 
 def _states(number: int, mission: Mission, flown: FlightLog) -> Iterator[tuple[float, DroneState]]:
@@ -128,15 +128,15 @@ def _chapters(mission: Mission, flown: FlightLog) -> Iterator[Chapter]:
     for leg, begins_s in _begun(mission, flown):
         for number, goal in leg.goals.items():
             (flying.discard if goal.lands else flying.add)(number)
-        yield Chapter(begins_s, leg.opened_by, f"{_told(leg.verdict)}, {_flying(flying, leg)}")
+        yield Chapter(begins_s, leg.opened_by, f"{_words(leg.verdict)}, {_flying(flying, leg)}")
 
 
-def _told(verdict: Verdict) -> str:
+def _words(verdict: Verdict) -> str:
     return verdict.value.replace("-", " ")
 
 
 def _flying(flying: set[int], leg: Leg) -> str:
     if not flying:
-        return "nobody flies"
+        return "no drone flies"
     stay = leg.verdict in {Verdict.NO_SOLUTION, Verdict.UNKNOWN}
     return f"{len(flying)} {'hover on' if stay else 'fly'}"

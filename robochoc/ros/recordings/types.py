@@ -134,8 +134,8 @@ class Types:
         if name not in self._store.fielddefs:
             text = definition_of(kind)
             if not text:
-                told = f"ROS {self.version} has no type {kind!r} that is known here"
-                raise UnknownTypeError(f"{told}; its mapping can bring the definition (docs/guides/ros.md)")
+                problem = f"ROS {self.version} has no type {kind!r} that is known here"
+                raise UnknownTypeError(f"{problem}; its mapping can bring the definition (docs/guides/ros.md)")
             try:
                 new = get_types_from_msg(text, name)
                 self._store.register({each: what for each, what in new.items() if each not in self._store.fielddefs})
@@ -149,7 +149,7 @@ class Types:
                 self._known[kind] = self._kind(name)
             except (KeyError, RecursionError) as error:
                 raise UnknownTypeError(
-                    f"the definition of {kind!r} needs types that nobody defines: {error}"
+                    f"the definition of {kind!r} needs types that are not defined: {error}"
                 ) from error
         return self._known[kind]
 
