@@ -49,8 +49,8 @@ def describe_decode_error(error: msgspec.MsgspecError, expected: Any) -> str:  #
         match = re.fullmatch(pattern, text)
         if match:
             parts = {name: part or "" for name, part in match.groupdict().items()}
-            named = {name: _named(parts[name]) for name in ("expected", "got") if name in parts}
-            text = sentence.format(**{"allowed": _allowed(expected, place), **parts, **named})
+            parts |= {name: _named(parts[name]) for name in ("expected", "got") if name in parts}
+            text = sentence.format(**{"allowed": _allowed(expected, place)} | parts)
             break
     return f"{place}: {text}" if place else text
 
