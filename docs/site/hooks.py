@@ -12,19 +12,17 @@ import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from msgspec import Struct
 
-from robochoc.model.message import Message
+from robochoc.protocols.protocol import Protocol, Settings
 from robochoc.run.registry import offers
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
     from mkdocs.structure.files import Files
     from mkdocs.structure.pages import Page
-
-    from robochoc.protocols.protocol import Protocol
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -36,7 +34,8 @@ MOVED = {"benchmarks/RESULTS.md": "reference/results.md", "CHANGELOG.md": "refer
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """Put the protocols' and the examples' pages into the navigation, beside their lists."""
-    protocols = [{Path(name).stem: name} for name in sorted({*protocol_pages()} - {PROTOCOLS})]
+    names = sorted(Path(name).stem for name in protocol_pages() if name != PROTOCOLS)
+    protocols = [{name: f"reference/protocols/{name}.md"} for name in names]
     for section in config.nav or []:
         for pages in section.values():
             if isinstance(pages, list) and PROTOCOLS in pages:
@@ -96,7 +95,7 @@ def protocol_pages() -> dict[str, str]:
     protocols = {offer.name: offer.protocol for offer in offers() if offer.protocol}
     pages = {f"reference/protocols/{name}.md": protocol_page(name, kind) for name, kind in protocols.items()}
     rows = [
-        f"| [`{name}`]({name}.md) | {title(kind)} | {purpose(kind)} | {kind.traits.paper} |"
+        f"| [`{name}`]({name}.md) | {title(kind)} | {purpose(kind)} | {kind.traits.use_when} |"
         for name, kind in protocols.items()
     ]
     listing = [
@@ -104,7 +103,7 @@ def protocol_pages() -> dict[str, str]:
         "",
         "One page per protocol, from its docstring. See also [which protocol when](../../guides/which-protocol.md).",
         "",
-        "| name | | for | paper |",
+        "| name | | for | use when |",
         "| --- | --- | --- | --- |",
         *rows,
     ]
@@ -117,6 +116,7 @@ def protocol_page(name: str, kind: type[Protocol]) -> str:
     facts = {
         "name": f"`--protocol {name}`",
         "for": purpose(kind),
+        "use when": traits.use_when,
         "complete": "yes" if traits.complete else "no: it ends with a good answer, and proves nothing",
         "constraints": ", ".join(["n-ary" if traits.n_ary else "binary", *["PKC"] * traits.partially_known]),
         "problems that change": "goes on with what still holds" if traits.dynamic else "begins anew",
@@ -124,9 +124,7 @@ def protocol_page(name: str, kind: type[Protocol]) -> str:
         "paper": traits.paper,
     }
     table = "\n".join(f"| {key} | {value} |" for key, value in facts.items())
-    listed = [
-        f"::: {item.__module__}.{item.__qualname__}\n    options: {{heading_level: 3}}\n" for item in structs(kind)
-    ]
+    listed = [struct_block(item) for item in structs(kind)]
     whole = "{members: false, show_root_heading: false, show_root_toc_entry: false}"
     parts = [
         f"# {title(kind)}\n\n| | |\n| --- | --- |\n{table}\n",
@@ -134,6 +132,13 @@ def protocol_page(name: str, kind: type[Protocol]) -> str:
         *(["## Messages and settings\n", *listed] if listed else []),
     ]
     return "\n".join(parts)
+
+
+def struct_block(item: type[Struct]) -> str:
+    """Return the block for mkdocstrings that shows a message or settings, with the fields."""
+    fields = ", ".join(item.__struct_fields__)
+    options = f"{{heading_level: 3, members: [{fields}], show_if_no_docstring: true, show_root_full_path: false}}"
+    return f"::: {item.__module__}.{item.__qualname__}\n    options: {options}\n"
 
 
 def title(kind: type[Protocol]) -> str:
@@ -148,11 +153,10 @@ def purpose(kind: type[Protocol]) -> str:
 
 
 def structs(kind: type[Protocol]) -> Iterator[type[Struct]]:
-    """Yield the messages and the settings that a protocol's module defines, in its order."""
-    for item in vars(inspect.getmodule(kind)).values():
-        own = isinstance(item, type) and issubclass(item, Struct) and item.__module__ == kind.__module__
-        if own and (issubclass(item, Message) or item.__name__.endswith("Settings")):
-            yield item
+    """Yield the messages that a protocol's robots receive, and its settings."""
+    yield from get_args(kind.messages) or (kind.messages,)
+    if type(kind.settings) is not Settings:
+        yield type(kind.settings)
 
 
 # Examples

@@ -14,7 +14,7 @@ from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import Deployment
 from robochoc.run.evaluation import Answer, Search, check_with_files
-from robochoc.run.runtimes import open_session
+from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
 from robochoc.run.start_events import StartEvents
 from robochoc.run.withdrawal import Phase
@@ -169,9 +169,10 @@ class ThisMachine(Deployment):
     def _session(self, phase: Phase, compiled: CompiledTeam) -> Session:
         """Open a session of the phase's protocol."""
         context = self._context
-        return open_session(
+        request = SessionRequest(
             phase.protocol, compiled, phase.parameters, self.options, context.observer, context.progress, context.kills
         )
+        return open_session(request)
 
     def _confirmed(self, alone: str | None = None, *, total: float = INFINITE, aside: float | None = None) -> bool:
         """Return whether the central solver agrees, if it is asked. For the arguments see `confirmed`."""

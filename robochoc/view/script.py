@@ -1,4 +1,4 @@
-"""meshcat's viewer: what a page needs to show a scene."""
+"""meshcat's viewer: the script that a page needs to show a scene."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 
 
 def viewer_script() -> str:
-    """The JavaScript of meshcat's viewer, three.js included: all that a page needs to show commands.
+    """Return the JavaScript of meshcat's viewer, three.js included.
 
-    meshcat itself is not imported, which takes long: this is but a file of it. Raises `ModuleNotFoundError`.
+    meshcat itself is not imported, which takes long: this is a file of it. Raises `ModuleNotFoundError`.
     """
     found = find_spec("meshcat")
     if found is None or not found.submodule_search_locations:

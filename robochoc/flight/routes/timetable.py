@@ -147,7 +147,7 @@ class _Timetable:
         self._latest = 0
         self._corners = np.empty((2, 0, 3))
         """Of the boxes around all paths: the lowest corners, and the highest."""
-        # Where somebody rests: the drone, the point, from which step, to which step.
+        # Where drones rest: the drone, the point, from which step, to which step.
         self._resting = np.arange(len(starts))
         self._places = starts.copy()
         self._from = np.zeros(len(starts), dtype=np.int64)
