@@ -14,8 +14,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+import click
 from msgspec import Struct
 
+from robochoc.cli.group import cli
 from robochoc.protocols.protocol import Protocol, Settings
 from robochoc.run.registry import offers
 
@@ -60,6 +62,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Return the page's text, its links to files outside of the site's source changed to their pages."""
     del config, files
+    markdown = markdown.replace("<!-- commands -->", "\n".join(command_reference(cli, "robochoc", 2)))
     return with_links(markdown, f"docs/{page.file.src_uri}", page.file.src_uri)
 
 
@@ -157,6 +160,31 @@ def structs(kind: type[Protocol]) -> Iterator[type[Struct]]:
     yield from get_args(kind.messages) or (kind.messages,)
     if type(kind.settings) is not Settings:
         yield type(kind.settings)
+
+
+# Commands
+
+
+def command_reference(command: click.Command, path: str, depth: int) -> Iterator[str]:
+    """Yield the reference of a command and of those below it: what `--help` shows, options in their groups.
+
+    mkdocs-click would list the options without the groups.
+    """
+    context = click.Context(command, info_name=path, max_content_width=82, terminal_width=82)
+    usage, options = context.make_formatter(), context.make_formatter()
+    command.format_usage(context, usage)
+    groups_are_pages = click.Command if isinstance(command, click.Group) else type(command)
+    groups_are_pages.format_options(command, context, options)
+    yield f"{'#' * depth} {path}\n"
+    for paragraph in re.split(r"\n\n+", inspect.cleandoc(command.help or "").partition("\f")[0]):
+        shown = paragraph.removeprefix("\b\n")
+        yield f"{shown}\n" if shown == paragraph else f"```text\n{shown}\n```\n"
+    yield f"```text\n{usage.getvalue()}\n{options.getvalue().rstrip()}\n```\n"
+    if isinstance(command, click.Group):
+        for name in command.list_commands(context):
+            below = command.get_command(context, name)
+            if below is not None and not below.hidden:
+                yield from command_reference(below, f"{path} {name}", depth + 1)
 
 
 # Examples
