@@ -6,6 +6,7 @@ import msgspec
 from msgspec import UNSET, UnsetType
 
 from robochoc.model.outcome import CheckCounts, EpochOutcome, Metrics, Outcome, PseudoTreeNode, Verdict
+from robochoc.system.decode_errors import describe_decode_error
 
 
 class ResultError(ValueError):
@@ -159,7 +160,7 @@ def read_result(content: bytes) -> Outcome:
     except RecursionError as error:
         raise ResultError("it is nested too deep") from error
     except msgspec.MsgspecError as error:
-        raise ResultError(str(error)) from error
+        raise ResultError(describe_decode_error(error, _Form)) from error
     spent = form.metrics
     messages = spent.messages_by_type or {"messages": spent.messages}
     counts = spent.bytes, spent.ncccs, spent.checks, spent.wall_s, spent.compile_s, spent.memory, spent.simulated_s

@@ -12,6 +12,7 @@ from lxml import etree
 from robochoc.formats.constraints import Context, read_private, read_shared
 from robochoc.formats.definitions import check_semantics, refuse_predefined
 from robochoc.formats.diagnostics import (
+    MAX_PER_FILE,
     Diagnostic,
     DiagnosticCollector,
     InvalidInputError,
@@ -23,7 +24,9 @@ from robochoc.formats.extension import check_count, read_domain, read_relation
 from robochoc.formats.intension import read_predicate, read_topic
 from robochoc.formats.locations import FileLocations
 from robochoc.formats.names import check_robot_name, check_unique
+from robochoc.formats.repair import without_schema_errors
 from robochoc.formats.rules import NEIGHBOURS_ONCE, check_shown_variables, refuse_nothing_to_decide, repeated_neighbours
+from robochoc.formats.schema import SchemaError, schema_for
 from robochoc.formats.team_members import TeamMember
 from robochoc.formats.xml import attribute, line, parsed_xml, read_xml
 from robochoc.model.problem import (
@@ -61,7 +64,10 @@ def read_robot(path: Path | str) -> Robot:
 def read_robot_file(path: Path) -> RobotFile:
     """Return the robot in the XML file `path`, with what the team has to check. Raises `InvalidInputError`."""
     _check_name(path.stem, path)
-    return _Reader(path, read_xml(path, "instance")).whole()
+    try:
+        return _Reader(path, read_xml(path, "instance")).whole()
+    except SchemaError as refused:
+        raise InvalidInputError([*refused.diagnostics, *_other_mistakes(path, refused)]) from None
 
 
 def robot_in(content: bytes, name: str) -> Robot:
@@ -72,6 +78,21 @@ def robot_in(content: bytes, name: str) -> Robot:
     path = Path(f"{name}.xml")
     _check_name(name, path)
     return _Reader(path, parsed_xml(content, path, "instance")).whole().robot
+
+
+def _other_mistakes(path: Path, refused: SchemaError) -> list[Diagnostic]:
+    """Return the mistakes of a file that its schema has `refused`, in lines where the schema finds none."""
+    if len(refused.diagnostics) > MAX_PER_FILE:
+        return []  # the file was not read to its end
+    tree = without_schema_errors(refused.tree, schema_for("instance"))
+    if tree is None:
+        return []
+    lines = {mistake.line for mistake in refused.diagnostics}
+    try:
+        _Reader(path, tree).whole()
+    except InvalidInputError as invalid:
+        return [mistake for mistake in invalid.diagnostics if mistake.line not in lines]
+    return []
 
 
 def _check_name(name: str, path: Path) -> None:

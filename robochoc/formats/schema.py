@@ -10,7 +10,7 @@ from typing import Protocol, cast
 
 from lxml import etree
 
-from robochoc.formats.diagnostics import DiagnosticCollector, shortened
+from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, shortened
 
 _SCHEMAS = {"instance": "robot.xsd", "scenario": "scenario.xsd"}
 _OPTIONAL = {"topics", "relations", "predicates", "constraints"}
@@ -54,6 +54,18 @@ _PATTERNS = {
 }
 
 
+class SchemaError(InvalidInputError):
+    """An XML file that its schema refuses. It may have other mistakes too.
+
+    Attributes:
+        tree: What could be read of it.
+    """
+
+    def __init__(self, diagnostics: Iterable[Diagnostic], tree: etree._Element) -> None:
+        super().__init__(diagnostics)
+        self.tree = tree
+
+
 class LogEntry(Protocol):
     """One of libxml2's messages."""
 
@@ -80,7 +92,7 @@ def schema_for(root: str) -> etree.XMLSchema:
 
 
 def check_schema(tree: etree._Element, file: str, schema: etree.XMLSchema) -> None:
-    """Raise `InvalidInputError` unless `tree`, read from `file`, is valid."""
+    """Raise `SchemaError` unless `tree`, read from `file`, is valid."""
     if schema.validate(tree):
         return
     import difflib  # noqa: PLC0415 - start-up: only mistakes need it
@@ -95,7 +107,10 @@ def check_schema(tree: etree._Element, file: str, schema: etree.XMLSchema) -> No
             unknown.setdefault(entry.path, []).append(parts["attribute"])
         message, hint = next(phrase for sign, *phrase in _PHRASES if sign in parts["message"])
         report.add(entry.line, message.format_map(parts), hint.format_map(parts))
-    report.finish()
+    try:
+        report.finish()
+    except InvalidInputError as invalid:
+        raise SchemaError(invalid.diagnostics, tree) from None
 
 
 def _parts(entry: LogEntry) -> dict[str, str]:

@@ -20,6 +20,7 @@ from robochoc.journal.columns import BlockError, entries_of
 from robochoc.journal.entries import READ, Ended, Header, JournalEntry, JournalError
 from robochoc.journal.events import AnyEvent, Began
 from robochoc.model.outcome import Outcome
+from robochoc.system.decode_errors import describe_decode_error
 
 MOST_ENTRIES = 30_000_000
 """`read_journal` keeps no more: about 10 million messages, of which each takes a kilobyte of memory."""
@@ -298,8 +299,10 @@ class _Text:
             entry = self._decode(line)
         except UnicodeDecodeError as error:
             raise JournalDamagedError(f"{self.place}: it is not UTF-8") from error
-        except (msgspec.MsgspecError, RecursionError) as error:
-            raise JournalDamagedError(f"{self.place}: {error}") from error
+        except msgspec.MsgspecError as error:
+            raise JournalDamagedError(f"{self.place}: {describe_decode_error(error, None)}") from error
+        except RecursionError as error:
+            raise JournalDamagedError(f"{self.place}: it is nested too deep") from error
         if not isfinite(entry.t):
             raise JournalDamagedError(f"{self.place}: its time is no number")
         return (entry,)

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import msgspec
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, shortened, suggestion
+from robochoc.system.decode_errors import describe_decode_error
 
 LARGEST_FILE = 2**16
 """A channel's file has no more bytes."""
@@ -150,8 +151,6 @@ _SHIPPED = (
 CHANNELS = MappingProxyType({model.name: model for model in _SHIPPED})
 """The models that are shipped, by name."""
 
-_PLACE = re.compile(r" - at `\$\.?(\w*)[^`]*`$")
-
 
 def read_channel(path: Path) -> ChannelModel:
     """The model in the TOML file at `path`, named for the file unless it says otherwise. Raises `InvalidInputError`."""
@@ -171,10 +170,7 @@ def read_channel(path: Path) -> ChannelModel:
     try:
         return msgspec.convert(fields, ChannelModel)
     except msgspec.ValidationError as wrong:
-        said = str(wrong)
-        place = _PLACE.search(said)
-        field = f"{place[1]}: " if place and place[1] else ""
-        raise _invalid(path, field + _PLACE.sub("", said)) from None
+        raise _invalid(path, describe_decode_error(wrong, ChannelModel)) from None
 
 
 def _text(path: Path) -> str:
