@@ -26,7 +26,7 @@ from rally import End, LongRally, ManyBalls, Rally, ShortRally, pair, play, retu
 
 from robochoc.authority.admission import Household
 from robochoc.authority.identity import Identity, IdentityTexts
-from robochoc.communication.network.inbox import Arrived
+from robochoc.communication.network.inbox import FrameArrived
 from robochoc.communication.network.local import LOOPBACK, LocalNetwork
 from robochoc.communication.network.router import RefusalObserver, Router
 from robochoc.communication.network.settings import LEASE_MS, NetworkSettings
@@ -128,7 +128,7 @@ class PostEnd:
         """The next letter."""
         while True:
             item = self._post.inbox.get()
-            if isinstance(item, Arrived):
+            if isinstance(item, FrameArrived):
                 return item.content
 
     def close(self) -> None:

@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from robochoc.communication.network.profile import acquaintances
+from robochoc.communication.network.profile import possible_neighbours
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Sent
@@ -40,7 +40,7 @@ def strangers(
     team: Team, protocol: type[Protocol], seed: int, brief: RunParameters = DEFAULT_PARAMETERS
 ) -> set[tuple[str, str]]:
     """Who has written to whom without sharing a constraint."""
-    known = acquaintances(profiles_of(team))
+    known = possible_neighbours(profiles_of(team))
     found = set()
 
     def look(event: AnyEvent) -> None:

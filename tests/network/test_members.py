@@ -23,15 +23,15 @@ PROFILES = profiles_of(team_of(dict.fromkeys("ABC", (1, 2)), TRIANGLE))
 RA, RB, RC = PROFILES
 
 
-def join(members: Members, *names: str, visit: str = "first") -> None:
+def join(members: Members, *names: str, incarnation: str = "first") -> None:
     for name in names:
-        members.register(name, PROFILES[name], visit).joined = True
+        members.register(name, PROFILES[name], incarnation).joined = True
 
 
-def refused(members: Members, name: str, profile: Profile, visit: str = "first") -> str:
+def refused(members: Members, name: str, profile: Profile, incarnation: str = "first") -> str:
     before = dict(members.robots)
     with pytest.raises(RegistrationRefusedError) as caught:
-        members.register(name, profile, visit)
+        members.register(name, profile, incarnation)
     assert members.robots == before
     return str(caught.value)
 
@@ -56,7 +56,7 @@ def test_who_was_away_may_come_in_another_life_while_the_team_is_open() -> None:
     join(members, RA)
     members.robots[RA].gone = 12.5
     now = members.register(RA, PROFILES[RA], "second")
-    assert (now.visit, now.joined, now.gone) == ("second", False, None)
+    assert (now.incarnation, now.joined, now.gone) == ("second", False, None)
     now.gone = 13.5
     assert "start it anew" in refused(members, RA, PROFILES[RA], "first")
     members.closed = True
@@ -68,7 +68,7 @@ def test_who_was_given_up_comes_in_another_life_or_not_at_all() -> None:
     join(members, RA)
     members.remove([RA, "nobody"])
     assert "away for too long; start it anew" in refused(members, RA, PROFILES[RA], "first")
-    assert members.register(RA, PROFILES[RA], "second").visit == "second"
+    assert members.register(RA, PROFILES[RA], "second").incarnation == "second"
 
 
 def test_a_certificate_is_for_one_file() -> None:
@@ -241,7 +241,7 @@ def test_a_robot_that_was_away_may_come_back_in_another_life() -> None:
     with pytest.raises(RegistrationRefusedError, match="registered already"):
         members.register("A", robot("A"), "second")
     members.robots["A"].doubtful = True
-    assert members.register("A", robot("A"), "second").visit == "second"
+    assert members.register("A", robot("A"), "second").incarnation == "second"
 
 
 def test_a_team_is_not_complete_while_one_that_has_come_is_away_or_may_be_another() -> None:
@@ -288,5 +288,5 @@ def test_all_kinds_of_teams_are_taken_in_any_order() -> None:
             members = Members([name for name, _ in profiles])
             for name, profile in profiles:
                 assert not members.complete
-                members.register(name, profile, "visit").joined = True
+                members.register(name, profile, "incarnation").joined = True
             assert members.complete

@@ -303,9 +303,9 @@ class Elsewhere:
 
     def _take_part(self, name: str, patience_s: float) -> None:
         identity = self.identities[name]
-        with Transport(self.endpoint, identity, watch=(), patience_s=30) as post:
+        with Transport(self.endpoint, identity, watch=(), patience_s=30) as transport:
             robot = NetworkRobot(
-                CompiledRobot(CHAIN[name]), identity, post, lambda _: PausedABT, RobotSettings(patience_s)
+                CompiledRobot(CHAIN[name]), identity, transport, lambda _: PausedABT, RobotSettings(patience_s)
             )
             self.endings[name] = robot.run()
 

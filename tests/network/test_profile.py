@@ -21,14 +21,14 @@ from robochoc.communication.network.profile import (
     MOST_VARIABLES,
     Profile,
     ProfileError,
-    acquaintances,
     among,
     contradictions,
     domain_of,
     missing,
+    possible_neighbours,
     profile_of,
     ranges_of,
-    silhouette,
+    visible_robot,
 )
 from robochoc.formats import read_team
 from robochoc.formats.extension import MAX_VALUES
@@ -65,7 +65,7 @@ def registered(team: Team) -> Members:
     robots = list(team.robots)
     Random(len(team.name)).shuffle(robots)
     for robot in robots:
-        members.register(robot.name, profile_of(robot), "visit").joined = True
+        members.register(robot.name, profile_of(robot), "incarnation").joined = True
     for name, variables in members.unseen().items():
         domains = {variable.name: variable.domain for variable in team[name].variables}
         members.robots[name].also.update({one: ranges_of(domains[one]) for one in variables})
@@ -156,7 +156,7 @@ def test_profiles_travel_and_agree(team: Team) -> None:
 @given(team=random_teams)
 @settings(max_examples=60, deadline=None)
 def test_acquaintances_are_neighbours_and_sharers_of_constraints(team: Team) -> None:
-    met = acquaintances(profiles_of(team))
+    met = possible_neighbours(profiles_of(team))
     for robot in team.robots:
         mine = {robot.name, *met[robot.name]}
         assert len(mine) == len(met[robot.name]) + 1
@@ -174,7 +174,7 @@ def test_a_profile_tells_nothing_of_what_nobody_sees() -> None:
         for make in MAKERS:
             for robot in make(Random(seed)).robots:
                 assert set(profile_of(robot).variables) == set(robot.interface)
-                shape = silhouette(profile_of(robot), {})
+                shape = visible_robot(profile_of(robot), {})
                 assert shape.interface == robot.interface
                 assert not shape.private
                 assert not shape.shared
@@ -190,7 +190,7 @@ def changed(**news: object) -> Profile:
 
 
 def test_a_silhouette_shows_what_was_told() -> None:
-    shape = silhouette(GOOD, {"Y": ((0, 0),)})
+    shape = visible_robot(GOOD, {"Y": ((0, 0),)})
     assert [(one.name, list(one.domain)) for one in shape.variables] == [("X", [1, 2, 3, 5]), ("Y", [0])]
     assert shape.interface == ("X", "Y")
     assert ([p.name for p in shape.parents], [c.name for c in shape.children]) == (["R0"], ["R2"])
@@ -231,14 +231,14 @@ def test_a_silhouette_shows_what_was_told() -> None:
 )
 def test_absurd_profiles_are_refused(profile: Profile, why: str) -> None:
     with pytest.raises(ProfileError, match=why):
-        silhouette(profile, {})
+        visible_robot(profile, {})
 
 
 def test_what_is_shown_later_is_looked_at_as_well() -> None:
     with pytest.raises(ProfileError, match="Y has 0 values"):
-        silhouette(GOOD, {"Y": ()})
+        visible_robot(GOOD, {"Y": ()})
     with pytest.raises(ProfileError, match="is no name"):
-        silhouette(GOOD, {"": ((1, 1),)})
+        visible_robot(GOOD, {"": ((1, 1),)})
 
 
 @given(

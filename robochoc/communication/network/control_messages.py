@@ -1,4 +1,4 @@
-"""What the master and robots say to each other across machines. Letters (`letters.py`) carry these words.
+"""What the master and robots say to each other across machines. Frames (`frames.py`) carry these words.
 
 The master is the paper's: it registers robots, waits until all are there, orders the start, finds out when all is
 quiet, and stops all (Figure 3). Of robots' files it knows what their profiles say. Protocol messages
@@ -28,23 +28,26 @@ class _Word(msgspec.Struct, frozen=True, tag=True, array_like=True):
 
 
 class Register(_Word, frozen=True):
-    """I am there: this is what my file says to all. `visit` names this life of mine: who comes back is another."""
+    """I am there: this is what my file says to all.
+
+    `incarnation` names this life of mine: who comes back is another.
+    """
 
     profile: Profile
-    visit: str
+    incarnation: str
 
 
 class Joined(_Word, frozen=True):
-    """I, in the life `visit`, have read your welcome: said to each, for an answer may get lost.
+    """I, in the life `incarnation`, have read your welcome: said to each, for an answer may get lost.
 
     `card` holds my keys of this run (`KeyCard`; empty: no filter needs any).
     """
 
-    visit: str
+    incarnation: str
     card: bytes
 
 
-class Shown(_Word, frozen=True):
+class DomainAnswer(_Word, frozen=True):
     """The domains that you asked for."""
 
     variables: dict[str, Ranges]
@@ -58,7 +61,7 @@ class Exchanged(NamedTuple):
     clock: int = 0
 
 
-class Account(Report, frozen=True):
+class DetailedReport(Report, frozen=True):
     """A report with what the master needs to check it. In private runs `assignment` and findings stay empty.
 
     `assigned` says whether the robot has values. `exchanged` counts the messages with each other robot, so that what
@@ -78,7 +81,7 @@ class Charge(NamedTuple):
     price: int | float
 
 
-class Checked(OfEpoch, frozen=True):
+class CheckResult(OfEpoch, frozen=True):
     """What the constraints that I hold charge for the values that you told me; `allowed`: none is broken.
 
     `held` is how many they are. Of these, `shared` are those that others may know too; `copies` are others' constraints
@@ -100,14 +103,14 @@ class Objection(_Word, frozen=True):
     why: str
 
 
-class Gap(_Word, frozen=True):
-    """So many `letters` of `who` to me are lost for good."""
+class LostFrames(_Word, frozen=True):
+    """So many `frames` of `who` to me are lost for good."""
 
     who: str
-    letters: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
+    frames: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
 
 
-class Ask(_Word, frozen=True):
+class DirectoryRequest(_Word, frozen=True):
     """To the Directory Facilitator, in SL0; answers have the same `number`.
 
     `subscribe`: tell me now and whenever it changes what this search finds.
@@ -118,7 +121,7 @@ class Ask(_Word, frozen=True):
     subscribe: bool = False
 
 
-class Sniff(_Word, frozen=True):
+class JournalRequest(_Word, frozen=True):
     """May I have the journal of your run? The answer has the same `number`; it is asked for by `publication.py`."""
 
     number: int
@@ -132,23 +135,23 @@ class Bye(_Word, frozen=True):
 
 
 class Welcome(_Word, frozen=True):
-    """You are registered, in your life `visit`, for the run `run`; messages go through these `filters`."""
+    """You are registered, in your life `incarnation`, for the run `run`; messages go through these `filters`."""
 
-    visit: str
+    incarnation: str
     run: str
     filters: tuple[str, ...]
     observed: bool
     private: bool
 
 
-class Denied(_Word, frozen=True):
+class RegistrationDenied(_Word, frozen=True):
     """You are not registered."""
 
-    visit: str
+    incarnation: str
     why: str
 
 
-class Show(_Word, frozen=True):
+class DomainRequest(_Word, frozen=True):
     """Parts of partially known constraints look at these variables of yours: show them."""
 
     variables: tuple[str, ...]
@@ -169,11 +172,11 @@ class Task(OfEpoch, frozen=True):
     cards: tuple[bytes, ...]
 
 
-class Search(OfEpoch, frozen=True):
+class StartSearch(OfEpoch, frozen=True):
     """All robots are ready: begin."""
 
 
-class Judge(OfEpoch, frozen=True):
+class CheckRequest(OfEpoch, frozen=True):
     """These are the values that all who share constraints with you have decided on, and your own: check them."""
 
     values: Mapping[str, int]
@@ -185,7 +188,7 @@ class Revoked(_Word, frozen=True):
     name: str
 
 
-class Told(_Word, frozen=True):
+class DirectoryAnswer(_Word, frozen=True):
     """The Directory Facilitator's answer: a performative, and content in SL0."""
 
     number: int
@@ -193,7 +196,7 @@ class Told(_Word, frozen=True):
     content: str
 
 
-class Sniffable(_Word, frozen=True):
+class JournalAnswer(_Word, frozen=True):
     """You may have the journal of the run `run`; or not, because of `why`."""
 
     number: int
@@ -230,20 +233,33 @@ class Copies(OfEpoch, frozen=True):
 ToMaster = (
     Register
     | Joined
-    | Shown
+    | DomainAnswer
     | Ready
     | Counters
     | Conclusion
     | Events
-    | Account
-    | Checked
+    | DetailedReport
+    | CheckResult
     | Failed
     | Objection
-    | Gap
-    | Ask
-    | Sniff
+    | LostFrames
+    | DirectoryRequest
+    | JournalRequest
     | Bye
 )
-ToRobot = Welcome | Denied | Show | Task | Search | Wave | Pause | Judge | Revoked | Told | Sniffable | Leave
+ToRobot = (
+    Welcome
+    | RegistrationDenied
+    | DomainRequest
+    | Task
+    | StartSearch
+    | Wave
+    | Pause
+    | CheckRequest
+    | Revoked
+    | DirectoryAnswer
+    | JournalAnswer
+    | Leave
+)
 ToPeer = ProtocolMessage | Copies
-Word = ToMaster | ToRobot | ToPeer
+ControlMessage = ToMaster | ToRobot | ToPeer

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 
-from robochoc.communication.network.control_messages import Ask, Told
+from robochoc.communication.network.control_messages import DirectoryAnswer, DirectoryRequest
 from robochoc.communication.network.profile import Profile
 from robochoc.model.communicative_acts import Performative
 from robochoc.services.descriptions import MAX_SERVICES, AgentDescription, RequestRefusedError, ServiceDescription
@@ -71,7 +71,7 @@ class DirectoryFacilitator:
             raise TooManyRequestsError(f"more than {ASKED_AT_MOST} requests a second")
         self._asked[requester] = [*recent, now]
 
-    def answer(self, requester: str, ask: Ask) -> Told:
+    def answer(self, requester: str, ask: DirectoryRequest) -> DirectoryAnswer:
         """The answer to what `requester` asks in SL0; `notices` has what it subscribes to."""
         now = time.time()
         aid = self._aid(requester)
@@ -80,7 +80,7 @@ class DirectoryFacilitator:
         self._numbers[aid] = ask.number
         return _told(ask.number, subscribe(self._directory, aid, ask.content, now))
 
-    def notices(self) -> Iterator[tuple[str, Told]]:
+    def notices(self) -> Iterator[tuple[str, DirectoryAnswer]]:
         """What subscribers are to be told, each with the subscriber's name."""
         for notice in self._directory.notices():
             number = self._numbers.get(notice.subscriber, 0)
@@ -91,6 +91,6 @@ class DirectoryFacilitator:
         return f"{name}@{self._endpoint}/robochoc"
 
 
-def _told(number: int, answer: tuple[Performative, str]) -> Told:
+def _told(number: int, answer: tuple[Performative, str]) -> DirectoryAnswer:
     performative, content = answer
-    return Told(number, str(performative), content)
+    return DirectoryAnswer(number, str(performative), content)

@@ -15,7 +15,7 @@ from typing import Annotated
 
 import msgspec
 
-from robochoc.communication.network.control_messages import Sniff, Sniffable
+from robochoc.communication.network.control_messages import JournalAnswer, JournalRequest
 from robochoc.communication.network.master_events import MasterEvents
 from robochoc.journal.entries import JournalError
 
@@ -61,7 +61,7 @@ class Publication:
 
     def __init__(self, descriptor: int, fresh: Callable[[], None] = lambda: None) -> None:
         self.run = ""
-        """The run whose journal it is, as letters name it; the master sets it."""
+        """The run whose journal it is, as frames name it; the master sets it."""
         self.fresh = fresh
         self.trouble = ""
         """Why nothing is written, and so nothing given out, any more; empty: all is well."""
@@ -155,7 +155,7 @@ def _question(content: bytes) -> Question:
 
 
 class JournalServer:
-    """Where the master is asked for the journal of its `run`: by letter who may have it, then for piece after piece.
+    """Where the master is asked for the journal of its `run`: by frame who may have it, then for piece after piece.
 
     `publication` is None where it gives none out. `may` says who has the right now.
     """
@@ -172,7 +172,7 @@ class JournalServer:
         """Whether somebody has not got the end of the journal yet."""
         return self.publication is not None and self.publication.lagging
 
-    def welcome(self, name: str, sniff: Sniff) -> Sniffable:
+    def welcome(self, name: str, sniff: JournalRequest) -> JournalAnswer:
         """What `name` is told who wants to sniff."""
         why = self._why_not(name)
         if why:
@@ -180,7 +180,7 @@ class JournalServer:
         elif name not in self._known:
             self._known.add(name)
             self._chronicle.granted(name, SNIFF)
-        return Sniffable(sniff.number, self._run, why)
+        return JournalAnswer(sniff.number, self._run, why)
 
     def answer(self, name: str, content: bytes) -> bytes | None:
         """The answer to a question of `name`, as the router says it is; None: there is none."""

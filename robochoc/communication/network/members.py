@@ -9,17 +9,17 @@ from types import MappingProxyType
 
 from robochoc.communication.network.access import ALL
 from robochoc.communication.network.control_messages import Task
-from robochoc.communication.network.plausibility import Declared
+from robochoc.communication.network.plausibility import Declarations
 from robochoc.communication.network.profile import (
     Profile,
     ProfileError,
     Ranges,
-    acquaintances,
     contradictions,
     in_priority_order,
     missing,
+    possible_neighbours,
     ranges_of,
-    silhouette,
+    visible_robot,
 )
 from robochoc.model.problem import Robot
 from robochoc.protocols.traits import Traits
@@ -30,7 +30,7 @@ def reach(profiles: Mapping[str, Profile], *, writes_to_non_neighbours: bool) ->
     """To whom each of a team may write besides the master. See `Members.reach`."""
     if writes_to_non_neighbours:
         return dict.fromkeys(profiles, (ALL,))
-    met = acquaintances(profiles)
+    met = possible_neighbours(profiles)
     return {name: tuple(sorted(profiles.keys() & others)) for name, others in met.items()}
 
 
@@ -40,14 +40,14 @@ class RegistrationRefusedError(ValueError):
 
 @dataclass
 class Member:
-    """A registered robot in its life `visit`; `gone` since when it is away (None: it is there).
+    """A registered robot in its life `incarnation`; `gone` since when it is away (None: it is there).
 
     `doubtful`: it was away since its last word, and who is there now may be another life. `also` are variables that it
     has shown since, as it was `asked` for them.
     """
 
     profile: Profile
-    visit: str
+    incarnation: str
     also: dict[str, Ranges] = field(default_factory=dict)
     card: bytes = b""
     joined: bool = False
@@ -59,11 +59,11 @@ class Member:
     @property
     def robot(self) -> Robot:
         """Its silhouette."""
-        return silhouette(self.profile, self.also)
+        return visible_robot(self.profile, self.also)
 
-    def join(self, visit: str, card: bytes) -> None:
+    def join(self, incarnation: str, card: bytes) -> None:
         """It has read the welcome; a word from another life of it is none of this one's."""
-        if visit == self.visit:
+        if incarnation == self.incarnation:
             self.card, self.joined, self.doubtful = card, True, False
 
     def note_presence(self, *, there: bool) -> None:
@@ -100,20 +100,20 @@ class Members:
         self._known: frozenset[tuple[str, str]] = frozenset()
         self._acquainted: dict[str, tuple[str, ...]] = {}
         self._over: set[str] = set()
-        """Lives that have ended. In one that goes on after all, letters are numbered as nobody expects."""
+        """Lives that have ended. In one that goes on after all, frames are numbered as nobody expects."""
 
     @property
     def profiles(self) -> dict[str, Profile]:
         """What all have told of themselves."""
         return {name: member.profile for name, member in self.robots.items()}
 
-    def register(self, sender: str, profile: Profile, visit: str, *, admitted: bool = True) -> Member:
+    def register(self, sender: str, profile: Profile, incarnation: str, *, admitted: bool = True) -> Member:
         """Take `sender` in, if it is `admitted`, or find it there already in the same life.
 
         Raises `RegistrationRefusedError`.
         """
         known = self.robots.get(sender)
-        if known and known.visit == visit:
+        if known and known.incarnation == incarnation:
             known.gone, known.doubtful = None, False
             return known
         if not admitted:
@@ -122,7 +122,7 @@ class Members:
             )
         if profile.name != sender:
             raise RegistrationRefusedError(f"its file is {profile.name[:80]!r}'s, and its certificate {sender}'s")
-        if visit in self._over:
+        if incarnation in self._over:
             raise RegistrationRefusedError("it was away for too long; start it anew")
         if known and (self.closed or not (known.doubtful or known.gone)):
             raise RegistrationRefusedError(f"a robot called {sender} is registered already")
@@ -131,7 +131,7 @@ class Members:
                 "the team is complete without it" if self.closed else "it is not one of the team"
             )
         try:
-            silhouette(profile, {})
+            visible_robot(profile, {})
         except ProfileError as bad:
             raise RegistrationRefusedError(str(bad)) from None
         others = {name: other for name, other in self.profiles.items() if name != sender}
@@ -139,8 +139,8 @@ class Members:
         if wrong:
             raise RegistrationRefusedError(wrong)
         if known:
-            self._over.add(known.visit)
-        self.robots[sender] = Member(profile, visit)
+            self._over.add(known.incarnation)
+        self.robots[sender] = Member(profile, incarnation)
         return self.robots[sender]
 
     @property
@@ -188,7 +188,7 @@ class Members:
             return "it has shown variables that it was not asked for"
         shown = {variable: variables[variable] for variable in wanted if variable in variables}
         try:
-            silhouette(member.profile, {**member.also, **shown})
+            visible_robot(member.profile, {**member.also, **shown})
         except ProfileError as bad:
             return str(bad)
         member.asked.update(wanted)
@@ -222,14 +222,16 @@ class Members:
         for name in names:
             member = self.robots.pop(name, None)
             if member:
-                self._over.add(member.visit)
+                self._over.add(member.incarnation)
 
     def to_welcome(self) -> dict[str, str]:
         """Of an open team, the lives of those who are there, and have answered no welcome since they came (back).
 
         Their answer may have got lost; and of two lives of one name only the one that is still there answers.
         """
-        waiting = {name: m.visit for name, m in self.robots.items() if m.gone is None and (m.doubtful or not m.joined)}
+        waiting = {
+            name: m.incarnation for name, m in self.robots.items() if m.gone is None and (m.doubtful or not m.joined)
+        }
         return {} if self.closed else waiting
 
     @property
@@ -279,14 +281,14 @@ class Members:
             for name in order
         }
 
-    def declared(self, traits: Traits) -> Declared:
+    def declared(self, traits: Traits) -> Declarations:
         """What robots' words in a search are held against."""
         shown = {
             name: {variable.name: variable.domain for variable in member.robot.variables}
             for name, member in self.robots.items()
         }
         dearest = {name: member.profile.max_cost for name, member in self.robots.items()}
-        return Declared(traits, shown, dearest)
+        return Declarations(traits, shown, dearest)
 
     def neighbourhood(self, name: str, values: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
         """Of the decided `values`, by robot, those that all whom `name` may share a constraint with show."""
@@ -298,10 +300,10 @@ class Members:
         return found
 
     def _met(self) -> dict[str, tuple[str, ...]]:
-        """See `acquaintances`; worked out once for all who are there."""
-        there = frozenset((name, member.visit) for name, member in self.robots.items())
+        """See `possible_neighbours`; worked out once for all who are there."""
+        there = frozenset((name, member.incarnation) for name, member in self.robots.items())
         if self._known != there:
-            self._known, self._acquainted = there, acquaintances(self.profiles)
+            self._known, self._acquainted = there, possible_neighbours(self.profiles)
         return self._acquainted
 
     def _links(self, name: str) -> tuple[str, ...]:

@@ -102,7 +102,7 @@ def domain_of(name: str, ranges: Ranges) -> Domain:
     return Domain(name, tuple(range(low, high + 1) for low, high in ranges))
 
 
-def silhouette(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
+def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
     """The robot as others see it; `also` are variables that it has shown since. Raises `ProfileError`."""
     looked_at = [name for names in profile.looks_at.values() for name in names]
     names = (profile.name, *profile.neighbours, *profile.variables, *looked_at, *profile.wants, *also)
@@ -161,7 +161,7 @@ def missing(profiles: Mapping[str, Profile]) -> set[str]:
     return {name for profile in profiles.values() for name in profile.neighbours} - profiles.keys()
 
 
-def acquaintances(profiles: Mapping[str, Profile]) -> dict[str, tuple[str, ...]]:
+def possible_neighbours(profiles: Mapping[str, Profile]) -> dict[str, tuple[str, ...]]:
     """For each robot the others that it may share a constraint with: its neighbours, and other parents of a child.
 
     A constraint over more than two robots stands with its lowest robot, and the others are parents of that one.

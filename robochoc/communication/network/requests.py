@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from robochoc.communication.network.control_messages import Ask, Sniff, Sniffable, Told
+from robochoc.communication.network.control_messages import (
+    DirectoryAnswer,
+    DirectoryRequest,
+    JournalAnswer,
+    JournalRequest,
+)
 from robochoc.communication.network.facilitator import DirectoryFacilitator, TooManyRequestsError
 from robochoc.communication.network.journal_server import JournalServer
 
@@ -16,7 +21,7 @@ class Requests:
         self,
         desk: JournalServer,
         facilitator: DirectoryFacilitator,
-        tell: Callable[[str, Told | Sniffable], None],
+        tell: Callable[[str, DirectoryAnswer | JournalAnswer], None],
         refuse: Callable[[str, str, str], None],
     ) -> None:
         self._desk = desk
@@ -24,12 +29,16 @@ class Requests:
         self._tell = tell
         self._refuse = refuse
 
-    def answer(self, sender: str, word: Ask | Sniff) -> None:
+    def answer(self, sender: str, word: DirectoryRequest | JournalRequest) -> None:
         """Answer `sender`, unless it asks too often."""
         try:
             self._facilitator.count(sender)
         except TooManyRequestsError as often:
             self._refuse(sender, "ask the Directory Facilitator", str(often))
             return
-        told = self._desk.welcome(sender, word) if isinstance(word, Sniff) else self._facilitator.answer(sender, word)
+        told = (
+            self._desk.welcome(sender, word)
+            if isinstance(word, JournalRequest)
+            else self._facilitator.answer(sender, word)
+        )
         self._tell(sender, told)

@@ -1,9 +1,9 @@
 """The router: the one process that all connect to. It checks certificates and who may write to whom.
 
-It is a process of its own (`router_process.py`) that holds no letters but those under way. zenoh's access control
+It is a process of its own (`router_process.py`) that holds no frames but those under way. zenoh's access control
 cannot be changed while it runs: to register or revoke somebody, the router is closed and opened anew with other rules,
-in a fraction of a second; what was sent meanwhile is recovered (`post.py`). What it refuses it tells in its log only,
-so that is read (`Log`).
+in a fraction of a second; what was sent meanwhile is recovered (`transport.py`). What it refuses it tells in its log
+only, so that is read (`Log`).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _PROCESS = "robochoc.communication.network.router_process"
 _READY = "listening"
 _LOG = "warn"
 _LOG_OF_REFUSALS = "warn,zenoh::net::routing::interceptor=trace,zenoh_link_tls=debug"
-"""With what is allowed as well, several lines for each letter: that costs more than the letters themselves."""
+"""With what is allowed as well, several lines for each frame: that costs more than the frames themselves."""
 _CHUNK = 65536
 _DENIED = re.compile(
     rb"(?:CertCommonName\([^)]*\)\S*\+|Using cached result: )([0-9a-f]+) is unauthorized to ([A-Za-z/ ]+?)"

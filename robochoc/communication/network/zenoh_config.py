@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import zenoh
 
 RX_BYTES = 32 * 2**20
-"""What zenoh takes from the network at once: more than a letter, so that one that is too large is refused aloud."""
+"""What zenoh takes from the network at once: more than a frame, so that one that is too large is refused aloud."""
 
 
 def config(settings: Mapping[str, object]) -> zenoh.Config:

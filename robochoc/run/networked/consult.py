@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from queue import Empty
 
 from robochoc.authority.identity import Identity
-from robochoc.communication.network.control_messages import Ask, Told
+from robochoc.communication.network.control_messages import DirectoryAnswer, DirectoryRequest
 from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing
-from robochoc.communication.network.inbox import Arrived
+from robochoc.communication.network.inbox import FrameArrived
 from robochoc.communication.network.transport import CannotConnectError, Transport
 from robochoc.model.communicative_acts import Performative
 from robochoc.run.networked.address import Address
@@ -69,8 +69,8 @@ def search_words(place: Address, slots: Sequence[str], at_most: int | None = Non
 
 def consult(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> str:
     """What the directory answers to `words`, in SL0. Raises `CannotConnectError` and `NoAnswerError`."""
-    with Transport(str(place), identity, watch=(), patience_s=patience_s) as post:
-        return _Asking(place, identity, post).asked(words, Performative.INFORM)
+    with Transport(str(place), identity, watch=(), patience_s=patience_s) as transport:
+        return _Asking(place, identity, transport).asked(words, Performative.INFORM)
 
 
 def watch(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> Iterator[str]:
@@ -78,15 +78,15 @@ def watch(place: Address, identity: Identity, words: str, patience_s: float = 10
 
     It ends with `NoAnswerError` when the master is gone for `patience_s`. Raises `CannotConnectError` as well.
     """
-    with Transport(str(place), identity, watch=(), patience_s=patience_s) as post:
-        asking = _Asking(place, identity, post)
+    with Transport(str(place), identity, watch=(), patience_s=patience_s) as transport:
+        asking = _Asking(place, identity, transport)
         asking.asked(words, Performative.AGREE, subscribe=True)
         heard = time.monotonic()
         while time.monotonic() - heard < patience_s:
             told = asking.told()
             if told:
                 yield told.content
-            if told or post.router:
+            if told or transport.router:
                 heard = time.monotonic()
     raise NoAnswerError(f"the master at {place} is gone")
 
@@ -94,13 +94,13 @@ def watch(place: Address, identity: Identity, words: str, patience_s: float = 10
 class _Asking:
     """One who asks; answers to others' questions, and to earlier ones, are none."""
 
-    def __init__(self, place: Address, identity: Identity, post: Transport) -> None:
+    def __init__(self, place: Address, identity: Identity, transport: Transport) -> None:
         self._place = place
         self._name = identity.name
-        self._post = post
-        self._letters = Framing(identity.name)
+        self._transport = transport
+        self._framing = Framing(identity.name)
         self._number = secrets.randbits(_NUMBER_BITS)
-        self._early: list[Told] = []
+        self._early: list[DirectoryAnswer] = []
 
     def asked(self, words: str, wanted: Performative, *, subscribe: bool = False) -> str:
         """Ask until there is an answer; its content. Raises `NoAnswerError`."""
@@ -108,7 +108,9 @@ class _Asking:
         while time.monotonic() < until:
             if time.monotonic() - asked > ASK_AGAIN_S:
                 asked = time.monotonic()
-                self._post.send(MASTER, self._letters.write(MASTER, Ask(self._number, words, subscribe)))
+                self._transport.send(
+                    MASTER, self._framing.write(MASTER, DirectoryRequest(self._number, words, subscribe))
+                )
             told = self._next()
             if told is None:
                 continue
@@ -123,19 +125,19 @@ class _Asking:
             f"the master at {self._place} does not answer {self._name}; is it enrolled with its Authority?"
         )
 
-    def told(self) -> Told | None:
+    def told(self) -> DirectoryAnswer | None:
         """The next INFORM; None: for a moment there was none."""
         if self._early:
             return self._early.pop(0)
         told = self._next()
         return told if told and told.performative == Performative.INFORM else None
 
-    def _next(self) -> Told | None:
+    def _next(self) -> DirectoryAnswer | None:
         try:
-            item = self._post.inbox.get(timeout=0.1)
+            item = self._transport.inbox.get(timeout=0.1)
         except Empty:
             return None
-        told = _told(self._letters, item) if isinstance(item, Arrived) and item.sender == MASTER else None
+        told = _told(self._framing, item) if isinstance(item, FrameArrived) and item.sender == MASTER else None
         return told if told and told.number == self._number else None
 
 
@@ -149,12 +151,12 @@ def about(answer: str) -> str:
     return searched_in(answer).name
 
 
-def _told(letters: Framing, item: Arrived) -> Told | None:
+def _told(framing: Framing, item: FrameArrived) -> DirectoryAnswer | None:
     try:
-        word = letters.read(item.sender, item.content).word
+        word = framing.read(item.sender, item.content).message
     except FrameRefusedError:
         return None
-    return word if isinstance(word, Told) else None
+    return word if isinstance(word, DirectoryAnswer) else None
 
 
 __all__ = ["CannotConnectError", "NoAnswerError", "TemplateError", "about", "consult", "found", "search_words", "watch"]

@@ -68,5 +68,5 @@ def join(robot: Robot, place: Address, identity: Identity, settings: RobotSettin
     settings = replace(settings, compiled=lambda shown: compiler.compile(shown).domain)
     own = CompiledRobot(robot, settings.compiled)
     settings.stage(f"looking for the master at {place}")
-    with Transport(str(place), identity, watch=(), patience_s=settings.patience_s) as post:
-        return NetworkRobot(own, identity, post, protocol_by_name, settings).run()
+    with Transport(str(place), identity, watch=(), patience_s=settings.patience_s) as transport:
+        return NetworkRobot(own, identity, transport, protocol_by_name, settings).run()
