@@ -19,7 +19,7 @@ from robochoc.view.playback_json import playback_json
 from robochoc.view.scene import Scene
 from robochoc.view.script import viewer_script
 
-_PLAYER = ("names.js", "trails.js", "camera.js", "player.js", "timeline.js", "page.js")
+_PLAYER = ("labels.js", "trails.js", "camera.js", "player.js", "timeline.js", "page.js")
 """The player's parts. In this order they are one script."""
 
 

@@ -1,7 +1,8 @@
-"""meshcat's viewer: the script that a page needs to show a scene."""
+"""The scripts that a page needs to show a scene: meshcat's viewer, and labels that can be read."""
 
 from __future__ import annotations
 
+from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -16,3 +17,8 @@ def viewer_script() -> str:
         raise ModuleNotFoundError("meshcat, whose viewer draws the scene, is not installed", name="meshcat")
     viewer = Path(found.submodule_search_locations[0]) / "viewer" / "dist" / "main.min.js"
     return viewer.read_text(encoding="utf-8")
+
+
+def labels_script() -> str:
+    """Return the JavaScript that chooses which labels of a scene are shown, and how large."""
+    return (files(__package__) / "labels.js").read_text(encoding="utf-8")

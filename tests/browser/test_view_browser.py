@@ -113,7 +113,7 @@ def test_of_names_that_would_cover_each_other_one_is_written(player: Page) -> No
 
     def named() -> list[bool]:
         written: list[bool] = player.evaluate(
-            "Playback.names.choose(), Playback.names.names.map((name) => name.visible)"
+            "Playback.labels.choose(), Playback.labels.names.map((name) => name.visible)"
         )
         return written
 
