@@ -169,14 +169,19 @@ class _Columns:
 def _scaled(times: Iterable[float], *, exact: bool) -> tuple[Literal[0, 1, 1_000_000_000], list[int] | bytes]:
     """Return times as a scale and the steps between whole numbers of 1 / scale, or (0) as the doubles that they are."""
     times = array("d", times)
-    if all(map(float.is_integer, times)):
+    if all(map(float.is_integer, times)) and _fit_in_steps(times, 1):
         return 1, _steps(map(int, times))
-    if not exact and all(map(isfinite, times)):
+    if not exact and all(map(isfinite, times)) and _fit_in_steps(times, NANOSECONDS):
         return 1_000_000_000, _steps([round(t * NANOSECONDS) for t in times])
     doubles = array("d", [t if isfinite(t) else 0.0 for t in times])  # what a stranger's clock says may be no number
     if sys.byteorder == "big":
         doubles.byteswap()
     return 0, doubles.tobytes()
+
+
+def _fit_in_steps(times: Iterable[float], scale: int) -> bool:
+    """Return whether steps between `times` fit into 64 bits, in units of 1 / `scale`."""
+    return all(abs(t) * scale < _LARGEST // 2 for t in times)
 
 
 def _steps(numbers: Iterable[int]) -> list[int]:
@@ -282,7 +287,7 @@ def _times(block: _Block) -> Sequence[float]:
         return doubles
     if not block.scale:
         raise ValueError("times are whole numbers, but have no scale")
-    return [number / block.scale for number in accumulate(block.times)]
+    return [number / block.scale for number in _whole(accumulate(block.times))]
 
 
 def _finite(times: Iterable[float]) -> None:

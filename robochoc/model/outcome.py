@@ -1,4 +1,4 @@
-"""What a run comes to: the typed form of the JSON result (FORMAT.md, "What comes out")."""
+"""What a run comes to: the typed form of the JSON result (docs/reference/result.md)."""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ filter_option = click.option(
 )
 
 
-_SAME_NAMES = ("seed", "timeout", "delay", "count", "verify", "messages", "spares", "patience", "filters")
+_SAME_NAMES = ("seed", "timeout", "delay", "count", "verify", "messages", "spares", "patience", "filters", "kill")
 """Arguments of `robochoc solve` that are called as in `robochoc.run.Options`."""
 
 
