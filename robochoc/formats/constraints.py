@@ -1,4 +1,4 @@
-"""One `constraint` element: a definition applied to a scope (FORMAT.md, "One robot")."""
+"""One `constraint` element: a definition applied to a scope (docs/reference/format.md, "One robot")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What holds of domains, relations, predicates and topics, whoever made them (FORMAT.md, "One robot").
+"""What holds of domains, relations, predicates and topics, whoever made them (docs/reference/format.md, "One robot").
 
 Expressions have no rules here: a tree is written down and handed to the parser, whose rules are the only ones.
 """
@@ -155,7 +155,7 @@ def parsed(said: str, names: tuple[str, ...], wanted: Type) -> Expression:
 def expression_mistake(what: str, error: ExpressionError, line: int = 0) -> MistakeError:
     """Return what is wrong with the expression of `what`, which stands in that `line`."""
     message = f"{what}: {error.message}, at character {error.position + 1}"
-    return MistakeError(message, error.hint or "see FORMAT.md, 'Functional expressions'", line)
+    return MistakeError(message, error.hint or "see docs/reference/format.md, 'Functional expressions'", line)
 
 
 def _check_size(expression: object) -> None:

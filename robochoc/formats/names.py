@@ -1,4 +1,4 @@
-"""What can be a name, and what a number, in a robot's data (FORMAT.md, "One robot")."""
+"""What can be a name, and what a number, in a robot's data (docs/reference/format.md, "One robot")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The JSON result (FORMAT.md, "What comes out"): one object for one team and run."""
+"""The JSON result (docs/reference/result.md): one object for one team and run."""
 
 from __future__ import annotations
 

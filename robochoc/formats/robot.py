@@ -1,4 +1,4 @@
-"""The third layer: what one robot's file means (FORMAT.md, "One robot"; Figure 2)."""
+"""The third layer: what one robot's file means (docs/reference/format.md, "One robot"; Figure 2)."""
 
 from __future__ import annotations
 

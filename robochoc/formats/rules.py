@@ -1,4 +1,4 @@
-"""What holds of a robot's constraints and neighbours, whoever made it (FORMAT.md, "One robot").
+"""What holds of a robot's constraints and neighbours, whoever made it (docs/reference/format.md, "One robot").
 
 With `names` and `definitions` this is the one list of rules on a robot. The readers of files ask them of each element
 that they have read, `objects` asks them of every object of a robot that was built in Python. What two robots can get

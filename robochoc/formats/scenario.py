@@ -1,4 +1,4 @@
-"""`scenario.xml`: how a team's problem changes over time (FORMAT.md, "Changes over time")."""
+"""`scenario.xml`: how a team's problem changes over time (docs/reference/format.md, "Changes over time")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Shared constraints and the robots of their scopes (FORMAT.md, "One robot" on n-ary constraints, and "The team")."""
+"""Check shared constraints against the robots of their scopes.
+
+docs/reference/format.md, "One robot" on n-ary constraints, and "The team".
+"""
 
 from __future__ import annotations
 

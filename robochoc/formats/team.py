@@ -33,7 +33,8 @@ def find_teams(path: Path | str) -> list[Path]:
 def read_team(folder: Path | str) -> Team:
     """Return the team whose robots are the XML files in `folder`, in priority order.
 
-    Raises `InvalidInputError` with the mistakes of all its files, and of all pairs of files (FORMAT.md, "The team").
+    Raises `InvalidInputError` with the mistakes of all its files, and of all pairs of files
+    (docs/reference/format.md, "The team").
     """
     folder = Path(folder)
     paths = [folder / name for name in _xml_files(_listing(folder)) if name != SCENARIO]

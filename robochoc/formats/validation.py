@@ -1,4 +1,4 @@
-"""Whether a team is valid, whoever made it: the rules of FORMAT.md, asked of the data.
+"""Whether a team is valid, whoever made it: the rules of docs/reference/format.md, asked of the data.
 
 A team that was read is valid: its reader has asked the same. A team that was built in Python, by hand, by a generator
 or by a change, is looked at when somebody wants to solve or to write it. What has been found valid is remembered for
@@ -47,7 +47,7 @@ _valid: dict[int, weakref.ref[Team]] = {}
 
 
 def check_team(team: Team) -> None:
-    """Raise `InvalidInputError` with every mistake of `team`, unless it is valid (FORMAT.md).
+    """Raise `InvalidInputError` with every mistake of `team`, unless it is valid (docs/reference/format.md).
 
     The messages are those for files; where a file's have its name and a line, these have the robot, and what of it is
     wrong. A team that was found valid before is not looked at again.

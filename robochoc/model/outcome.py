@@ -1,4 +1,4 @@
-"""The outcome of a run: the typed form of the JSON result (docs/reference/format.md)."""
+"""What a run comes to: the typed form of the JSON result (docs/reference/result.md)."""
 
 from __future__ import annotations
 

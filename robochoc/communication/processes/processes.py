@@ -5,7 +5,7 @@ queue when a robot wants to talk to another for the first time, detects quiescen
 epoch. Protocol messages go from robot to robot and never through the parent.
 
 Crash detection: the parent watches every process's sentinel; a robot's control pipe ends with the parent. Why fork, why
-queues are opened on demand, and what was measured: docs/design.md, "Processes".
+queues are opened on demand, and what was measured: docs/explanation/design.md, "Processes".
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ def parse(text: str, names: Collection[str], wanted: Type) -> Expression:
     """Read a functional expression over `names` that yields a `wanted` value.
 
     Reads XCSP 2.1's functional form, and what Figure 2 writes besides: an argument list in parentheses of its own,
-    infix `+ - *`, and `minus(i-j)` (FORMAT.md, "Functional expressions"). Raises `ExpressionError`.
+    infix `+ - *`, and `minus(i-j)` (docs/reference/format.md, "Functional expressions"). Raises `ExpressionError`.
     """
     if len(text) > MAX_TEXT:
         raise ExpressionError(

@@ -15,7 +15,7 @@ from robochoc.formats import InvalidInputError, write_team
 from robochoc.journal.events import AnyEvent, Concluded
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.run.networked.address import AddressError
-from robochoc.run.registry import UnknownProtocolError, offers
+from robochoc.run.registry import UnknownProtocolError, installed_protocols
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.deployments import Deployment
 from tests.support.problems import team_of
@@ -120,7 +120,7 @@ def test_protocols_as_the_paper_calls_them(word: str, name: str) -> None:
 
 
 def test_every_protocol_has_a_class_that_names_it() -> None:
-    named = [(offer.name, offer.protocol.__name__) for offer in offers() if offer.protocol]
+    named = [(offer.name, offer.protocol.__name__) for offer in installed_protocols() if offer.protocol]
     words = [{name.casefold(), kind.casefold()} for name, kind in named]
     assert sum(map(len, words)) == len(set().union(*words))
 

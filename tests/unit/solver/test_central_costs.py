@@ -20,7 +20,7 @@ from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Se
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run import Options, Runtime, Withdrawal, solve
-from robochoc.run.incumbent import absent
+from robochoc.run.incumbent import robots_without_values
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import Solved
 from robochoc.solver.central import CentralAnswer, CentralSolver
@@ -331,4 +331,4 @@ def test_the_program_refuses_to_count_costs(tmp_path: Path) -> None:
 
 def test_absent_is_who_has_no_value() -> None:
     team = team_of({"A": (1,), "B": (1,)}, [])
-    assert absent(team, {"B": 1}) == ("RA",)
+    assert robots_without_values(team, {"B": 1}) == ("RA",)

@@ -15,7 +15,7 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.run import Options, solve
-from robochoc.run.incumbent import absent
+from robochoc.run.incumbent import robots_without_values
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.encoding import Codes, Network, Table
@@ -94,7 +94,7 @@ def test_when_the_time_is_over_those_who_stay_so_far_are_told(warm: AceProcess) 
         lambda judgement: bool(judgement.assignment),
         lambda limit: CentralSolver(deadline=time.monotonic() + limit, solver=warm).solve(team, withdrawal_cost=1),
     )
-    away = absent(team, judgement.assignment)
+    away = robots_without_values(team, judgement.assignment)
     assert judgement.verdict is Verdict.UNKNOWN
     assert judgement.cost == len(away) == 36 - len(judgement.assignment)
     assert not list(violations(team, judgement.assignment, away))
