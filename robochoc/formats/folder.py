@@ -22,7 +22,7 @@ def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
     already, unless `replace` is set and it is a team's folder (one that holds nothing but XML files). Raises `OSError`
     when the folder cannot be written.
     """
-    import secrets  # noqa: PLC0415 - start-up: only who writes a team needs them
+    import secrets  # noqa: PLC0415 - start-up: only to write a team
     import shutil  # noqa: PLC0415 - the same
 
     check_writable(team)

@@ -65,7 +65,7 @@ def read_team(folder: Path | str) -> Team:
 def robot_names(folder: Path | str) -> tuple[str, ...]:
     """Return the names of the robots whose files are in `folder`, in natural order, from the files' names alone.
 
-    No file is opened: whoever only has to know who takes part need not see what each robot has to solve. Raises
+    No file is opened: to know the names, one need not know the robots' problems. Raises
     `InvalidInputError` when the folder cannot be read, or has no robot.
     """
     names = tuple(Path(name).stem for name in _xml_files(_listing(Path(folder))) if name != SCENARIO)
@@ -80,7 +80,7 @@ def _whole(folder: Path, members: TeamMembers) -> Team:
 
 
 def _informed(members: TeamMembers, name: str) -> Robot:
-    """Return the robot `name`; where its file does not say what a child must be told, the constraints do."""
+    """Return the robot `name`; where its file does not name the variables of a child, constraints do."""
     file = members.files[name]
     children = []
     for child in file.robot.children:

@@ -79,7 +79,7 @@ def queens3d(
 
 
 def _robot(name: str, cells: Sequence[Cell], flown_by: Mapping[Cell, str], levels: Domain, model: QueensModel) -> Robot:
-    """Return the robot that flies the drones of `cells`; it holds what they owe each other, and what they owe above."""
+    """Return the robot that flies the drones of `cells`, with their constraints."""
     n = len(levels)
     private, above, below = [], dict[str, list[Constraint]](), dict[str, list[str]]()
     for cell in cells:
@@ -120,7 +120,7 @@ def _attackable(cell: Cell, n: int) -> Iterator[Cell]:
 
 
 def _apart(parent: Cell, child: Cell, model: QueensModel) -> Constraint:
-    """Return what two robots owe each other; p1's i and j are the coordinates in which the cells differ."""
+    """Return the constraint between two cells. p1's i and j are the coordinates in which the cells differ."""
     names = (_variable(parent), _variable(child))
     diagonal = parent[0] != child[0] and parent[1] != child[1]
     if diagonal and model is QueensModel.PLANAR:

@@ -59,7 +59,7 @@ class CompiledDomain:
         return {} if index == len(self.values) else dict(zip(self.variables, self.solutions[index], strict=True))
 
     def behind(self, value: Value) -> dict[str, int]:
-        """Return the same for `value`, as neighbours see it: one that the robot does not have is to step aside."""
+        """Return the same for `value`, as neighbours see it. A value that the robot does not have means withdrawal."""
         return self.solution(self.values.index(value) if value in self.values else len(self.values))
 
 

@@ -34,7 +34,8 @@ class OutOfTimeError(Exception):
 class TeamCompiler:
     """Compiles teams of one run. `seconds` is how long solvers took for it; no solver, no time.
 
-    `deadline` is on the monotonic clock. `stage` is told in a few words how far it is. For the others see `Compiler`.
+    `deadline` is on the monotonic clock. `stage` is called with a few words on the progress. For the others see
+    `Compiler`.
     """
 
     seconds: float = 0.0

@@ -2,7 +2,7 @@
 
 For the variables that share charges there is one more variable, whose codes are what they are charged, and a table
 that says which of them goes with which codes of theirs. What is left for the solver to compute is a sum of these
-variables, none of which is negative; what is minimised is checked again by whoever knows the problem.
+variables, none of which is negative; the minimum is checked again with the original problem.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class WeightedComponent:
         return self.base + self.unit * sum(codes[place] for place in self.costs)
 
     def decoded(self, codes: Sequence[int]) -> dict[str, int]:
-        """Return the values of the variables behind a solution of `network`; those that are aside have none."""
+        """Return the values of the variables behind a solution of `network`; withdrawn ones have none."""
         values = self.part.values
         own = zip(self.part.names, codes, strict=False)
         return {name: values[code] for name, code in own if code < len(values)}
