@@ -54,9 +54,12 @@ class RobotFile(TeamMember):
 
 
 def read_robot(path: Path | str) -> Robot:
-    """Return the robot in the XML file `path`, named after the file's stem.
+    """Return the robot in the XML file `path`. It is named after the file's stem.
 
-    Its neighbours are not looked at: `read_team` does that. Raises `InvalidInputError` with all mistakes of the file.
+    Its neighbours' files are not checked: `read_team` does that.
+
+    Raises:
+        InvalidInputError: with all mistakes of the file.
     """
     return read_robot_file(Path(path)).robot
 
@@ -73,7 +76,10 @@ def read_robot_file(path: Path) -> RobotFile:
 def robot_in(content: bytes, name: str) -> Robot:
     """Return the robot called `name`, whose XML file has this `content`. There need not be such a file.
 
-    The same limits hold as for a file. Raises `InvalidInputError`, whose messages name the file `NAME.xml`.
+    The same limits hold as for a file.
+
+    Raises:
+        InvalidInputError: with all mistakes. Messages name the file `NAME.xml`.
     """
     path = Path(f"{name}.xml")
     _check_name(name, path)

@@ -45,7 +45,8 @@ _HINTS = {
 def read_xml(path: Path, root: str) -> etree._Element:
     """Return the root element of the XML file `path`, which must be a `root` and valid by its schema.
 
-    Raises `InvalidInputError` with every mistake that the failing layer shows.
+    Raises:
+        InvalidInputError: with every mistake that the failing layer shows.
     """
     try:
         content = _bytes(path)

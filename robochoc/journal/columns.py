@@ -196,7 +196,8 @@ _decode = msgspec.msgpack.Decoder(_Block).decode
 def entries_of(content: bytes) -> list[JournalEntry]:
     """Return the entries of a block that holds `content`.
 
-    Raises `BlockError` where that is anything but what is written.
+    Raises:
+        BlockError: if `content` is not what `columns_of` writes.
     """
     try:
         block = _decode(content)

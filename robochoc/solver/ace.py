@@ -113,10 +113,19 @@ class AceProcess:
         strategy: Strategy = "default",
         deadline: float | None = None,
     ) -> SolverAnswer:
-        """Return all solutions of `network`, up to `limit`; by `deadline` on the monotonic clock.
+        """Return the solutions of `network`.
 
-        Raises `SolverMissingError`, `SolverLostError`, `SolverTimeoutError`; after the last two the process is gone,
-        and the next task starts another.
+        Args:
+            network: The network.
+            limit: How many solutions are wanted. None: all.
+            count_only: Whether only their number is wanted.
+            strategy: How ACE searches.
+            deadline: The end of the time, on the monotonic clock.
+
+        Raises:
+            SolverMissingError: if there is no Java.
+            SolverLostError: if the solver's process died. The next task starts another.
+            SolverTimeoutError: if the time is over. The process is ended, and the next task starts another.
         """
         self.begin(network, limit=limit, count_only=count_only, strategy=strategy)
         return self.answer(deadline)

@@ -58,7 +58,10 @@ class Enumeration(NamedTuple):
 def enumerate_solutions(network: Network, budget: Budget, *, limit: int | None, count_only: bool) -> Enumeration:
     """Return the solutions of `network`, up to `limit`, in lexicographic order.
 
-    `network` is propagated. Raises `OutOfStepsError` when the budget does not suffice.
+    `network` is propagated.
+
+    Raises:
+        OutOfStepsError: when the budget does not suffice.
     """
     search = _Search(network, budget)
     solutions: list[Codes] = []
@@ -78,7 +81,10 @@ def enumerate_solutions(network: Network, budget: Budget, *, limit: int | None, 
 def minimum_solution(network: Network, budget: Budget, costs: Codes) -> Codes | None:
     """Return a solution of `network` in which the codes at the places `costs` sum up to the least, if there is one.
 
-    `network` is propagated. Raises `OutOfStepsError` when the budget does not suffice.
+    `network` is propagated.
+
+    Raises:
+        OutOfStepsError: when the budget does not suffice.
     """
     return _Search(network, budget).cheapest(costs)
 

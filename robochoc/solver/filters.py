@@ -22,8 +22,10 @@ MAX_FILTER_BITS = 65_536
 class Filters:
     """Makes the filters that one robot sends, and says where its own values stand in those that it gets.
 
-    `constraints` are those with each receiver; robots that are not in it get a full filter. Raises
-    `UnsupportedError` when the robot's own values are too many for a filter.
+    `constraints` are those with each receiver; robots that are not in it get a full filter.
+
+    Raises:
+        UnsupportedError: when the robot's own values are too many for a filter.
     """
 
     def __init__(

@@ -54,8 +54,9 @@ class TeamCompiler:
     def compile(self, team: Team, *, every: bool = False) -> CompiledTeam:
         """Return `team`, which is what robots will work on, compiled.
 
-        Raises `NoLocalSolutionError` at the first robot without values, unless `every` robot is wanted;
-        `OutOfTimeError`; and as `Compiler.compile` does.
+        Raises:
+            NoLocalSolutionError: at the first robot without values, unless `every` robot is wanted;
+                `OutOfTimeError`; and as `Compiler.compile` does.
         """
         began = time.monotonic()
         solved, number = False, count(1)

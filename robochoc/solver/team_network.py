@@ -23,8 +23,10 @@ def team_network(team: Team) -> tuple[Network, Codes]:
 
     Unary constraints are folded into domains, cliques of `ne` are made explicit. What soft constraints charge are
     variables too, after the others: those at the places that are returned, whose sum is what the problem costs.
-    Raises `UnsupportedError` for a team that changes over time, and when a constraint is too large to be a table, or
-    charges too much, or a value is none that XCSP3's solvers take.
+
+    Raises:
+        UnsupportedError: for a team that changes over time, and when a constraint is too large to be a table, or
+            charges too much, or a value is none that XCSP3's solvers take.
     """
     if team.dynamic:
         raise UnsupportedError(f"{team.name} has a scenario.xml; an XCSP3 file holds one problem, not its changes")

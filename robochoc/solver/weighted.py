@@ -61,8 +61,10 @@ class WeightedComponent:
 def weighted_components(variables: Iterable[Variable], constraints: Sequence[Constraint]) -> list[WeightedComponent]:
     """Return the problem of `variables` and `constraints`, split into what does not depend on each other.
 
-    What constraints on constants charge is left out. Raises `UnsupportedError` when a constraint has too many tuples,
-    or charges are too high.
+    What constraints on constants charge is left out.
+
+    Raises:
+        UnsupportedError: when a constraint has too many tuples, or charges are too high.
     """
     soft = [constraint for constraint in constraints if is_soft(constraint) and constraint.variables]
     parts = components(variables, constraints, [constraint.variables for constraint in soft])
@@ -104,7 +106,10 @@ def _by_scope(part: Component, soft: Iterable[Constraint]) -> dict[Codes, list[C
 def with_cost_variables(part: Component, network: Network, charges: Mapping[Codes, CostRows]) -> WeightedComponent:
     """Return `network`, which is that of `part`, with a variable for every scope that is charged.
 
-    Combinations of codes that a scope has no price for are forbidden. Raises `UnsupportedError` when they are too high.
+    Combinations of codes that a scope has no price for are forbidden.
+
+    Raises:
+        UnsupportedError: when they are too high.
     """
     least = {scope: int(min(prices.values(), default=0)) for scope, prices in charges.items()}
     above = {scope: {row: int(price) - least[scope] for row, price in charges[scope].items()} for scope in charges}
