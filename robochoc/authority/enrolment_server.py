@@ -24,7 +24,7 @@ from robochoc.authority.events import Refused
 from robochoc.authority.frames import (
     Answer,
     Certified,
-    Denied,
+    EnrolmentDenied,
     Exchange,
     FrameError,
     Introduce,
@@ -161,16 +161,16 @@ class EnrolmentServer:
         try:
             return self._answer(exchange.question(), connection.getpeercert(binary_form=True), origin)
         except NotGrantedError as refusal:  # which the Authority has reported
-            return Denied(str(refusal))
+            return EnrolmentDenied(str(refusal))
         except FrameError as error:
             self._refuse(origin, str(error))
-            return Denied(str(error))
+            return EnrolmentDenied(str(error))
         except AuthorityError as error:
             self._refuse(origin, str(error))
-            return Denied("the Authority cannot answer at the moment; ask whoever runs it")
+            return EnrolmentDenied("the Authority cannot answer at the moment; ask whoever runs it")
 
     def _answer(self, question: Question, shown: bytes | None, origin: str) -> Answer:
-        """The answer to whoever has `shown` a certificate (DER) in the handshake, or none."""
+        """Return the answer to whoever has `shown` a certificate (DER) in the handshake, or none."""
         match question:
             case Introduce():
                 return Introduction(pem(self._authority.certificate))

@@ -34,7 +34,10 @@ class Host:
 
     @classmethod
     def of(cls, protocol: type[Protocol], part: AgentProblem) -> Self:
-        """A host for the robot whose part of the problem is `part`. Raises `UnsupportedError` (see `LocalProblem`)."""
+        """Return a host for the robot whose part of the problem is `part`.
+
+        Raises `UnsupportedError` (see `LocalProblem`).
+        """
         return cls(protocol(LocalProblem(part), PriorityOrder(part.order, part.links)), part.parameters)
 
     def __init__(self, protocol: Protocol, brief: RunParameters = DEFAULT_PARAMETERS) -> None:
@@ -83,7 +86,7 @@ class Host:
         return self._step(protocol.start)
 
     def change(self, part: AgentProblem, void: Invalidated) -> None:
-        """A new epoch: the problem has changed to `part`, and counting begins again.
+        """Enter a new epoch: the problem has changed to `part`, and counting begins again.
 
         A protocol that can goes on with what it knows; any other is begun anew. Raises `UnsupportedError`.
         """
@@ -145,7 +148,7 @@ class Host:
         return self._step(self.protocol.settle)
 
     def metrics(self) -> Metrics:
-        """What this robot has sent and checked so far; `ncccs` is its own clock."""
+        """Return what this robot has sent and checked so far; `ncccs` is its own clock."""
         return Metrics(dict(self.sent), self.bytes, self.clock, self.checks, largest=self.largest)
 
     def _equip(self, brief: RunParameters) -> None:
@@ -198,7 +201,7 @@ class Host:
         self.clock = before + self._checks
 
     def _time(self, checks: int) -> float:
-        """The time when so many checks were done."""
+        """Return the time when so many checks were done."""
         return self._now() if self._then is None else self._then(checks)
 
     @property

@@ -124,7 +124,7 @@ class SearchState:
         return self.counters.begin_wave() if self.wave_due or (wanted and not self.counters.waving) else None
 
     def has_reported(self, name: str) -> bool:
-        """Whether the robot has reported the end of its search."""
+        """Return whether the robot has reported the end of its search."""
         return name in self._reports
 
     @property

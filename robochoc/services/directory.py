@@ -50,7 +50,7 @@ class Directory:
         self._next_end = math.inf
 
     def __len__(self) -> int:
-        """How many are registered, those included whose lease has ended since a time was last given."""
+        """Return how many are registered, those included whose lease has ended since a time was last given."""
         return len(self._registered)
 
     def register(self, description: AgentDescription, now: float, *, requester: str) -> None:
@@ -74,7 +74,7 @@ class Directory:
         self._put(description, now)
 
     def renew(self, name: str, now: float, *, requester: str) -> None:
-        """The lease of `name` begins again."""
+        """Begin the lease of `name` again."""
         _authorise(name, requester)
         self._lapse(now)
         description = self._known(name).description
@@ -91,7 +91,7 @@ class Directory:
     def search(
         self, template: AgentDescription, now: float, max_results: int | None = None
     ) -> tuple[AgentDescription, ...]:
-        """Who matches `template`, by name, and of them the first `max_results` only (None or negative: all)."""
+        """Return the agents that match `template`, by name; at most `max_results` (None or negative: all)."""
         check_bounds(template)
         self._lapse(now)
         known = self._registered
@@ -130,7 +130,7 @@ class Directory:
             self._notices = {key: notice for key, notice in self._notices.items() if key[0] != subscriber}
 
     def notices(self) -> Sequence[Notice]:
-        """What subscribers are to be told, oldest first, and each of an agent only what is newest; told once."""
+        """Return notices for subscribers, once each, oldest first; of each agent only the newest."""
         told = tuple(self._notices.values())
         self._notices.clear()
         return told

@@ -62,7 +62,7 @@ def subscribe(directory: Directory, requester: str, content: str, now: float) ->
 
 
 def told(df: AgentIdentifier, notice: Notice) -> str:
-    """The content of the INFORM that tells a subscriber of `notice`: what a search for that agent finds now."""
+    """Return the content of the INFORM that tells a subscriber of `notice`: what a search for that agent finds now."""
     searched = described(AgentDescription(notice.name))
     action = listed("action", expression_of(df), listed(Function.SEARCH, searched))
     found = [] if notice.description is None else [described(notice.description)]
@@ -109,5 +109,5 @@ def _arguments(action: Action, at_most: int) -> tuple[Expression, ...]:
 
 
 def _proposition(reason: Reason, about: Sequence[str]) -> Expression:
-    """A proposition without arguments is the bare word in SL0."""
+    """Return a proposition without arguments is the bare word in SL0."""
     return listed(reason, *map(name, about)) if about else Word(reason)

@@ -91,7 +91,7 @@ def test_damage_and_an_empty_journal_are_told(browser: Any, tmp_path: Path) -> N
             assert "The journal is damaged" in page.inner_text("#notices")
     file.write_bytes(journal_of([], OUTCOME))
     with sniffer_server(Session(file)) as server, shown(browser, server.url, "0 messages") as page:
-        until(lambda: "Nobody has said anything" in page.inner_text("#notices"), "an empty page, and nobody says why")
+        until(lambda: "There are no messages" in page.inner_text("#notices"), "an empty page without a notice")
 
 
 def test_names_of_strangers_are_text(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401

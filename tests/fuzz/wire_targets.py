@@ -24,7 +24,7 @@ from robochoc.authority.certificates import (
 )
 from robochoc.authority.frames import (
     Certified,
-    Denied,
+    EnrolmentDenied,
     FrameError,
     Introduce,
     Introduction,
@@ -329,7 +329,14 @@ def _authority() -> tuple[bytes, bytes, bytes]:
 def questions() -> Sequence[bytes]:
     """Questions of robots that want to be certified, and answers to them."""
     ca, leaf, asked = _authority()
-    frames = (Introduce(), Redeem(b"s" * 32, asked), Renew(asked), Introduction(ca), Certified(leaf), Denied("no"))
+    frames = (
+        Introduce(),
+        Redeem(b"s" * 32, asked),
+        Renew(asked),
+        Introduction(ca),
+        Certified(leaf),
+        EnrolmentDenied("no"),
+    )
     return [_packed(frame) for frame in frames]
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from robochoc.authority.admission import Household
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.authority.certificates import leaf_certificate, moment, new_key
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Conclusion
@@ -70,7 +70,7 @@ def test_a_robot_that_is_not_of_the_team(run: NetworkRun) -> None:
 
 
 def test_a_certificate_of_another_authority(run: NetworkRun) -> None:
-    other = Household(CHAIN.order).identity("RX0")
+    other = InMemoryAuthority(CHAIN.order).identity("RX0")
     with pytest.raises(CannotConnectError, match="does not let RX0 in"):
         Transport(run.endpoint, other, patience_s=SOON_S)
     run.wait_for_refusal("somebody", "connect", "does not believe the master")
@@ -87,7 +87,7 @@ def test_a_certificate_that_has_expired(run: NetworkRun) -> None:
     run.wait_for_progress()
 
 
-def out_of_date(household: Household, name: str) -> Identity:
+def out_of_date(household: InMemoryAuthority, name: str) -> Identity:
     key, now = new_key(), time.time()
     times = (moment(now - 2 * A_DAY_S), moment(now - A_DAY_S))
     issuer = (household._certificate, household._key)  # noqa: SLF001

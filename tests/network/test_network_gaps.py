@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from robochoc.authority.admission import Household
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.authority.registry import Right, Role
 from robochoc.communication.control import Failed
 from robochoc.communication.network.access import ALL, frame_key
@@ -32,7 +32,7 @@ WATCHER = "Watcher"
 PATIENCE_S = 30.0
 
 
-class Watched(Household):
+class Watched(InMemoryAuthority):
     """A household with an observer."""
 
     def names(self, role: Role | None = None, right: Right | None = None, *, invited: bool = False) -> tuple[str, ...]:
@@ -106,7 +106,7 @@ def test_a_gap_between_robots_that_is_one_names_the_sender(tmp_path: Path) -> No
 
 def test_a_gap_is_put_down_to_whose_key_it_came_on() -> None:
     """B uses the source of A: where each sender has a subscriber of its own, A's frames come all the same."""
-    household = Household(("A", "B", "C"))
+    household = InMemoryAuthority(("A", "B", "C"))
     router = Router(free_endpoint(), household.master_identity(("127.0.0.1",)), None, LEASE_MS)
     router.open({"A": (ALL,), "B": (ALL,), "C": (ALL,)})
     join = partial(Transport, router.endpoint, watch=(), patience_s=PATIENCE_S)

@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from robochoc.authority.admission import Household
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.abt import ABT
@@ -83,7 +83,7 @@ def test_partially_known_constraints_stay_with_their_holders() -> None:
 
 def test_messages_go_through_filters() -> None:
     team = random_team(Random(3))
-    household = Household(team.order)
+    household = InMemoryAuthority(team.order)
     identities = {name: household.identity(name) for name in team.order}
     office = InMemoryNetwork(team, ABT, identities, ("signed", "sealed"))
     result = office.search()

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.authority.admission import Household
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.control import Failed
 from robochoc.communication.network.access import ALL, access_control
 from robochoc.communication.network.framing import LARGEST_FRAME, MASTER, Framing, MessageTooLargeError
@@ -42,12 +42,12 @@ def free() -> str:
 
 
 @pytest.fixture(scope="module")
-def household() -> Household:
-    return Household(("A", "B"))
+def household() -> InMemoryAuthority:
+    return InMemoryAuthority(("A", "B"))
 
 
 @pytest.fixture(scope="module")
-def router(household: Household) -> Iterator[Router]:
+def router(household: InMemoryAuthority) -> Iterator[Router]:
     opened = Router(free(), household.master_identity(("127.0.0.1",)), None, LEASE_MS)
     opened.open(REACH)
     yield opened
@@ -55,7 +55,7 @@ def router(household: Household) -> Iterator[Router]:
 
 
 @pytest.fixture
-def posts(household: Household, router: Router) -> Iterator[tuple[Transport, Transport]]:
+def posts(household: InMemoryAuthority, router: Router) -> Iterator[tuple[Transport, Transport]]:
     join = partial(Transport, router.endpoint, watch=(), patience_s=PATIENCE_S)
     with join(household.identity("A")) as a, join(household.identity("B")) as b:
         yield a, b
@@ -107,7 +107,7 @@ def test_nothing_listens_but_the_router_and_nothing_looks_for_others() -> None:
 
 
 def test_the_router_is_ours_whatever_is_in_the_working_directory(
-    household: Household, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    household: InMemoryAuthority, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is given the master's key."""
     (tmp_path / "zenoh.py").write_text("raise SystemExit('not ours')")
@@ -178,7 +178,7 @@ def test_a_program_forks_after_a_network_run_runs_another_and_ends() -> None:
     assert said == ["solution"] * 3 + ["closed"]
 
 
-def test_sessions_open_and_close_at_once(household: Household, router: Router) -> None:
+def test_sessions_open_and_close_at_once(household: InMemoryAuthority, router: Router) -> None:
     with waiting(5):  # it takes some hundredths of a second; a machine may be busy
         for _ in range(5):
             with Transport(router.endpoint, household.identity("A"), watch=(), patience_s=PATIENCE_S) as one:

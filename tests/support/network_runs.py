@@ -14,7 +14,7 @@ from typing import Self
 
 import zenoh
 
-from robochoc.authority.admission import Household
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.network.control_messages import ControlMessage
 from robochoc.communication.network.framing import Framing
 from robochoc.communication.network.journal_server import Publication
@@ -74,7 +74,7 @@ class NetworkRun:
         publication: Publication | None = None,
     ) -> None:
         self.team = team
-        self.household = Household(team.order)
+        self.household = InMemoryAuthority(team.order)
         self.events: list[AnyEvent] = []
         self.result: RunResult | None = None
         self.error: Exception | None = None

@@ -21,22 +21,22 @@ ALL = "*"
 
 
 def frame_key(receiver: str, sender: str) -> str:
-    """Where frames from `sender` to `receiver` go."""
+    """Return where frames from `sender` to `receiver` go."""
     return f"rc/msg/{receiver}/{sender}"
 
 
 def life_key(name: str) -> str:
-    """The liveliness token of `name`."""
+    """Return the liveliness token of `name`."""
     return f"rc/live/{name}"
 
 
 def journal_key(name: str) -> str:
-    """Where `name` asks for the run's journal."""
+    """Return where `name` asks for the run's journal."""
     return f"rc/journal/{name}"
 
 
 def name_in(key: str) -> str:
-    """The sender in a frame's key, whose life a token is, or who asks for the journal."""
+    """Return the sender in a frame's key, whose life a token is, or who asks for the journal."""
     return key.rpartition("/")[2]
 
 
@@ -85,7 +85,7 @@ def yielding() -> dict[str, Any]:
 
 
 def _rules(name: str, written: Sequence[str]) -> list[dict[str, Any]]:
-    """What `name` may do, who writes frames to the keys `written`."""
+    """Return the rules for `name`, which writes frames to the keys `written`."""
     read = [frame_key(name, ALL)]
     says = ["put", "reply", "declare_queryable", "liveliness_token"]
     hears = ["declare_subscriber", "query", "declare_liveliness_subscriber", "liveliness_query", "liveliness_token"]

@@ -1,8 +1,8 @@
-"""Frames that are lost for good: whose loss that is. Never that of others.
+"""Frames that are lost for good, and which robot is lost with them: always their sender, never another.
 
-A gap in the frames to the master is the loss of their sender; who is no robot of the team loses only its request. A
-gap between two robots is what one of them says, and may be a number that the other has made up: it counts once messages
-turn out to be missing, which the counters of all robots show.
+A robot whose frames to the master are lost is lost. An observer only loses its request. The loss of frames between two
+robots is reported by one of them, and may be a number that the other has made up. So it counts only once messages are
+missing, which the counters of all robots show.
 """
 
 from __future__ import annotations
@@ -22,21 +22,24 @@ class _Lose(Protocol):
 
 
 class LossTracker:
-    """Gaps in a run of `members`. `refuse` is told of each (who, what, why); `lose` takes a robot out."""
+    """Lost frames in a run of `members`. `refuse` reports each (who, what, why); `lose` removes a robot."""
 
     def __init__(self, members: Members, refuse: Callable[[str, str, str], None], lose: _Lose) -> None:
         self._members = members
         self._refuse = refuse
         self._lose = lose
         self._said: dict[str, str] = {}
-        """Of whom robots say in this search that frames are lost, and the words for it."""
+        """Reports of this search: whose frames are lost, and why."""
 
     def begin(self) -> None:
-        """A search begins: what was said in another one is of no account."""
+        """Begin a search: what robots reported in another one no longer counts."""
         self._said.clear()
 
     def note_at_master(self, missed: FramesLost) -> None:
-        """Frames to the master are lost: its sender is, if it is a robot that takes part. Raises `RobotsLostError`."""
+        """Note that frames to the master are lost, and with them their sender, if it takes part.
+
+        Raises `RobotsLostError`.
+        """
         name, many = missed.sender, f"{missed.frames:,} frames"
         why = f"{many} of it were more than it may send" if missed.dropped else f"{many} of it were lost for good"
         self._refuse(name, TO_MASTER, why)
@@ -45,14 +48,14 @@ class LossTracker:
             self._lose(name, f"{why} on the way to the master", for_good=self._members.closed)
 
     def note_between(self, name: str, gap: LostFrames) -> None:
-        """The robot `name` says that frames to it are lost."""
+        """Note that the robot `name` reports the loss of frames to it."""
         why = f"{gap.frames:,} frames of it to {name} were lost for good ({name} says so)"
         self._refuse(gap.who, f"a frame to {name}", why)
         if gap.who in self._members.robots:
             self._said.setdefault(gap.who, why)
 
     def explain_missing(self) -> bool:
-        """Protocol messages are missing: those are lost of whom frames are. Return whether there is anybody.
+        """Lose the robots whose frames are lost, as protocol messages are missing; return whether there are any.
 
         Raises `RobotsLostError`.
         """

@@ -1,8 +1,8 @@
-"""Frames: what goes around each message, so that nothing is taken twice, out of place, or from another run.
+"""Frames around messages, so that no message is taken twice, out of order, or from another run. Pure.
 
-Pure. The router proves who has sent a frame (`access.py`); its run and its number say which one it is. Within a run
-the frames of an ordered pair are numbered from 1, and come in that order or not at all. Words before a run
-(from `Register` to `Joined`, requests of observers) carry no run and no number: repeating them changes nothing.
+The router proves who has sent a frame (`access.py`); its run and its number identify it. Within a run the frames of an
+ordered pair are numbered from 1, and arrive in that order or not at all. Messages before a run (from `Register` to
+`Joined`, and requests of observers) carry no run and no number: repeating them changes nothing.
 """
 
 from __future__ import annotations
@@ -92,22 +92,22 @@ class Framing:
         self._of_robot = msgspec.msgpack.Decoder(_ToMaster if name == MASTER else _ToPeer)
 
     def begin(self, run: str) -> None:
-        """A run begins: numbers start anew."""
+        """Begin a run: numbers start anew."""
         self.run = run
         self._written.clear()
         self._read.clear()
 
     def forget(self, other: str) -> None:
-        """What comes from `other`, and goes there, is numbered anew: it is another life of that robot."""
+        """Number frames from and to `other` anew: the robot was started again."""
         self._written.pop(other, None)
         self._read.pop(other, None)
 
     def next_number(self, receiver: str) -> int:
-        """The number of the next frame to `receiver`."""
+        """Return the number of the next frame to `receiver`."""
         return self._written.get(receiver, 0) + 1
 
     def write(self, receiver: str, message: ControlMessage) -> bytes:
-        """The next frame to `receiver`. Raises `MessageTooLargeError`."""
+        """Return the next frame to `receiver`. Raises `MessageTooLargeError`."""
         outside = isinstance(message, _OUTSIDE)
         frame = Frame("", 0, message) if outside else Frame(self.run, self.next_number(receiver), message)
         content = self._encode(frame)
@@ -120,7 +120,10 @@ class Framing:
         return content
 
     def read(self, sender: str, content: bytes) -> Opened:
-        """What `sender` has written; it may come again until it has been `taken`. Raises `FrameRefusedError`."""
+        """Return the message in a frame of `sender`; it may come again until it is accepted by `take`.
+
+        Raises `FrameRefusedError`.
+        """
         if len(content) > LARGEST_FRAME:
             raise FrameRefusedError(f"it has {len(content):,} bytes, more than {LARGEST_FRAME:,}")
         decoder = self._of_master if sender == MASTER else self._of_robot
@@ -140,6 +143,6 @@ class Framing:
         return Opened(frame.number, frame.message)
 
     def take(self, sender: str, number: int) -> None:
-        """The frame `number` of `sender` is what it claims to be: from now on the next one is expected."""
+        """Accept the frame `number` of `sender`: the next one is expected now."""
         if number:
             self._read[sender] = max(number, self._read.get(sender, 0))

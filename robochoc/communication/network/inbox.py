@@ -76,21 +76,24 @@ class Inbox:
             self._changed.notify()
 
     def get(self, timeout: float | None = None) -> Item:
-        """The oldest item, as soon as there is one. Raises `Empty` when there is none within `timeout` seconds."""
+        """Return the oldest item, as soon as there is one.
+
+        Raises `Empty` when there is none within `timeout` seconds.
+        """
         with self._changed:
             if not self._changed.wait_for(lambda: self._items, timeout):
                 raise Empty
             return self._taken()
 
     def get_nowait(self) -> Item:
-        """The oldest item. Raises `Empty`."""
+        """Return the oldest item. Raises `Empty`."""
         with self._changed:
             if not self._items:
                 raise Empty
             return self._taken()
 
     def empty(self) -> bool:
-        """Whether nothing waits."""
+        """Return whether nothing waits."""
         return not self._items
 
     def _usage_of(self, sender: str) -> Usage:

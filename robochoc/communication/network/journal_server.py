@@ -1,8 +1,8 @@
-"""The run's journal as the master gives it out while it grows, to those who have the right to sniff.
+"""The run's journal, which the master offers while it grows to participants with the right to sniff.
 
-Whoever follows a run asks for the bytes from `start` on, and gets a piece of bounded size; what it has not asked for
-waits in the journal's file. So a follower may come late, be slow, or stop: nothing is kept for it, nothing waits for
-it, and neither the master nor a robot is slowed. The router proves who asks (`access.py`). Threads may share it.
+A follower asks for the bytes from `start` on, and gets a piece of bounded size; the rest waits in the journal's file.
+So a follower may come late, be slow, or stop: nothing is kept for it, nothing waits for it, and neither the master nor
+a robot is slowed. The router proves who asks (`access.py`). Threads may share it.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class Publication:
             self._size += done
 
     def end(self) -> None:
-        """All has been written."""
+        """Note that all has been written."""
         self._over = True
 
     def close(self) -> None:
@@ -101,7 +101,10 @@ class Publication:
             return not self._closed and any(now - asked < PRESENT_S for asked in self._behind.values())
 
     def answer(self, name: str, content: bytes) -> bytes:
-        """The answer to the question `content` of `name`, who has the right to ask. Raises `NotAnsweredError`."""
+        """Return the answer to the question `content` of `name`, who has the right to ask.
+
+        Raises `NotAnsweredError`.
+        """
         self._count(name)
         question = _question(content)
         if question.run == self.run and question.start >= self._size and not self._over:
@@ -133,12 +136,12 @@ class Publication:
 
 
 def question(run: str, start: int) -> bytes:
-    """What whoever follows `run` asks for all from byte `start` on."""
+    """Return the question for the journal of `run` from byte `start` on."""
     return msgspec.msgpack.encode(Question(run, start))
 
 
 def piece_in(content: bytes) -> Piece:
-    """The piece in an answer. Raises `JournalError`."""
+    """Return the piece in an answer. Raises `JournalError`."""
     try:
         return msgspec.msgpack.decode(content, type=Piece)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
@@ -173,7 +176,7 @@ class JournalServer:
         return self.publication is not None and self.publication.lagging
 
     def welcome(self, name: str, sniff: JournalRequest) -> JournalAnswer:
-        """What `name` is told who wants to sniff."""
+        """Return the answer to `name`, which wants to sniff."""
         why = self._why_not(name)
         if why:
             self._chronicle.refuse(name, SNIFF, why)
@@ -183,7 +186,7 @@ class JournalServer:
         return JournalAnswer(sniff.number, self._run, why)
 
     def answer(self, name: str, content: bytes) -> bytes | None:
-        """The answer to a question of `name`, as the router says it is; None: there is none."""
+        """Return the answer to a question of `name`, as the router says it is; None: there is none."""
         why = self._why_not(name)
         if not why and self.publication:
             try:

@@ -20,7 +20,7 @@ from multiprocessing.process import BaseProcess
 from multiprocessing.util import get_temp_dir
 from typing import cast
 
-from robochoc.authority.admission import Household
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.network import fork_server
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members, reach
@@ -82,7 +82,7 @@ class LocalNetwork(Session):
         self._settings = settings
         self._processes: dict[str, BaseProcess] = {}
         self._sent_home = False
-        self._household = Household(team.order)
+        self._household = InMemoryAuthority(team.order)
         self._waiting = list(self.compiled.robots.values())
         watched = observer is not None
         profiles = {robot.name: profile_of(robot) for robot in team.robots}
@@ -102,7 +102,7 @@ class LocalNetwork(Session):
 
     @staticmethod
     def _opened(make: Callable[[str], Master]) -> Master:
-        """The master at a free port of loopback; somebody else may be quicker, then at another."""
+        """Return the master at a free port of loopback; somebody else may be quicker, then at another."""
         for attempt in range(_ATTEMPTS):
             with socket.create_server((LOOPBACK, 0)) as trial:
                 port = trial.getsockname()[1]

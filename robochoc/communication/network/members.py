@@ -1,4 +1,4 @@
-"""Who has registered with the master: profiles, lives, and what of them is common knowledge. Pure."""
+"""The robots that have registered with the master: profiles, incarnations, and what all robots know of them. Pure."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from robochoc.solver.agent_problem import RunParameters
 
 
 def reach(profiles: Mapping[str, Profile], *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:
-    """To whom each of a team may write besides the master. See `Members.reach`."""
+    """Return to whom each robot of a team may write besides the master. See `Members.reach`."""
     if writes_to_non_neighbours:
         return dict.fromkeys(profiles, (ALL,))
     met = possible_neighbours(profiles)
@@ -40,9 +40,9 @@ class RegistrationRefusedError(ValueError):
 
 @dataclass
 class Member:
-    """A registered robot in its life `incarnation`; `gone` since when it is away (None: it is there).
+    """A registered robot in its `incarnation`; `gone` since when it is away (None: it is there).
 
-    `doubtful`: it was away since its last word, and who is there now may be another life. `also` are variables that it
+    `doubtful`: it was away since its last message, and may have been started again since. `also` are variables that it
     has shown since, as it was `asked` for them.
     """
 
@@ -58,30 +58,34 @@ class Member:
 
     @property
     def robot(self) -> Robot:
-        """Its silhouette."""
+        """The robot as others see it."""
         return visible_robot(self.profile, self.also)
 
     def join(self, incarnation: str, card: bytes) -> None:
-        """It has read the welcome; a word from another life of it is none of this one's."""
+        """Note that it has read the welcome. Messages of another incarnation change nothing."""
         if incarnation == self.incarnation:
             self.card, self.joined, self.doubtful = card, True, False
 
     def note_presence(self, *, there: bool) -> None:
-        """It is there, or is not any more, as far as the router knows."""
+        """Note whether it is there, as far as the router knows."""
         self.gone = None if there else self.gone or time.monotonic()
         self.doubtful = self.doubtful or not there
 
     def is_away(self, for_s: float) -> bool:
-        """Whether it has been away for longer than that. For a moment all are, behind a router that is opened anew."""
+        """Return whether it has been away for longer than that.
+
+        For a moment all are, behind a router that is opened anew.
+        """
         return self.gone is not None and time.monotonic() - self.gone > for_s
 
 
 class Members:
     """All registered robots, by name.
 
-    `expected` names who alone may come (None: whoever the Authority lets in), `number` says how many do. Without either
-    the team is complete when every neighbour that a robot names is there. `order` is the priority order, where it is
-    known before; parents come before their children in it. `ways` are those that it will have (`reach`), likewise.
+    `expected` names the only robots that may come (None: all that the Authority admits), `number` says how many do.
+    Without either the team is complete when every neighbour that a robot names is there. `order` is the priority order,
+    where it is known before; parents come before their children in it. `ways` are those that it will have (`reach`),
+    likewise.
     """
 
     def __init__(
@@ -100,11 +104,11 @@ class Members:
         self._known: frozenset[tuple[str, str]] = frozenset()
         self._acquainted: dict[str, tuple[str, ...]] = {}
         self._over: set[str] = set()
-        """Lives that have ended. In one that goes on after all, frames are numbered as nobody expects."""
+        """Incarnations that have ended. In one that goes on after all, frames are numbered as nobody expects."""
 
     @property
     def profiles(self) -> dict[str, Profile]:
-        """What all have told of themselves."""
+        """The profiles of all registered robots, by name."""
         return {name: member.profile for name, member in self.robots.items()}
 
     def register(self, sender: str, profile: Profile, incarnation: str, *, admitted: bool = True) -> Member:
@@ -145,7 +149,7 @@ class Members:
 
     @property
     def awaited(self) -> set[str]:
-        """Who has to come yet, as far as that is known by name."""
+        """The robots that have to register yet, as far as they are known by name."""
         return (set(self.expected or ()) | missing(self.profiles)) - self.robots.keys()
 
     @property
@@ -205,7 +209,7 @@ class Members:
                     yield f"{name} holds a constraint over {variable}, which is a variable of none of its neighbours"
 
     def _owners(self) -> dict[str, str]:
-        """Who has the variables that are shown."""
+        """Return the owners of the variables that are shown."""
         return {
             variable: name
             for name, member in self.robots.items()
@@ -213,7 +217,7 @@ class Members:
         }
 
     def remove(self, names: Collection[str]) -> None:
-        """Robots are out for good: whoever named them as neighbours does so no more.
+        """Remove robots for good, also as neighbours of others.
 
         Once the team is complete, those who are left keep their places in the order, as they do in every runtime.
         """
@@ -225,9 +229,9 @@ class Members:
                 self._over.add(member.incarnation)
 
     def to_welcome(self) -> dict[str, str]:
-        """Of an open team, the lives of those who are there, and have answered no welcome since they came (back).
+        """Return the incarnations of robots that are there and have not answered a welcome, while the team is open.
 
-        Their answer may have got lost; and of two lives of one name only the one that is still there answers.
+        Their answer may have been lost; and of two incarnations only the one that is still there answers.
         """
         waiting = {
             name: m.incarnation for name, m in self.robots.items() if m.gone is None and (m.doubtful or not m.joined)
@@ -236,11 +240,11 @@ class Members:
 
     @property
     def listening(self) -> list[str]:
-        """Who has joined, and not left. Others may not have been welcomed yet: a word of this run is none to them."""
+        """The robots that have joined, and not left. Others do not know this run yet."""
         return [name for name, member in self.robots.items() if member.joined and not member.left]
 
     def staying(self, away_s: float, besides: Collection[str]) -> list[str]:
-        """Who has neither taken leave nor been away for longer than `away_s`, `besides` those."""
+        """Return the robots, `besides` those, that have neither left nor been away for longer than `away_s` seconds."""
         stay = (name for name, member in self.robots.items() if not (member.left or member.is_away(away_s)))
         return [name for name in stay if name not in besides]
 
@@ -252,11 +256,11 @@ class Members:
         return tuple(in_priority_order(self.profiles))
 
     def reach(self, *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:
-        """To whom each may write: everybody, if the protocol goes beyond those it may share constraints with."""
+        """Return to whom each robot may write: to all, if the protocol writes to non-neighbours."""
         return reach(self.profiles, writes_to_non_neighbours=writes_to_non_neighbours)
 
     def tasks(self, epoch: int, protocol: str, traits: Traits, brief: RunParameters) -> dict[str, Task]:
-        """What each robot is told for a search, in priority order."""
+        """Return the task of each robot for a search, in priority order."""
         order = self.order
         shown = {name: self.robots[name].robot for name in order}
         domains = {
@@ -282,7 +286,7 @@ class Members:
         }
 
     def declared(self, traits: Traits) -> Declarations:
-        """What robots' words in a search are held against."""
+        """Return the declarations that robots' reports in a search are checked against."""
         shown = {
             name: {variable.name: variable.domain for variable in member.robot.variables}
             for name, member in self.robots.items()
@@ -291,7 +295,7 @@ class Members:
         return Declarations(traits, shown, dearest)
 
     def neighbourhood(self, name: str, values: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
-        """Of the decided `values`, by robot, those that all whom `name` may share a constraint with show."""
+        """Return those of the decided `values` that robots show which `name` may share a constraint with."""
         found: dict[str, int] = {}
         for other in self._met()[name]:
             if other in self.robots:

@@ -60,7 +60,7 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
 
 
 def profile_of(robot: Robot) -> Profile:
-    """What `robot` tells of itself."""
+    """Return the profile of `robot`."""
     shown = set(robot.interface)
     own = {variable.name for variable in robot.variables}
     parts = [constraint for child in robot.children for constraint in child.constraints]
@@ -90,7 +90,7 @@ def ranges_of(domain: Domain) -> Ranges:
 
 
 def domain_of(name: str, ranges: Ranges) -> Domain:
-    """The domain of the variable `name`. Raises `ProfileError`; nothing is made of absurd ones."""
+    """Return the domain of the variable `name`. Raises `ProfileError`; nothing is made of absurd ones."""
     last: int | None = None
     size = 0
     for low, high in ranges:
@@ -103,7 +103,7 @@ def domain_of(name: str, ranges: Ranges) -> Domain:
 
 
 def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
-    """The robot as others see it; `also` are variables that it has shown since. Raises `ProfileError`."""
+    """Return the robot as others see it; `also` are variables that it has shown since. Raises `ProfileError`."""
     looked_at = [name for names in profile.looks_at.values() for name in names]
     names = (profile.name, *profile.neighbours, *profile.variables, *looked_at, *profile.wants, *also)
     bad = next((name for name in names if not is_name(name) or len(name) > LONGEST_NAME), None)
@@ -134,7 +134,7 @@ def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
 
 
 def contradictions(profiles: Mapping[str, Profile]) -> Iterator[str]:
-    """What cannot be if all of `profiles` are of one team: neighbours that disagree, variables with two owners."""
+    """Yield contradictions between profiles of one team: neighbours that disagree, variables with two owners."""
     owner: dict[str, str] = {}
     for profile in profiles.values():
         for variable in profile.variables:
@@ -174,7 +174,7 @@ def possible_neighbours(profiles: Mapping[str, Profile]) -> dict[str, tuple[str,
 
 
 def in_priority_order(profiles: Mapping[str, Profile]) -> Sequence[str]:
-    """The total priority order of a team whose profiles do not contradict each other."""
+    """Return the total priority order of a team whose profiles do not contradict each other."""
     return priority_order({profile.name: profile.parents for profile in profiles.values()})
 
 

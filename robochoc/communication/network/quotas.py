@@ -1,4 +1,4 @@
-"""What a sender may have of a receiver: frames and bytes that wait, and frames, bytes and events a second. Pure.
+"""Quotas of a sender at a receiver: frames and bytes that wait, and frames, bytes and events a second. Pure.
 
 The limits are far beyond what honest robots need: docs/guides/security.md has the measurement.
 """
@@ -16,7 +16,7 @@ NO_LIMIT = 1e15
 
 
 class Share(NamedTuple):
-    """What one sender may have: so many frames and bytes waiting, and so many a second in the long run."""
+    """The quota of one sender: frames and bytes that wait, and frames and bytes a second in the long run."""
 
     frames: int
     size: int
@@ -41,13 +41,13 @@ class Allowance:
         self._since = now
 
     def has(self, amount: float, now: float) -> bool:
-        """Whether `amount` is left at the time `now`."""
+        """Return whether `amount` is left at the time `now`."""
         grown = (now - self._since) * self._a_second
         self._left, self._since = min(BURST_S * self._a_second, self._left + grown), now
         return amount <= self._left
 
     def use(self, amount: float) -> None:
-        """So much of it is gone."""
+        """Use `amount` of it."""
         self._left -= amount
 
 
@@ -63,7 +63,7 @@ class Usage:
         self._much = Allowance(share.size_a_second, now)
 
     def takes(self, size: int, now: float) -> bool:
-        """Whether a frame of `size` bytes is within the share; if so, it waits from now on."""
+        """Return whether a frame of `size` bytes is within the share; if so, it waits from now on."""
         if self._framing >= self._share.frames or self._size + size > self._share.size:
             return False
         if not (self._often.has(1, now) and self._much.has(size, now)):
@@ -75,22 +75,22 @@ class Usage:
         return True
 
     def release(self, size: int) -> None:
-        """A frame of `size` bytes waits no more."""
+        """Note that a frame of `size` bytes waits no more."""
         self._framing -= 1
         self._size -= size
 
 
 class Backlog:
-    """What of each sender is kept for later, up to what may wait of it; how fast it comes does not matter."""
+    """Frames of each sender that are kept for later, within its share; how fast they come does not matter."""
 
     def __init__(self, share: Share = OF_A_NEIGHBOUR) -> None:
         self._share = share._replace(frames_a_second=NO_LIMIT, size_a_second=NO_LIMIT)
         self._usage: dict[str, Usage] = {}
 
     def takes(self, sender: str, size: int) -> bool:
-        """Whether `size` bytes more of `sender` may be kept; if so, they are from now on."""
+        """Return whether `size` bytes more of `sender` may be kept; if so, they are from now on."""
         return self._usage.setdefault(sender, Usage(self._share, 0.0)).takes(size, 0.0)
 
     def clear(self) -> None:
-        """Nothing is kept any more."""
+        """Forget all that is kept."""
         self._usage.clear()

@@ -27,7 +27,7 @@ _PR_SET_NAME = 15
 
 
 class RobotStart(NamedTuple):
-    """With what a robot's process begins."""
+    """What a robot's process starts with."""
 
     own: CompiledRobot
     identity: IdentityTexts
@@ -38,7 +38,7 @@ class RobotStart(NamedTuple):
 
 
 def robot_process(given: RobotStart) -> None:
-    """What a robot's process runs. Ctrl-C reaches the whole process group, and is left to the parent."""
+    """Run one robot in this process. Ctrl-C reaches the whole process group, and is left to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})

@@ -145,7 +145,7 @@ class Router:
         }
 
     def _wait_until_ready(self, output: IO[bytes]) -> bytes:
-        """What it has said until it was ready: who waits at the door comes in before that."""
+        """Return what it has said until it was ready: who waits at the door comes in before that."""
         said: list[bytes] = []
         watch = threading.Timer(START_S, self._give_up)
         watch.start()
@@ -190,7 +190,7 @@ class Log:
         """Whose sessions there are: zenoh names a certificate's holder only where it looks a right up anew."""
 
     def refusals(self, log: bytes) -> Iterator[Refusal]:
-        """What a part of the log tells of refusals; it ends with a whole line."""
+        """Yield what a part of the log tells of refusals; it ends with a whole line."""
         plain = _COLOURS.sub(b"", log)
         for name in _ACCEPTED.findall(plain):
             who = name.decode(errors="replace")

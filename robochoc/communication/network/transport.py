@@ -1,4 +1,4 @@
-"""The transport: what zenoh does for one participant. It carries frames both ways, and tells who is there.
+"""The transport of one participant by zenoh: it carries frames both ways, and knows who is there.
 
 Frames travel by zenoh's advanced publishers and subscribers, which number what they carry, keep it, and ask again for
 what an outage has swallowed; plain ones lose messages without a word. Nothing but this file and the router's imports
@@ -126,7 +126,7 @@ class Transport:
         self._answering = self._session.declare_queryable(key, reply)
 
     def ask(self, key: str, content: bytes, patience_s: float) -> bytes | None:
-        """What is answered to `content` on `key`; None: nothing is, within `patience_s`.
+        """Return the answer to `content` on `key`; None if none comes within `patience_s` seconds.
 
         The answer yields to all that robots say, and is dropped if it does not get through at once.
         """
@@ -147,7 +147,7 @@ class Transport:
         return None
 
     def wake(self) -> None:
-        """Have whoever waits at the inbox look up."""
+        """End a wait for the inbox."""
         self.inbox.put(WakeUp())
 
     def close(self) -> None:
@@ -163,7 +163,7 @@ class Transport:
         self.close()
 
     def _subscribed(self, sender: str) -> _Subscriber:
-        """What hears `sender` alone (`ALL`: all that have no subscriber of their own), and that frames are lost.
+        """Return a subscriber to `sender` alone (`ALL`: to all others), which also notices lost frames.
 
         zenoh tells of a gap just before the frame behind it, in the same thread (not `indirect`: that would be one of
         Python's own for each). So a gap is put down to the sender of that frame, whom the router has proven, and not
@@ -202,7 +202,7 @@ class Transport:
 
 
 def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Session:
-    """A session. zenoh does not hear Ctrl-C while it connects, so it is not left to that for long."""
+    """Return a session. zenoh does not hear Ctrl-C while it connects, so it is not left to that for long."""
     if endpoint.startswith("["):
         raise CannotConnectError(
             f"{endpoint}: zenoh cannot check whose IPv6 address that is; call the master by a host name"
@@ -223,7 +223,7 @@ def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int)
 
 
 def client_config(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Config:
-    """How a participant connects: to that one router, by mutual TLS, and in no other way."""
+    """Return how a participant connects: to that one router, by mutual TLS, and in no other way."""
     texts = identity.texts
     tls = {
         "root_ca_certificate_base64": encoded(texts.ca),

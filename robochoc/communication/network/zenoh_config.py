@@ -12,7 +12,7 @@ RX_BYTES = 32 * 2**20
 
 
 def config(settings: Mapping[str, object]) -> zenoh.Config:
-    """A configuration of zenoh: `settings`, and nothing that looks for others or listens where it was not told to."""
+    """Return a configuration of zenoh with `settings`, and without discovery or other listeners."""
     made = zenoh.Config()
     common = {
         "scouting/multicast/enabled": False,

@@ -93,7 +93,7 @@ class Simulation(Session):
                 self._hosts[name] = self._host(part)
 
     def close(self) -> None:
-        """Nothing to leave behind."""
+        """Do nothing: there is nothing to release."""
 
     def _host(self, part: AgentProblem) -> Host:
         host = Host.of(self._protocol, part)
@@ -133,7 +133,7 @@ class Simulation(Session):
         self._note_verdict(host)
 
     def _time(self, checks: int) -> float:
-        """The time when the robot that is at work had done so many checks."""
+        """Return the time when the robot that is at work had done so many checks."""
         return self._schedule.time(checks - self._checks)
 
     def _note_verdict(self, host: Host) -> None:

@@ -167,12 +167,12 @@
     }
   }
 
-  /* Nobody is known yet: the scene begins with the first decision. */
+  /* No robot is known yet: the scene begins with the first decision. */
   class Waiting {
     constructor(element) {
       this.element = element;
       this.step = 0;
-      Sniffer.fill(element, Sniffer.make("p", { class: "hint" }, "Nobody has decided anything yet."));
+      Sniffer.fill(element, Sniffer.make("p", { class: "hint" }, "No robot has decided anything yet."));
     }
 
     show(step) {
