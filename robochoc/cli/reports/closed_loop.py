@@ -10,7 +10,7 @@ from robochoc.cli.options.ros import FLIGHT, RosOptions
 from robochoc.cli.reports.failures import LOST
 
 if TYPE_CHECKING:
-    from robochoc.flight.flight import FlightLog
+    from robochoc.flight.log import FlightLog
     from robochoc.flight.mission import Mission
     from robochoc.ros.closed_loop import ClosedLoop
 
