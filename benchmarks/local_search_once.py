@@ -15,7 +15,7 @@ from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats import PREDEFINED
 from robochoc.model.problem import Child, Constraint, Domain, Parent, ProblemKind, Robot, Team, Variable
-from robochoc.run.incumbent import course
+from robochoc.run.incumbent import costs_by_cycle
 from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 
@@ -61,7 +61,7 @@ def main() -> None:
     memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     trails = {name: found.trail for name, found in result.findings.items() if found.trail}
     told = {
-        "costs": list(course(run.compiled, trails)),
+        "costs": list(costs_by_cycle(run.compiled, trails)),
         "messages": sum(result.metrics.messages.values()),
         "bytes": result.metrics.bytes,
         "ncccs": result.metrics.ncccs,

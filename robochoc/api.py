@@ -23,7 +23,7 @@ from robochoc.model.problem import Team
 from robochoc.run.defaults import default_protocol
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.orchestrator import solve
-from robochoc.run.registry import UnknownProtocolError, installed_spelling, offers
+from robochoc.run.registry import UnknownProtocolError, installed_protocols, installed_spelling
 from robochoc.run.scenario import Environment
 
 if TYPE_CHECKING:
@@ -219,7 +219,7 @@ class AgentsContainer:
 
         Args:
             observer: It is called with every event that the master sees.
-            **plan: Other fields of `robochoc.run.networked.lead.Plan`, for the master.
+            **plan: Other fields of `robochoc.run.networked.master_run.Plan`, for the master.
 
         Returns:
             On the master's machine the outcome; on a robots' machine how each robot ended, by its name.
@@ -235,13 +235,13 @@ class AgentsContainer:
 
     def _lead(self, observer: Observer | None, plan: Mapping[str, Any]) -> Outcome:
         from robochoc.authority.authority import default_folder  # noqa: PLC0415 - an extra
-        from robochoc.run.networked.lead import HERE, Plan, lead  # noqa: PLC0415 - the same
+        from robochoc.run.networked.master_run import LOOPBACK_ADDRESS, MasterPlan, run_master  # noqa: PLC0415 - the same
 
         protocol = protocol_called(self._type.removeprefix(_MASTER))
         folder = self._authority or default_folder()
         watched = any(sniff for _, sniff in self._agents.values())
-        asked = Plan(folder, self._listen or HERE, protocol=protocol, **plan)
-        return lead(asked, observer=observer, watched=watched).outcome
+        asked = MasterPlan(folder, self._listen or LOOPBACK_ADDRESS, protocol=protocol, **plan)
+        return run_master(asked, observer=observer, watched=watched).outcome
 
     def _join(self) -> dict[str, Ending]:
         from concurrent.futures import ThreadPoolExecutor  # noqa: PLC0415 - robots' machines only
@@ -271,7 +271,7 @@ def protocol_called(word: str) -> str:
 
     Raises `UnknownProtocolError`.
     """
-    for offer in offers():
+    for offer in installed_protocols():
         if offer.protocol and word.casefold() in {offer.name.casefold(), offer.protocol.__name__.casefold()}:
             return offer.name
     raise UnknownProtocolError(f"no protocol {word!r} is installed; robochoc protocols lists them")

@@ -19,7 +19,7 @@ from msgspec import Struct
 
 from robochoc.cli.group import cli
 from robochoc.protocols.protocol import Protocol, Settings
-from robochoc.run.registry import offers
+from robochoc.run.registry import installed_protocols
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
@@ -95,7 +95,7 @@ def page_of(path: str) -> str:
 
 def protocol_pages() -> dict[str, str]:
     """Return the text of the protocols' pages and of their list, by the pages' names."""
-    protocols = {offer.name: offer.protocol for offer in offers() if offer.protocol}
+    protocols = {offer.name: offer.protocol for offer in installed_protocols() if offer.protocol}
     pages = {f"reference/protocols/{name}.md": protocol_page(name, kind) for name, kind in protocols.items()}
     rows = [
         f"| [`{name}`]({name}.md) | {title(kind)} | {purpose(kind)} | {kind.traits.use_when} |"

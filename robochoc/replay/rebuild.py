@@ -19,7 +19,7 @@ from robochoc.model.team_edits import ChangeError, keep_interfaces, without_robo
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.protocols.settings import SettingsError
 from robochoc.replay.steps import RecordedRun
-from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_by_name
+from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_or_first_fit
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.agent_problem import AgentProblem, RunParameters
 from robochoc.solver.cache import SolutionCache
@@ -133,7 +133,7 @@ class Rebuilder:
     @staticmethod
     def _named(name: str) -> type[Protocol]:
         try:
-            return protocol_by_name(name)
+            return protocol_or_first_fit(name)
         except UnknownProtocolError as unknown:
             raise CannotReplayError(str(unknown)) from unknown
 

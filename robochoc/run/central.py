@@ -11,7 +11,7 @@ from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.context import RunContext
 from robochoc.run.evaluation import Answer, check
-from robochoc.run.incumbent import absent
+from robochoc.run.incumbent import robots_without_values
 from robochoc.run.options import CENTRAL, Options, Withdrawal
 from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.failures import SolverLostError
@@ -68,7 +68,7 @@ def _decide(solver: CentralSolver, team: Team, options: Options) -> _Decision:
     began = time.monotonic()
     solutions = None
     if options.count:
-        judgement = solver.judge(team, count=True)
+        judgement = solver.solve(team, count=True)
         answer, solutions = Answer(judgement.verdict), judgement.count
     else:
         answer = _answer(solver, team, options)
@@ -82,10 +82,10 @@ def _answer(solver: CentralSolver, team: Team, options: Options) -> Answer:
     price = None
     judgement = None
     if options.withdraw is not Withdrawal.MINIMUM or team.kind is ProblemKind.DISCSP:
-        judgement = solver.judge(team)
+        judgement = solver.solve(team)
     if judgement is None or (options.withdraw is not None and judgement.verdict is Verdict.NO_SOLUTION):
         price = int(withdrawal_cost(team))
-        judgement = solver.judge(team, aside=price)
+        judgement = solver.solve(team, withdrawal_cost=price)
     return _answer_of(judgement, team, price, options)
 
 
@@ -98,9 +98,9 @@ def _answer_of(judgement: CentralAnswer, team: Team, price: int | None, options:
             raise SolverLostError(f"the constraint solver's answer costs {total:,}, and it says {judgement.cost:,}")
     if verdict is Verdict.UNKNOWN and judgement.bound is not None:
         bound = judgement.bound // (price or 1)
-    if verdict is Verdict.OPTIMAL and team.kind is ProblemKind.DISCSP and not absent(team, assignment):
+    if verdict is Verdict.OPTIMAL and team.kind is ProblemKind.DISCSP and not robots_without_values(team, assignment):
         verdict = Verdict.SOLUTION
     found = judgement.cost is not None or verdict is Verdict.SOLUTION
-    withdrawn = absent(team, assignment) if found and options.withdraw else ()
+    withdrawn = robots_without_values(team, assignment) if found and options.withdraw else ()
     paid = assignment_cost(team, assignment) if found else None
     return Answer(verdict, assignment=assignment, cost=paid, withdrawn=withdrawn, bound=bound, verified=found)

@@ -1,8 +1,8 @@
 """What solves a team, unless something else is asked for."""
 
-SATISFIES = "abt"
+DEFAULT_PROTOCOL = "abt"
 """A team without costs."""
-MINIMISES = "sfb"
+DEFAULT_COST_PROTOCOL = "sfb"
 """One with costs; it also says who steps aside, when the protocol that was asked for cannot."""
 FIRST_FIT = "first-fit"
 """Says who steps aside with `--withdraw maximal`. Nobody can ask for it by name."""
@@ -10,4 +10,4 @@ FIRST_FIT = "first-fit"
 
 def default_protocol(kind: str) -> str:
     """The protocol for a team of this `Kind`."""
-    return SATISFIES if kind == "DisCSP" else MINIMISES
+    return DEFAULT_PROTOCOL if kind == "DisCSP" else DEFAULT_COST_PROTOCOL

@@ -19,28 +19,28 @@ from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.objective import Objective
 
 
-class Found(NamedTuple):
+class BestKnown(NamedTuple):
     """An assignment of the robots that do not step aside, and what it costs: what constraints and absences charge."""
 
     assignment: dict[str, int]
     cost: float
 
 
-def best_of(compiled: CompiledTeam, result: RunResult, aside: float | None = None) -> Found | None:
+def best_known(compiled: CompiledTeam, result: RunResult, aside: float | None = None) -> BestKnown | None:
     """The cheapest assignment that `result` tells of; None when all that it tells of break hard constraints.
 
     `compiled` is what the robots have worked on.
     """
-    best: Found | None = None
+    best: BestKnown | None = None
     for own in (result.assignments, *_heard_of(compiled, result.findings), *_best_cycle(compiled, result, aside)):
         objective = Objective(compiled.team, aside)
         objective.change(own)
         if objective.cost < (best.cost if best else INFINITE):
-            best = Found(joined(own), objective.cost)
+            best = BestKnown(merged_values(own), objective.cost)
     return best
 
 
-def course(compiled: CompiledTeam, trails: Mapping[str, Trail], aside: float | None = None) -> Iterator[float]:
+def costs_by_cycle(compiled: CompiledTeam, trails: Mapping[str, Trail], aside: float | None = None) -> Iterator[float]:
     """The cost of the values that all robots had in cycle 0, 1, ..., as far as all have come."""
     objective = Objective(compiled.team, aside)
     for changed in _changes(compiled, trails):
@@ -48,24 +48,24 @@ def course(compiled: CompiledTeam, trails: Mapping[str, Trail], aside: float | N
         yield objective.cost
 
 
-def bound_of(findings: Mapping[str, Findings]) -> float | None:
+def lower_bound(findings: Mapping[str, Findings]) -> float | None:
     """No assignment costs less; None when nobody can tell."""
     bounds = [found.bound for found in findings.values() if found.bound is not None]
     least = sum(bounds)
     return int(least) if bounds and least < INFINITE else None
 
 
-def tree_of(findings: Mapping[str, Findings]) -> dict[str, PseudoTreeNode]:
+def pseudo_tree(findings: Mapping[str, Findings]) -> dict[str, PseudoTreeNode]:
     """The pseudo-tree that the robots have built: those that have their place in it."""
     return {name: found.place for name, found in findings.items() if found.place is not None}
 
 
-def joined(own: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
+def merged_values(own: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
     """The values of all robots' variables."""
     return {name: value for values in own.values() for name, value in values.items()}
 
 
-def absent(team: Team, assignment: Mapping[str, int]) -> tuple[str, ...]:
+def robots_without_values(team: Team, assignment: Mapping[str, int]) -> tuple[str, ...]:
     """The robots that have no values: they step aside."""
     return tuple(robot.name for robot in team.robots if robot.variables[0].name not in assignment)
 
@@ -86,7 +86,7 @@ def _best_cycle(compiled: CompiledTeam, result: RunResult, aside: float | None) 
     trails = {name: found.trail for name, found in result.findings.items() if found.trail is not None}
     if len(trails) < len(compiled.team.robots):
         return
-    costs = list(course(compiled, trails, aside))
+    costs = list(costs_by_cycle(compiled, trails, aside))
     if costs:
         own: _Own = {}
         for changed in itertools.islice(_changes(compiled, trails), costs.index(min(costs)) + 1):

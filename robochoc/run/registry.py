@@ -10,7 +10,7 @@ from typing import cast
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import DynamicProtocol, Protocol, Settings
 from robochoc.protocols.traits import Traits
-from robochoc.run.defaults import FIRST_FIT, MINIMISES
+from robochoc.run.defaults import DEFAULT_COST_PROTOCOL, FIRST_FIT
 from robochoc.run.options import CENTRAL
 from robochoc.system.entry_points import EntryPoint
 from robochoc.system.installed import (
@@ -29,7 +29,7 @@ class UnknownProtocolError(LookupError):
 
 
 @dataclass(frozen=True)
-class Offer:
+class InstalledProtocol:
     """What a package offers as a protocol: the class that `entry` stands for, or why there is none."""
 
     entry: EntryPoint
@@ -65,12 +65,12 @@ def installed_spelling(name: str) -> str:
     return spellings[0] if name not in names and len(spellings) == 1 else name
 
 
-def offers() -> tuple[Offer, ...]:
+def installed_protocols() -> tuple[InstalledProtocol, ...]:
     """All that installed packages offer, by name; what cannot be used too, with the reason."""
     return tuple(_offer(entry, namesakes) for entry, namesakes in all_entry_points(GROUP))
 
 
-def offer_named(name: str) -> Offer:
+def installed_protocol(name: str) -> InstalledProtocol:
     """What is offered as `name`. Raises `UnknownProtocolError`, which names those there are."""
     found = entry_points_named(GROUP, name)
     if not found:
@@ -80,13 +80,13 @@ def offer_named(name: str) -> Offer:
 
 def protocol_named(name: str) -> type[Protocol]:
     """The class of the protocol called `name`. Raises `UnknownProtocolError`, which names those there are."""
-    offer = offer_named(name)
+    offer = installed_protocol(name)
     if offer.protocol is None:
         raise UnknownProtocolError(f"{offer.place}, installed as protocol {name!r}, {offer.broken}")
     return offer.protocol
 
 
-def protocol_by_name(name: str) -> type[Protocol]:
+def protocol_or_first_fit(name: str) -> type[Protocol]:
     """Like `protocol_named`, of all that robots can be told to speak: also what only says who steps aside."""
     return FirstFit if name == FIRST_FIT else protocol_named(name)
 
@@ -96,20 +96,20 @@ def protocol_by_class(class_name: str, likely: Iterable[str] = ()) -> tuple[str,
 
     None: nothing that is installed is called that.
     """
-    for name in (*likely, FIRST_FIT, MINIMISES):
+    for name in (*likely, FIRST_FIT, DEFAULT_COST_PROTOCOL):
         with suppress(UnknownProtocolError):
-            protocol = protocol_by_name(name)
+            protocol = protocol_or_first_fit(name)
             if protocol.__name__ == class_name:
                 return name, protocol
-    for offer in offers():
+    for offer in installed_protocols():
         if offer.protocol is not None and offer.protocol.__name__ == class_name:
             return offer.name, offer.protocol
     return None
 
 
-def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> Offer:
+def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> InstalledProtocol:
     found = load_entry_point(entry, namesakes, _fault)
-    return Offer(entry, cast("type[Protocol] | None", found.what), found.broken)
+    return InstalledProtocol(entry, cast("type[Protocol] | None", found.what), found.broken)
 
 
 def _fault(loaded: object) -> str:

@@ -19,7 +19,7 @@ from robochoc.communication.network.transport import Transport
 from robochoc.journal.blocks import BlockReader, JournalDamagedError
 from robochoc.journal.entries import JournalError
 from robochoc.run.networked.address import Address
-from robochoc.run.networked.consult import ANSWER_S, ASK_AGAIN_S, NoAnswerError
+from robochoc.run.networked.directory_query import ANSWER_S, ASK_AGAIN_S, NoAnswerError
 
 LOOK_S = 0.1
 """How often it is asked for what is new."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.run.registry import offers
+from robochoc.run.registry import installed_protocols
 from tests.support.program import ROOT
 
 pytest.importorskip("material", reason="the extra docs is not installed: make docs")
@@ -34,7 +34,7 @@ def test_pages_load_nothing_from_elsewhere(site: Path) -> None:
 
 
 def test_there_is_a_page_for_each_protocol_and_for_each_command(site: Path) -> None:
-    for offer in offers():
+    for offer in installed_protocols():
         page = (site / "reference" / "protocols" / f"{offer.name}.html").read_text()
         assert f"--protocol {offer.name}" in page
     commands = (site / "reference" / "cli.html").read_text()

@@ -25,7 +25,7 @@ from robochoc.communication.network.transport import CannotConnectError
 from robochoc.journal.blocks import BEGINNING, PREAMBLE, frame_block
 from robochoc.model.outcome import Verdict
 from robochoc.run.networked.address import Address
-from robochoc.run.networked.consult import NoAnswerError
+from robochoc.run.networked.directory_query import NoAnswerError
 from robochoc.sniffer.remote import Followed, receive
 from tests.support.clocks import waiting
 from tests.support.network_runs import NetworkRun

@@ -78,8 +78,8 @@ def network_failures_told(place: object) -> Iterator[None]:
         from robochoc.authority.token import TokenError
         from robochoc.communication.network.router import RouterError
         from robochoc.communication.network.transport import CannotConnectError
-        from robochoc.run.networked.consult import NoAnswerError, TemplateError
-        from robochoc.run.networked.lead import TeamIncompleteError
+        from robochoc.run.networked.directory_query import NoAnswerError, TemplateError
+        from robochoc.run.networked.master_run import TeamIncompleteError
     except ModuleNotFoundError as missing:
         package = (missing.name or "").partition(".")[0]
         if package not in _EXTRA:

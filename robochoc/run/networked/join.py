@@ -15,7 +15,7 @@ from robochoc.communication.network.transport import Transport
 from robochoc.formats import check_robot
 from robochoc.model.problem import Robot
 from robochoc.run.networked.address import Address
-from robochoc.run.registry import protocol_by_name
+from robochoc.run.registry import protocol_or_first_fit
 from robochoc.solver.compile import Compiler
 from robochoc.solver.compiled_team import CompiledRobot
 
@@ -69,4 +69,4 @@ def join(robot: Robot, place: Address, identity: Identity, settings: RobotSettin
     own = CompiledRobot(robot, settings.compiled)
     settings.stage(f"looking for the master at {place}")
     with Transport(str(place), identity, watch=(), patience_s=settings.patience_s) as transport:
-        return NetworkRobot(own, identity, transport, protocol_by_name, settings).run()
+        return NetworkRobot(own, identity, transport, protocol_or_first_fit, settings).run()

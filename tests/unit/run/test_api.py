@@ -15,7 +15,7 @@ from robochoc.formats import InvalidInputError, write_team
 from robochoc.journal.events import AnyEvent, Concluded
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.run.networked.address import AddressError
-from robochoc.run.registry import UnknownProtocolError, offers
+from robochoc.run.registry import UnknownProtocolError, installed_protocols
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.deployments import Deployment
 from tests.support.problems import team_of
@@ -57,7 +57,7 @@ def test_options_are_those_of_the_command_line() -> None:
         "afc-ng", "simulator", order="random", withdraw="fewest", seed=3, delay=5, observer=told.append
     )
     assert (outcome.verdict, outcome.protocol, outcome.seed) == (Verdict.OPTIMAL, "afc-ng", 3)
-    assert len(outcome.aside) == 6
+    assert len(outcome.withdrawn_alive) == 6
     assert any(isinstance(event, Concluded) for event in told)
     stopped = problem.solve("dsa", "simulator", settings={"cycles": 7, "variant": "C"})
     assert stopped.verdict is Verdict.UNKNOWN
@@ -120,7 +120,7 @@ def test_protocols_as_the_paper_calls_them(word: str, name: str) -> None:
 
 
 def test_every_protocol_has_a_class_that_names_it() -> None:
-    named = [(offer.name, offer.protocol.__name__) for offer in offers() if offer.protocol]
+    named = [(offer.name, offer.protocol.__name__) for offer in installed_protocols() if offer.protocol]
     words = [{name.casefold(), kind.casefold()} for name, kind in named]
     assert sum(map(len, words)) == len(set().union(*words))
 

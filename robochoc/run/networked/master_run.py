@@ -25,21 +25,21 @@ from robochoc.journal.events import Observer
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.run.compatibility import refuse_options, refuse_settings, refuse_unfit
-from robochoc.run.defaults import MINIMISES, SATISFIES, default_protocol
+from robochoc.run.defaults import DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL, default_protocol
 from robochoc.run.distributed import solve_distributed
 from robochoc.run.networked.address import LOOPBACK, Address
 from robochoc.run.networked.machines import Machines, claimed, listed, team_of
 from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
-from robochoc.run.registry import protocol_by_name
+from robochoc.run.registry import protocol_or_first_fit
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import RefutedError
 
-HERE = Address(LOOPBACK)
+LOOPBACK_ADDRESS = Address(LOOPBACK)
 """Anything but loopback must be asked for."""
 
 
 @dataclass(frozen=True)
-class Plan:
+class MasterPlan:
     """What a master is to do.
 
     `place` is where it listens, `hosts` how robots may call that place besides. `names` says who is in the team, or
@@ -49,7 +49,7 @@ class Plan:
     """
 
     authority: Path
-    place: Address = HERE
+    place: Address = LOOPBACK_ADDRESS
     hosts: tuple[str, ...] = ()
     name: str = "team"
     names: tuple[str, ...] | None = None
@@ -83,15 +83,15 @@ class TeamIncompleteError(Exception):
     """The team was not complete in time."""
 
 
-class Led(NamedTuple):
+class MasterResult(NamedTuple):
     """The outcome, and what the master knows of the team: silhouettes, without any constraint."""
 
     outcome: Outcome
     team: Team
 
 
-def lead(
-    plan: Plan,
+def run_master(
+    plan: MasterPlan,
     *,
     observer: Observer | None = None,
     watched: bool = False,
@@ -99,7 +99,7 @@ def lead(
     listening: Callable[[], None] = lambda: None,
     publication: Publication | None = None,
     concluded: Callable[[Outcome | None], None] = lambda _outcome: None,
-) -> Led:
+) -> MasterResult:
     """Be the master of one run. `listening` is called once robots can come.
 
     Who has the right to sniff may have what is written to `publication`, while the run lasts and until a moment after
@@ -142,7 +142,9 @@ def _enrolling(authority: Authority, identity: Identity, place: Address) -> Iter
         yield
 
 
-def _run(plan: Plan, master: Master, observer: Observer | None, concluded: Callable[[Outcome | None], None]) -> Led:
+def _run(
+    plan: MasterPlan, master: Master, observer: Observer | None, concluded: Callable[[Outcome | None], None]
+) -> MasterResult:
     """Let the robots solve their problem, once the master listens, and tell them the outcome."""
     try:
         led = _solve(plan, master, observer)
@@ -156,36 +158,36 @@ def _run(plan: Plan, master: Master, observer: Observer | None, concluded: Calla
     return led
 
 
-def _solve(plan: Plan, master: Master, observer: Observer | None) -> Led:
+def _solve(plan: MasterPlan, master: Master, observer: Observer | None) -> MasterResult:
     """Wait for the team, and let it solve its problem."""
     if not master.gather(None if plan.gather_s is None else time.monotonic() + plan.gather_s):
         names = listed(sorted(master.members.awaited)) or "more robots"
         raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; awaited: {names}")
     team = team_of(master, plan.name)
     name = plan.protocol or default_protocol(team.kind)
-    options, protocol = plan.options(name), protocol_by_name(name)
+    options, protocol = plan.options(name), protocol_or_first_fit(name)
     refuse_settings(name, protocol, options.settings)
     refuse_unfit(team, options, protocol.traits)
     machines = Machines(master, options, plan.name, observer)
     header = Outcome(plan.name, name, Runtime.NETWORK, plan.seed, Verdict.UNKNOWN)
     outcome = claimed(solve_distributed(machines, protocol, header))
-    return Led(outcome, machines.team_seen())
+    return MasterResult(outcome, machines.team_seen())
 
 
-def _refuse_early(plan: Plan) -> None:
+def _refuse_early(plan: MasterPlan) -> None:
     """Refuse what can be refused before any robot has come. Raises `UnsupportedError`."""
-    refuse_options(plan.options(plan.protocol or SATISFIES))
+    refuse_options(plan.options(plan.protocol or DEFAULT_PROTOCOL))
     try:
-        name = plan.protocol or SATISFIES
-        refuse_settings(name, protocol_by_name(name), plan.settings)
+        name = plan.protocol or DEFAULT_PROTOCOL
+        refuse_settings(name, protocol_or_first_fit(name), plan.settings)
     except UnsupportedError:
         if plan.protocol:
             raise
-        refuse_settings(MINIMISES, protocol_by_name(MINIMISES), plan.settings)
+        refuse_settings(DEFAULT_COST_PROTOCOL, protocol_or_first_fit(DEFAULT_COST_PROTOCOL), plan.settings)
 
 
 def _in_words(outcome: Outcome) -> str:
     """The outcome, as robots are told it."""
-    aside = f", {len(outcome.aside)} step aside" if outcome.aside else ""
+    aside = f", {len(outcome.withdrawn_alive)} step aside" if outcome.withdrawn_alive else ""
     claim = f", claimed by {outcome.claimed_by}" if outcome.claimed_by else ""
     return f"{outcome.verdict}{aside}{claim}"

@@ -32,7 +32,7 @@ class TemplateError(ValueError):
     """That is nothing to search for."""
 
 
-def template_of(slots: Sequence[str]) -> AgentDescription:
+def search_template(slots: Sequence[str]) -> AgentDescription:
     """The template that `slot=value` words describe: all of them have to match. Raises `TemplateError`.
 
     Names may go without their platform, which may call itself otherwise than whoever asks does.
@@ -61,19 +61,19 @@ def platform_at(place: Address) -> str:
     return f"{place}/robochoc"
 
 
-def search_words(place: Address, slots: Sequence[str], at_most: int | None = None) -> str:
+def search_request(place: Address, slots: Sequence[str], at_most: int | None = None) -> str:
     """The search as the directory is asked: an action in SL0. Raises `TemplateError`."""
     platform = platform_at(place)
-    return request(df_on(platform), Function.SEARCH, template_of(slots), at_most)
+    return request(df_on(platform), Function.SEARCH, search_template(slots), at_most)
 
 
-def consult(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> str:
+def query_directory(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> str:
     """What the directory answers to `words`, in SL0. Raises `CannotConnectError` and `NoAnswerError`."""
     with Transport(str(place), identity, watch=(), patience_s=patience_s) as transport:
         return _Asking(place, identity, transport).asked(words, Performative.INFORM)
 
 
-def watch(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> Iterator[str]:
+def watch_directory(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> Iterator[str]:
     """What the directory tells whoever subscribes to what `words` search for, now and whenever it changes, in SL0.
 
     It ends with `NoAnswerError` when the master is gone for `patience_s`. Raises `CannotConnectError` as well.
@@ -141,12 +141,12 @@ class _Asking:
         return told if told and told.number == self._number else None
 
 
-def found(answer: str) -> tuple[AgentDescription, ...]:
+def agents_in(answer: str) -> tuple[AgentDescription, ...]:
     """The agents in an answer."""
     return descriptions_in(answer)
 
 
-def about(answer: str) -> str:
+def subject_of(answer: str) -> str:
     """The name of the agent that an answer to a subscriber is about; empty where a search was for no name."""
     return searched_in(answer).name
 
@@ -159,4 +159,13 @@ def _told(framing: Framing, item: FrameArrived) -> DirectoryAnswer | None:
     return word if isinstance(word, DirectoryAnswer) else None
 
 
-__all__ = ["CannotConnectError", "NoAnswerError", "TemplateError", "about", "consult", "found", "search_words", "watch"]
+__all__ = [
+    "CannotConnectError",
+    "NoAnswerError",
+    "TemplateError",
+    "agents_in",
+    "query_directory",
+    "search_request",
+    "subject_of",
+    "watch_directory",
+]
