@@ -68,7 +68,7 @@ def _decide(solver: CentralSolver, team: Team, options: Options) -> _Decision:
     began = time.monotonic()
     solutions = None
     if options.count:
-        judgement = solver.judge(team, count=True)
+        judgement = solver.solve(team, count=True)
         answer, solutions = Answer(judgement.verdict), judgement.count
     else:
         answer = _answer(solver, team, options)
@@ -82,10 +82,10 @@ def _answer(solver: CentralSolver, team: Team, options: Options) -> Answer:
     price = None
     judgement = None
     if options.withdraw is not Withdrawal.MINIMUM or team.kind is ProblemKind.DISCSP:
-        judgement = solver.judge(team)
+        judgement = solver.solve(team)
     if judgement is None or (options.withdraw is not None and judgement.verdict is Verdict.NO_SOLUTION):
         price = int(withdrawal_cost(team))
-        judgement = solver.judge(team, aside=price)
+        judgement = solver.solve(team, withdrawal_cost=price)
     return _answer_of(judgement, team, price, options)
 
 
