@@ -1,4 +1,4 @@
-"""What a run comes to: the typed form of the JSON result (docs/reference/result.md)."""
+"""The outcome of a run: the typed form of the JSON result (docs/reference/result.md)."""
 
 from __future__ import annotations
 

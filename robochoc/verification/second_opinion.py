@@ -40,7 +40,7 @@ def confirmed(
     against = contradiction(opinion, total)
     if against or (alone is not None and has_local_solution(team[alone])):
         claim = "no solution" if total == INFINITE else f"a solution of the least cost, {total:,}"
-        found = f"{team.name} has {claim}, and a judge has found {against or 'one'}"
+        found = f"{team.name} has {claim}, and the central solver has found {against or 'one'}"
         raise RefutedError(f"{protocol} says that {found}")
     return opinion.verdict is not Verdict.UNKNOWN
 
