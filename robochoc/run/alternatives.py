@@ -37,7 +37,7 @@ def alternatives(team: Team, options: Options, *, complete: bool = False, costs:
     if names:
         return f"; these do: {', '.join(names)} (--protocol)"
     if _central_solver_fits(team, options):
-        return f"; no protocol does, but the central judge (--protocol {CENTRAL})"
+        return f"; no protocol does, but the central solver (--protocol {CENTRAL})"
     too_high = max_total(team, options) >= EXACT
     return f"; no protocol that is installed does{' (scale the costs down)' if too_high else ''}"
 

@@ -99,7 +99,7 @@ def test_where_no_protocol_does_the_judge_may() -> None:
     for kind, asked in ((ProblemKind.DISWCSP, "sfb"), (ProblemKind.DISWCSP, "abt")):
         team = replace(partly_known(3), robots=tuple(replace(one, kind=kind) for one in partly_known(3).robots))
         said = refused(team, Options(protocol=asked))
-        assert said.endswith("; no protocol does, but the central judge (--protocol central)")
+        assert said.endswith("; no protocol does, but the central solver (--protocol central)")
     assert "central" not in refused(partly_known(2**31), Options(protocol="sfb"))
 
 

@@ -196,7 +196,7 @@ def test_when_the_time_is_over_the_judge_says_unknown() -> None:
 
 def test_a_no_solution_that_the_judge_refutes_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(CentralSolver, "judge", lambda *_, **__: CentralAnswer(Verdict.SOLUTION))
-    with pytest.raises(RefutedError, match="no solution, and a judge has found one"):
+    with pytest.raises(RefutedError, match="no solution, and the central solver has found one"):
         solve(queens3d(4), Options(runtime=Runtime.SIMULATOR, verify=True))
 
 
