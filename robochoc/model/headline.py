@@ -23,12 +23,12 @@ def describe_outcome(
         flying = total - len(outcome.withdrawn)
     match outcome.verdict:
         case Verdict.UNKNOWN:
-            so_far = f"; {flying} of {total} fly in the best answer so far" if outcome.aside else ""
+            so_far = f"; {flying} of {total} fly in the best answer so far" if outcome.withdrawn_alive else ""
             return f"no verdict, a limit was reached{so_far}"
         case Verdict.NO_SOLUTION:
             once_solved = any(epoch.assignment for epoch in outcome.epochs)
             return f"no solution{_left(outcome)}{' in the end' if once_solved else ''}"
-        case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.aside:
+        case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.withdrawn_alive:
             best = "proven" if outcome.verdict is Verdict.OPTIMAL else "not proven to be the"
             what = "maximum by weight" if weighted else "maximum"
             return f"{flying} of {total} fly ({best} {what}{_lost(outcome)})"

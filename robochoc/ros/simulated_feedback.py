@@ -9,9 +9,11 @@ from itertools import islice
 
 import numpy as np
 
-from robochoc.flight.flight import Flight, FlightConditions, FlightLog, MotorFailure
+from robochoc.flight.flight import Flight
 from robochoc.flight.layout import Point
+from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Drone, Goal, Leg, MissionBuilder
+from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.flight.reports import OutOfOrder, Report
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.closed_loop import TOGETHER_S, Feedback

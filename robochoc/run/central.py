@@ -68,7 +68,7 @@ def _decide(solver: CentralSolver, team: Team, options: Options) -> _Decision:
     began = time.monotonic()
     solutions = None
     if options.count:
-        found = solver.judge(team, count=True)
+        found = solver.solve(team, count=True)
         answer, solutions = Answer(found.verdict), found.count
     else:
         answer = _answer(solver, team, options)
@@ -82,10 +82,10 @@ def _answer(solver: CentralSolver, team: Team, options: Options) -> Answer:
     price = None
     found = None
     if options.withdraw is not Withdrawal.MINIMUM or team.kind is ProblemKind.DISCSP:
-        found = solver.judge(team)
+        found = solver.solve(team)
     if found is None or (options.withdraw is not None and found.verdict is Verdict.NO_SOLUTION):
         price = int(withdrawal_cost(team))
-        found = solver.judge(team, aside=price)
+        found = solver.solve(team, withdrawal_cost=price)
     return _answer_of(found, team, price, options)
 
 

@@ -112,7 +112,7 @@ def with_cost_variables(part: Component, network: Network, charges: Mapping[Code
     worst = sum(max(prices.values(), default=0) for prices in above.values()) // unit
     if worst > MAX_TOTAL_COST:
         raise UnsupportedError(
-            f"costs add up to {worst * unit:,} at worst, which is more than the central judge can minimise; costs that"
+            f"costs add up to {worst * unit:,} at worst, which is more than the central solver can minimise; costs that"
             " stand for 'never' are better written as infinity"
         )
     domains, tables, costs = list(network.domains), list(network.tables), []
@@ -125,10 +125,10 @@ def with_cost_variables(part: Component, network: Network, charges: Mapping[Code
     return WeightedComponent(part, Network(tuple(domains), tuple(tables)), tuple(costs), sum(least.values()), unit)
 
 
-def components_with_withdrawal(team: Team, aside: int) -> list[WeightedComponent]:
+def components_with_withdrawal(team: Team, withdrawal_cost: int) -> list[WeightedComponent]:
     """Return the components of `team`, where robots may withdraw, with all their constraints.
 
-    `aside` is the cost of withdrawing a robot of weight 1.
+    `withdrawal_cost` is the cost of withdrawing a robot of weight 1.
 
     Its variables then have a code that stands for no value.
     """
@@ -154,7 +154,7 @@ def components_with_withdrawal(team: Team, aside: int) -> list[WeightedComponent
             first, *others = (place[name] for name in own[robot.name])
             network = replace(network, tables=(*network.tables, *_all_or_none(network, first, others, absent)))
             prices = charges.setdefault((first,), {(code,): 0 for code in network.domains[first]})
-            prices[absent,] += robot.weight * aside
+            prices[absent,] += robot.weight * withdrawal_cost
         found.append(with_cost_variables(part, network, charges))
     return found
 
@@ -199,7 +199,7 @@ def _prices(part: Component, network: Network, scope: Codes, charging: Iterable[
         names = ", ".join(constraint.name for constraint in charging)
         raise UnsupportedError(
             f"constraint {names} has a price for {size:,} combinations of values, more than {MAX_COST_ROWS:,} that the"
-            " central judge can list; split it"
+            " central solver can list; split it"
         )
     prices = [cost_function(constraint, [part.names[place] for place in scope]) for constraint in charging]
     found = {}

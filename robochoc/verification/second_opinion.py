@@ -36,7 +36,7 @@ def confirmed(
     Raises:
         RefutedError: when it has found something else.
     """
-    opinion = solver.judge(team, aside=withdrawal_cost)
+    opinion = solver.solve(team, withdrawal_cost=withdrawal_cost)
     against = contradiction(opinion, total)
     if against or (alone is not None and has_local_solution(team[alone])):
         claim = "no solution" if total == INFINITE else f"a solution of the least cost, {total:,}"

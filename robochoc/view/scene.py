@@ -131,9 +131,9 @@ def _flight_facts(flown: FlightLog | None, why_not: str, *, is_to_scale: bool) -
 def _facts(outcome: Outcome, mission: Mission) -> tuple[tuple[str, str], ...]:
     checked = ", checked" if outcome.verified else ""
     facts = [("verdict", f"{outcome.verdict}{checked}"), ("protocol", outcome.protocols)]
-    if outcome.aside:
+    if outcome.withdrawn_alive:
         facts[0] = ("verdict", f"no solution for all {len(mission.drones)}{checked}")
-        facts.append(("withdrawn", f"{len(outcome.aside)}"))
+        facts.append(("withdrawn", f"{len(outcome.withdrawn_alive)}"))
     if outcome.lost:
         facts.append(("lost", ", ".join(outcome.lost)))
     if outcome.cost:

@@ -159,7 +159,7 @@ def claimed(outcome: Outcome) -> Outcome:
         case Verdict.UNKNOWN:
             by = None if outcome.bound is None else ALL_ROBOTS
         case Verdict.SOLUTION:
-            by = (outcome.witness if outcome.aside else None) if outcome.verified else ALL_ROBOTS
+            by = (outcome.witness if outcome.withdrawn_alive else None) if outcome.verified else ALL_ROBOTS
         case never:
             assert_never(never)
     return replace(outcome, claimed_by=by)

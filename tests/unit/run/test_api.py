@@ -57,7 +57,7 @@ def test_options_are_those_of_the_command_line() -> None:
         "afc-ng", "simulator", order="random", withdraw="fewest", seed=3, delay=5, observer=told.append
     )
     assert (outcome.verdict, outcome.protocol, outcome.seed) == (Verdict.OPTIMAL, "afc-ng", 3)
-    assert len(outcome.aside) == 6
+    assert len(outcome.withdrawn_alive) == 6
     assert any(isinstance(event, Concluded) for event in told)
     stopped = problem.solve("dsa", "simulator", settings={"cycles": 7, "variant": "C"})
     assert stopped.verdict is Verdict.UNKNOWN

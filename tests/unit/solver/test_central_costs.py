@@ -1,4 +1,4 @@
-"""The central judge on costs: the least cost, the fewest aside, and second opinions."""
+"""The central solver on costs: the least cost, the fewest aside, and second opinions."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def test_counting_is_for_problems_without_costs() -> None:
 def test_an_answer_that_does_not_cost_what_the_judge_says_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     team = coloring(3, 2, 2)
     wrong = CentralAnswer(Verdict.OPTIMAL, dict.fromkeys(team.variables, 1), cost=1, bound=1)
-    monkeypatch.setattr(CentralSolver, "judge", lambda *_, **__: wrong)
+    monkeypatch.setattr(CentralSolver, "solve", lambda *_, **__: wrong)
     with pytest.raises(SolverLostError, match="costs 3, and it says 1"):
         solve(team, CENTRAL)
 
@@ -142,7 +142,7 @@ def test_an_answer_that_does_not_cost_what_the_judge_says_is_none(monkeypatch: p
 def test_a_search_that_broke_off_proves_no_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(AceProcess, "_hear", lambda *_: Solved(found=1, complete=False, solutions=b"\0" * 4 * 6))
     with pytest.raises(SolverLostError, match="stopped before"):
-        CentralSolver(always_ace=True).judge(coloring(3, 2, 2))
+        CentralSolver(always_ace=True).solve(coloring(3, 2, 2))
 
 
 # --- the fewest aside -------------------------------------------------------------------------------------------------
@@ -222,7 +222,7 @@ def test_there_is_nothing_to_count_where_robots_step_aside() -> None:
 
 
 def test_maximal_is_for_the_robots() -> None:
-    with pytest.raises(UnsupportedError, match="--withdraw fewest"):
+    with pytest.raises(UnsupportedError, match="--withdraw minimum"):
         solve(queens3d(3), replace(CENTRAL, withdraw=Withdrawal.MAXIMAL))
 
 
