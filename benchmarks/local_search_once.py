@@ -54,7 +54,7 @@ def main() -> None:
     name, agents, degree, seed, cycles, *settings = sys.argv[1:]
     team = soft_colouring(int(agents), int(degree), int(seed))
     given = {"cycles": cycles, **dict(setting.split("=", 1) for setting in settings)}
-    run = Simulation(team, protocol_named(name), Concurrent(int(seed)), brief=RunParameters(int(seed), given))
+    run = Simulation(team, protocol_named(name), Concurrent(int(seed)), parameters=RunParameters(int(seed), given))
     cpu_s, wall_s = time.process_time(), time.perf_counter()
     result = run.search()
     cpu_s, wall_s = time.process_time() - cpu_s, time.perf_counter() - wall_s

@@ -129,9 +129,9 @@ class Wave(_Control, frozen=True):
     number: int
 
 
-def sealed(part: AgentProblem, void: Invalidated) -> bytes:
+def sealed(part: AgentProblem, invalidated: Invalidated) -> bytes:
     """Return the content of a `Change`."""
-    return bytes(ForkingPickler.dumps((part, void)))
+    return bytes(ForkingPickler.dumps((part, invalidated)))
 
 
 def unsealed(change: bytes) -> tuple[AgentProblem, Invalidated]:
@@ -139,8 +139,8 @@ def unsealed(change: bytes) -> tuple[AgentProblem, Invalidated]:
 
     A process is started with the same means (`multiprocessing`); no message of a protocol ever comes here.
     """
-    part, void = ForkingPickler.loads(change)
-    return part, void
+    part, invalidated = ForkingPickler.loads(change)
+    return part, invalidated
 
 
 RobotMessage = Ready | Counters | Conclusion | Events

@@ -40,10 +40,10 @@ class Host:
         """
         return cls(protocol(LocalProblem(part), PriorityOrder(part.order, part.links)), part.parameters)
 
-    def __init__(self, protocol: Protocol, brief: RunParameters = DEFAULT_PARAMETERS) -> None:
+    def __init__(self, protocol: Protocol, parameters: RunParameters = DEFAULT_PARAMETERS) -> None:
         self.protocol = protocol
         self.name = protocol.problem.agent
-        self._equip(brief)
+        self._equip(parameters)
         self.clock = 0
         self.sent: dict[str, int] = {}
         self.bytes = self.largest = 0
@@ -85,14 +85,14 @@ class Host:
         self._begun = True
         return self._step(protocol.start)
 
-    def change(self, part: AgentProblem, void: Invalidated) -> None:
+    def change(self, part: AgentProblem, invalidated: Invalidated) -> None:
         """Enter a new epoch: the problem has changed to `part`, and counting begins again.
 
         A protocol that can goes on with what it knows; any other is begun anew. Raises `UnsupportedError`.
         """
         problem, order = LocalProblem(part), PriorityOrder(part.order, part.links)
         if isinstance(self.protocol, DynamicProtocol):
-            self.protocol.change(problem, order, void)
+            self.protocol.change(problem, order, invalidated)
             self._forget_said()
         else:
             self.protocol = type(self.protocol)(problem, order)
@@ -151,12 +151,12 @@ class Host:
         """Return what this robot has sent and checked so far; `ncccs` is its own clock."""
         return Metrics(dict(self.sent), self.bytes, self.clock, self.checks, largest=self.largest)
 
-    def _equip(self, brief: RunParameters) -> None:
+    def _equip(self, parameters: RunParameters) -> None:
         """Give the protocol what it cannot have of itself: what was set, and chance."""
         protocol = self.protocol
-        if brief.settings:
-            protocol.settings = settings_of(type(protocol), brief.settings)
-        protocol.chance = random.Random(f"{brief.seed} {self.name}").random  # noqa: S311 - a search is no secret
+        if parameters.settings:
+            protocol.settings = settings_of(type(protocol), parameters.settings)
+        protocol.chance = random.Random(f"{parameters.seed} {self.name}").random  # noqa: S311 - a search is no secret
 
     def _step(self, act: Callable[[], None]) -> list[Envelope]:
         """Let the protocol act, count its checks, and wrap what it has said."""

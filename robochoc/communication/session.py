@@ -20,15 +20,15 @@ class Epoch(NamedTuple):
 
     Attributes:
         compiled: The team, with compiled domains.
-        void: What of the epoch before no longer holds.
+        invalidated: What of the epoch before no longer holds.
         restarted: Robots that begin anew, though there may have been others of their names before.
-        brief: What robots are given besides the problem.
+        parameters: What robots are given besides the problem.
     """
 
     compiled: CompiledTeam
-    void: Invalidated = Invalidated(frozenset(), frozenset())
+    invalidated: Invalidated = Invalidated(frozenset(), frozenset())
     restarted: frozenset[str] = frozenset()
-    brief: RunParameters = DEFAULT_PARAMETERS
+    parameters: RunParameters = DEFAULT_PARAMETERS
 
     @property
     def team(self) -> Team:
@@ -38,7 +38,7 @@ class Epoch(NamedTuple):
     def parts(self, protocol: type[Protocol]) -> dict[str, AgentProblem]:
         """Return each robot's part of the problem for `protocol`."""
         traits = protocol.traits
-        return agent_problems(self.compiled, self.brief, shared_scopes=traits.shared_scopes, tree=traits.tree)
+        return agent_problems(self.compiled, self.parameters, shared_scopes=traits.shared_scopes, tree=traits.tree)
 
 
 class Session(ABC):

@@ -37,7 +37,7 @@ def name_of(protocol: type[Protocol]) -> str:
 
 
 def strangers(
-    team: Team, protocol: type[Protocol], seed: int, brief: RunParameters = DEFAULT_PARAMETERS
+    team: Team, protocol: type[Protocol], seed: int, parameters: RunParameters = DEFAULT_PARAMETERS
 ) -> set[tuple[str, str]]:
     """Who has written to whom without sharing a constraint."""
     known = possible_neighbours(profiles_of(team))
@@ -47,7 +47,7 @@ def strangers(
         if isinstance(event, Sent) and event.receiver not in known[event.sender]:
             found.add((event.sender, event.receiver))
 
-    with Simulation(team, protocol, RandomChannels(seed), observer=look, brief=brief) as session:
+    with Simulation(team, protocol, RandomChannels(seed), observer=look, parameters=parameters) as session:
         session.search(messages=MESSAGES)
     return found
 

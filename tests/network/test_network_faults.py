@@ -94,8 +94,8 @@ class Team:
 @contextmanager
 def held_team(folder: Path, settings: NetworkSettings = NetworkSettings()) -> Iterator[Team]:
     events: list[AnyEvent] = []
-    brief = RunParameters(settings={"file": str(folder / "go")})
-    with LocalNetwork(CHAIN, PausedABT, observer=events.append, settings=settings, brief=brief) as network:
+    parameters = RunParameters(settings={"file": str(folder / "go")})
+    with LocalNetwork(CHAIN, PausedABT, observer=events.append, settings=settings, parameters=parameters) as network:
         team = Team(network, events, folder / "go")
         try:
             yield team

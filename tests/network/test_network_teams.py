@@ -45,8 +45,8 @@ def test_nobody_is_doubted_who_is_honest(name: str) -> None:
     protocol = protocol_named(name)
     chance = Random(4)
     team = random_cost_team(chance, n_ary=False) if protocol.traits.costs else random_team(chance, n_ary=False)
-    brief = RunParameters(settings={"cycles": "5"} if hasattr(protocol.settings, "cycles") else {})
-    office = InMemoryNetwork(known_to_both(team), protocol, brief=brief)
+    parameters = RunParameters(settings={"cycles": "5"} if hasattr(protocol.settings, "cycles") else {})
+    office = InMemoryNetwork(known_to_both(team), protocol, parameters=parameters)
     result = office.search()
     assert not office.failures
     assert not office.state.doubts_about_counts

@@ -81,10 +81,10 @@ def nothing_of(_robot: Robot) -> CompiledDomain:
 
 def part_of(robot: Robot, task: Task) -> AgentProblem:
     """What a robot knows across machines."""
-    brief = RunParameters(task.seed, task.settings, task.aside)
+    parameters = RunParameters(task.seed, task.settings, task.aside)
     domains = {name: domain_of(name, ranges) for name, ranges in task.domains.items()}
     own = CompiledRobot(among(robot, task.interfaces), nothing_of)
-    return AgentProblem(own, task.order, task.interfaces, (), domains, task.links, task.secretive, brief)
+    return AgentProblem(own, task.order, task.interfaces, (), domains, task.links, task.secretive, parameters)
 
 
 def comparable(part: AgentProblem) -> AgentProblem:
@@ -99,10 +99,10 @@ def comparable(part: AgentProblem) -> AgentProblem:
     )
 
 
-def assert_same(team: Team, members: Members, robots: Sequence[Robot], brief: RunParameters) -> None:
+def assert_same(team: Team, members: Members, robots: Sequence[Robot], parameters: RunParameters) -> None:
     """What robots know by the master's word is what they would know in a process of the whole team."""
-    expected = agent_problems(CompiledTeam(team, nothing_of), brief, tree=True)
-    tasks = members.tasks(1, "abt", TREE, brief)
+    expected = agent_problems(CompiledTeam(team, nothing_of), parameters, tree=True)
+    tasks = members.tasks(1, "abt", TREE, parameters)
     assert list(tasks) == list(expected)
     for robot in robots:
         known = part_of(robot, tasks[robot.name])
@@ -113,8 +113,8 @@ def assert_same(team: Team, members: Members, robots: Sequence[Robot], brief: Ru
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
 def test_robots_of_files_know_what_the_whole_team_would_tell_them(folder: Path) -> None:
     team = read_team(folder)
-    brief = RunParameters(3, {"p": "0.5"}, 17.5)
-    assert_same(team, registered(team), team.robots, brief)
+    parameters = RunParameters(3, {"p": "0.5"}, 17.5)
+    assert_same(team, registered(team), team.robots, parameters)
 
 
 @given(team=random_teams)

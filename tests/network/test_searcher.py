@@ -69,22 +69,22 @@ def chain(cost: float = INFINITE) -> Team:
     return team_of(dict.fromkeys("ABC", (1, 2)), [*constraints, Constraint("P", PREDEFINED["lt"], ("B", 9), ("B", 9))])
 
 
-def tasks(team: Team, protocol: type[Protocol], brief: RunParameters = DEFAULT_PARAMETERS) -> dict[str, Task]:
+def tasks(team: Team, protocol: type[Protocol], parameters: RunParameters = DEFAULT_PARAMETERS) -> dict[str, Task]:
     members = Members()
     for name, profile in profiles_of(team).items():
         members.register(name, profile, "incarnation")
-    return members.tasks(1, protocol.__name__, protocol.traits, brief)
+    return members.tasks(1, protocol.__name__, protocol.traits, parameters)
 
 
 def searcher(
     around: RobotContext,
     protocol: type[Protocol] = ABT,
-    brief: RunParameters = DEFAULT_PARAMETERS,
+    parameters: RunParameters = DEFAULT_PARAMETERS,
     team: Team | None = None,
 ) -> Searcher:
     """RB's."""
     team = team or chain()
-    return Searcher(CompiledRobot(team["RB"]), tasks(team, protocol, brief)["RB"], protocol, around)
+    return Searcher(CompiledRobot(team["RB"]), tasks(team, protocol, parameters)["RB"], protocol, around)
 
 
 def ok(value: int | None, clock: int = 0) -> Envelope:
@@ -272,7 +272,7 @@ def test_checking_adds_up_what_its_constraints_charge() -> None:
 
 def test_who_steps_aside_answers_for_nothing() -> None:
     around = Around()
-    one = searcher(around.context(), brief=RunParameters(withdrawal_cost=1))
+    one = searcher(around.context(), parameters=RunParameters(withdrawal_cost=1))
     one.prepare()
     assert one.check_constraints({"A": 1, "C": 1}) == CheckResult(1, allowed=True, cost=0)
 

@@ -146,8 +146,8 @@ def test_who_may_step_aside_does_so_rather_than_break_anything(protocol: type[Cy
     for seed in range(40):
         team = random_hard_team(chance)
         price = withdrawal_cost(team)
-        brief = RunParameters(seed, {"cycles": "25"}, withdrawal_cost=price)
-        result = Simulation(team, protocol, any_schedule(chance), brief=brief).search()
+        parameters = RunParameters(seed, {"cycles": "25"}, withdrawal_cost=price)
+        result = Simulation(team, protocol, any_schedule(chance), parameters=parameters).search()
         assert result.verdict is Verdict.SOLUTION
         found = best_known(CompiledTeam(team), result, price)
         assert found

@@ -83,7 +83,7 @@ class InMemoryNetwork:
         protocol: type[Protocol],
         identities: dict[str, Identity] | None = None,
         filters: Sequence[str] = (),
-        brief: RunParameters = DEFAULT_PARAMETERS,
+        parameters: RunParameters = DEFAULT_PARAMETERS,
         traitor: str = "",
     ) -> None:
         self.traitor = traitor
@@ -94,7 +94,7 @@ class InMemoryNetwork:
         self.failures: dict[str, Failed] = {}
         self._protocol = protocol
         self._filters = tuple(filters)
-        self._brief = brief
+        self._brief = parameters
         self._searching = False
         self._framing = Framing(MASTER, RUN)
         unproven = cast("Identity", None)

@@ -200,8 +200,8 @@ class NetworkRun:
             while not self._given_up and time.monotonic() < deadline and not self.master.members.closed:
                 self.master.gather(time.monotonic() + SLICE_S)
             if self.master.members.closed:
-                brief = RunParameters(settings={"file": str(self._gate)})
-                self.result = self.master.search("held", PausedABT.traits, brief, self._seconds)
+                parameters = RunParameters(settings={"file": str(self._gate)})
+                self.result = self.master.search("held", PausedABT.traits, parameters, self._seconds)
                 if not self.result.lost and self.result.assignments:
                     self.held = self.master.checked(self.result.assignments)
         except Exception as error:  # noqa: BLE001 - the test is told

@@ -70,13 +70,13 @@ class LocalNetwork(Session):
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
         settings: NetworkSettings = NetworkSettings(),
-        brief: RunParameters = DEFAULT_PARAMETERS,
+        parameters: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
         super().__init__(team)
         team = self.compiled.team
         require_descriptors(_DESCRIPTORS + _DESCRIPTORS_PER_ROBOT * len(team.robots))
         self._protocol = protocol
-        self._brief = brief
+        self._brief = parameters
         self._context = _fork_server(protocol)
         settings = replace(settings, scratch=get_temp_dir())
         self._settings = settings
@@ -151,7 +151,7 @@ class LocalNetwork(Session):
         self.compiled = epoch.compiled
         gone = [name for name in self._master.members.robots if name not in epoch.team]
         self._master.members.remove(gone)
-        self._brief = epoch.brief
+        self._brief = epoch.parameters
 
     def close(self) -> None:
         """Send all home, and leave nothing behind."""

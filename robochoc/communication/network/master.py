@@ -151,7 +151,7 @@ class Master(MasterLoop):
         self,
         protocol: str,
         traits: Traits,
-        brief: RunParameters,
+        parameters: RunParameters,
         timeout: float | None = None,
         messages: int | None = None,
     ) -> RunResult:
@@ -168,7 +168,7 @@ class Master(MasterLoop):
         self._policy.open_ways(self.members.reach(writes_to_non_neighbours=traits.writes_to_non_neighbours))
         epoch, declared = self.state.epoch + 1, self.members.declared(traits)
         state = self.state = AuditedSearchState(epoch, self.members.order, messages, declared)
-        for name, task in self.members.tasks(epoch, protocol, traits, brief).items():
+        for name, task in self.members.tasks(epoch, protocol, traits, parameters).items():
             self._send(name, task)
         self._search_until(deadline)
         state.note_end(time.monotonic() - began, in_time=not over(deadline))

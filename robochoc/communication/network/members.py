@@ -259,7 +259,7 @@ class Members:
         """Return to whom each robot may write: to all, if the protocol writes to non-neighbours."""
         return reach(self.profiles, writes_to_non_neighbours=writes_to_non_neighbours)
 
-    def tasks(self, epoch: int, protocol: str, traits: Traits, brief: RunParameters) -> dict[str, Task]:
+    def tasks(self, epoch: int, protocol: str, traits: Traits, parameters: RunParameters) -> dict[str, Task]:
         """Return the task of each robot for a search, in priority order."""
         order = self.order
         shown = {name: self.robots[name].robot for name in order}
@@ -277,9 +277,9 @@ class Members:
                 domains,
                 links,
                 tuple(parent for parent in self._links(name) if name in self.robots[parent].profile.looks_at),
-                brief.seed,
-                dict(brief.settings),
-                brief.withdrawal_cost,
+                parameters.seed,
+                dict(parameters.settings),
+                parameters.withdrawal_cost,
                 cards,
             )
             for name in order

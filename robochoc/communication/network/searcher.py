@@ -159,8 +159,10 @@ class Searcher(RobotLoop):
             raise UnsupportedError(f"{self._robot.name} was told what cannot be: {bad}") from None
         self._learnt = {sender: [one.constraint for one in theirs] for sender, theirs in known.items()}
         copies = _sorted([one for theirs in known.values() for one in theirs], task.order)
-        brief = RunParameters(task.seed, task.settings, task.aside)
-        return AgentProblem(self._own, task.order, task.interfaces, copies, domains, task.links, task.secretive, brief)
+        parameters = RunParameters(task.seed, task.settings, task.aside)
+        return AgentProblem(
+            self._own, task.order, task.interfaces, copies, domains, task.links, task.secretive, parameters
+        )
 
     def _known(self, sender: str, record: SharedRecord) -> KeyedConstraint:
         """Return a constraint that `sender` holds: it has to be a child, and this robot's variables in the scope."""

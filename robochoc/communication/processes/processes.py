@@ -65,7 +65,7 @@ class ProcessesRun(Session, MasterLoop):
         survive: Robots whose processes end break the search off, and are named in its result. Otherwise
             `RobotsLostError` is raised.
         patience_s: A robot whose process is stopped (SIGSTOP) for so many seconds is lost. None: it is waited for.
-        brief: What robots are given besides the problem.
+        parameters: What robots are given besides the problem.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class ProcessesRun(Session, MasterLoop):
         start_method: StartMethod = "fork",
         survive: bool = False,
         patience_s: float | None = None,
-        brief: RunParameters = DEFAULT_PARAMETERS,
+        parameters: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
         Session.__init__(self, team)
         MasterLoop.__init__(self, progress)
@@ -89,7 +89,7 @@ class ProcessesRun(Session, MasterLoop):
         self._pool = ProcessPool(start_method)
         self._lossless = True
         self._deadline: float | None = None
-        self._unstarted = Epoch(self.compiled, brief=brief).parts(protocol)
+        self._unstarted = Epoch(self.compiled, parameters=parameters).parts(protocol)
         self.state = SearchState(0, self.compiled.team.order, traits=protocol.traits)
 
     @property
@@ -137,7 +137,7 @@ class ProcessesRun(Session, MasterLoop):
             elif robot.ended:  # after its report, so that the epoch before could do without it
                 self._lose(name, robot.describe_end())
             else:
-                self._send(robot, Change(self.state.epoch, sealed(part, epoch.void), left))
+                self._send(robot, Change(self.state.epoch, sealed(part, epoch.invalidated), left))
 
     def kill(self, name: str) -> None:
         """Kill the robot's process, if it has one."""

@@ -30,7 +30,7 @@ PROGRESS_EVERY = 256
 class Simulation(Session):
     """One team in this thread. `observer` is told of all events, with the schedule's time.
 
-    `brief` is what robots are told beside the problem.
+    `parameters` is what robots are told beside the problem.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class Simulation(Session):
         *,
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
-        brief: RunParameters = DEFAULT_PARAMETERS,
+        parameters: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
         super().__init__(team)
         self._protocol = protocol
@@ -52,7 +52,7 @@ class Simulation(Session):
         self._checks = 0
         self._verdict: Verdict | None = None
         self._witness: str | None = None
-        parts = Epoch(self.compiled, brief=brief).parts(protocol)
+        parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
         self._hosts = {name: self._host(part) for name, part in parts.items()}
 
     @property
@@ -87,7 +87,7 @@ class Simulation(Session):
         for name, part in epoch.parts(self._protocol).items():
             if name in before and name not in epoch.restarted:
                 self._hosts[name] = before[name]
-                before[name].change(part, epoch.void)
+                before[name].change(part, epoch.invalidated)
                 self._note_verdict(before[name])
             else:
                 self._hosts[name] = self._host(part)
