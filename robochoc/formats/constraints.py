@@ -27,7 +27,7 @@ class Context:
     """What a file's constraints can refer to.
 
     `definitions` holds None, and `own` the name nevertheless, for what is defined but has a mistake of its own:
-    whoever refers to it is not to blame.
+    references to it are no mistakes.
     """
 
     kind: ProblemKind

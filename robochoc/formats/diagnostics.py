@@ -12,7 +12,7 @@ from robochoc.model.priorities import natural_key
 from robochoc.system.plain_text import on_one_line as on_one_line  # noqa: PLC0414 - from here, too
 
 MAX_PER_FILE = 100
-"""So many mistakes of one file are told; who makes more needs no longer list."""
+"""How many mistakes of one file are reported at most."""
 
 
 @dataclass(frozen=True, slots=True)

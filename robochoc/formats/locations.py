@@ -42,7 +42,7 @@ class Locations(Protocol):
         """Return where a neighbour is listed."""
 
     def absent(self, name: str) -> tuple[str, str]:
-        """Return what is said of a neighbour that is not there, and what to do about it."""
+        """Return the message and the hint for a neighbour that is not there."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class FileLocations:
 
 @dataclass(frozen=True)
 class ObjectLocations:
-    """A robot that was built in Python, and is called `name`: stale lines of files are not believed."""
+    """A robot that was built in Python. Lines of a file that it may once have been read from are ignored."""
 
     name: str
 

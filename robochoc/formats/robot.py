@@ -54,9 +54,12 @@ class RobotFile(TeamMember):
 
 
 def read_robot(path: Path | str) -> Robot:
-    """Return the robot in the XML file `path`, named after the file's stem.
+    """Return the robot in the XML file `path`. It is named after the file's stem.
 
-    Its neighbours are not looked at: `read_team` does that. Raises `InvalidInputError` with all mistakes of the file.
+    Its neighbours' files are not checked: `read_team` does that.
+
+    Raises:
+        InvalidInputError: with all mistakes of the file.
     """
     return read_robot_file(Path(path)).robot
 
@@ -71,9 +74,12 @@ def read_robot_file(path: Path) -> RobotFile:
 
 
 def robot_in(content: bytes, name: str) -> Robot:
-    """Return the robot called `name`, whose XML file has this `content`. Nobody need have written such a file.
+    """Return the robot called `name`, whose XML file has this `content`. There need not be such a file.
 
-    The same limits hold as for a file. Raises `InvalidInputError`, which tells of the file `NAME.xml`.
+    The same limits hold as for a file.
+
+    Raises:
+        InvalidInputError: with all mistakes. Messages name the file `NAME.xml`.
     """
     path = Path(f"{name}.xml")
     _check_name(name, path)
@@ -234,12 +240,12 @@ class _Reader:
             if kept:
                 copies[name] = kept
             scopes = itertools.chain.from_iterable(constraint.variables for constraint in held)
-            told = tuple(dict.fromkeys(variable for variable in scopes if variable in self._own))
+            shown = tuple(dict.fromkeys(variable for variable in scopes if variable in self._own))
             if agent.get("variable") is not None:
-                told = tuple((agent.get("variable") or "").split())
+                shown = tuple((agent.get("variable") or "").split())
                 with self._report.at(line(agent)):
-                    check_shown_variables(told, self._own)
-            yield Child(name, told, parts, line(agent), kept)
+                    check_shown_variables(shown, self._own)
+            yield Child(name, shown, parts, line(agent), kept)
 
     def _check_neighbours(self, parents: tuple[Parent, ...], children: tuple[Child, ...]) -> None:
         for neighbour, message in repeated_neighbours(self._name, parents, children):

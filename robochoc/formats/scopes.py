@@ -43,7 +43,7 @@ def _place(members: TeamMembers, robot: Robot, parent: Parent, constraint: Const
     """Return why the constraint should not stand under `parent`, if so."""
     found = [members.owners.get(name, []) for name in constraint.variables]
     if any(len(owners) != 1 for owners in found):
-        return None  # the mistake is another one, and told elsewhere
+        return None  # another mistake, which is reported elsewhere
     others = {owners[0] for owners in found} - {robot.name}
     if parent.name not in others:
         message = f"the scope has no variable of the parent '{parent.name}', under which it stands"
@@ -79,7 +79,7 @@ def _foreign_to_both(members: TeamMembers, robot: Robot, child: str, part: Const
 
 
 def _unshown(members: TeamMembers, child: str, part: Constraint) -> tuple[str, str] | None:
-    """Return a variable of `child` in its parent's part that the child, by its own file, shows to nobody."""
+    """Return the mistake that the parent's part has a variable which `child` shows to no robot."""
     if members.broken:
         return None
     robot = members.files[child].robot

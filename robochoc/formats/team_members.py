@@ -33,7 +33,7 @@ class TeamMember:
     copies: Mapping[str, tuple[Constraint, ...]] = field(default_factory=dict)
     """By child: the TKC constraints that the original platform's files repeat with the parent."""
     unsaid: frozenset[str] = frozenset()
-    """The children for which `variable` is left out: what they must be told follows from the scopes."""
+    """The children for which `variable` is left out: the variables they must know follow from the scopes."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ class TeamMembers:
     """The robots of a team, as far as each is right by itself.
 
     `broken` names the robots that have mistakes of their own. They are there, but nothing is known of them: a check
-    that would need them says nothing, so that one mistake is told once. `order` is the robots' order, where something
-    else than the links says it: a team that was built in Python has one.
+    that would need them says nothing, so that one mistake is reported once. `order` is the robots' order, where
+    something else than the links says it: a team that was built in Python has one.
     """
 
     files: Mapping[str, TeamMember]
@@ -66,7 +66,7 @@ class TeamMembers:
 
     @cached_property
     def entries(self) -> dict[tuple[str, str], NeighbourEntry]:
-        """Return who lists whom, by the names of the two."""
+        """The entries of neighbours, by the names of the two robots."""
         return {
             (name, neighbour.name): NeighbourEntry(
                 member.robot, neighbour.name, role, member.places.neighbour(neighbour)

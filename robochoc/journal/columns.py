@@ -173,7 +173,7 @@ def _scaled(times: Iterable[float], *, exact: bool) -> tuple[Literal[0, 1, 1_000
         return 1, _steps(map(int, times))
     if not exact and all(map(isfinite, times)) and _fit_in_steps(times, NANOSECONDS):
         return 1_000_000_000, _steps([round(t * NANOSECONDS) for t in times])
-    doubles = array("d", [t if isfinite(t) else 0.0 for t in times])  # what a stranger's clock says may be no number
+    doubles = array("d", [t if isfinite(t) else 0.0 for t in times])  # a clock of unknown origin may give no number
     if sys.byteorder == "big":
         doubles.byteswap()
     return 0, doubles.tobytes()
@@ -196,7 +196,8 @@ _decode = msgspec.msgpack.Decoder(_Block).decode
 def entries_of(content: bytes) -> list[JournalEntry]:
     """Return the entries of a block that holds `content`.
 
-    Raises `BlockError` where that is anything but what is written.
+    Raises:
+        BlockError: if `content` is not what `columns_of` writes.
     """
     try:
         block = _decode(content)

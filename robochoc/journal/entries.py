@@ -10,7 +10,7 @@ from robochoc.model.outcome import Outcome
 VERSION = 2
 """Of what entries mean. Raised when one is added, or gets another meaning; readers refuse what they do not know."""
 STAMPED_LATE = 1
-"""In this version the `clock` of what was said was that of the end of the step; and it came after what was decided."""
+"""In this version the `clock` of a sent message was that of the end of the step; and it came after the decision."""
 READ = (STAMPED_LATE, VERSION)
 """Versions that are read."""
 

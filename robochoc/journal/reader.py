@@ -55,7 +55,10 @@ def read_journal(content: bytes) -> Journal:
 
     Within a run, from one `Began` to the next, events are put in the order of their times; those of equal times stay
     in the order in which they came, which is each robot's own (`Improved` were written last, and so come after all of
-    their time). Raises `JournalError` where not even the header can be read.
+    their time).
+
+    Raises:
+        JournalError: where not even the header can be read.
     """
     with _without_cycles():
         follower = Follower(io.BytesIO(content))
@@ -119,8 +122,10 @@ class Follower:
     def read(self, most: int | None = None) -> list[JournalEntry]:
         """Return the entries that are complete since the last call, in the file's order. The first is the `Header`.
 
-        Stops after the block with which there are more than `most`. Raises `JournalError` when it turns out that the
-        file is no journal.
+        Stops after the block with which there are more than `most`.
+
+        Raises:
+            JournalError: when it turns out that the file is no journal.
         """
         lines: list[JournalEntry] = []
         while self.damage is None and (most is None or len(lines) <= most):

@@ -196,7 +196,7 @@ def check(team: Team, assignment: Mapping[str, int], withdrawn: Sequence[str] = 
     faults = [*violations(team, assignment, withdrawn)]
     if maximal:
         faults += [
-            f"{name} has stepped aside and could be added" for name in needlessly_withdrawn(team, assignment, withdrawn)
+            f"{name} has withdrawn and could be added" for name in needlessly_withdrawn(team, assignment, withdrawn)
         ]
     if faults:
         raise RefutedError(f"the checker refutes the answer for {team.name}: {faults[0]} ({len(faults)} objections)")

@@ -109,9 +109,9 @@ class ThisMachine(Deployment):
 
         cost = phase.parameters.withdrawal_cost
         if answer.verdict is Verdict.NO_SOLUTION:
-            return self._confirmed(aside=cost)
+            return self._confirmed(withdrawal_cost=cost)
         total = total_cost(self._scenario.team, answer.assignment, cost)
-        return self._confirmed(total=total, aside=cost)
+        return self._confirmed(total=total, withdrawal_cost=cost)
 
     def limit_reached(self, why: str) -> Answer:
         """Return the answer of a run that a limit has ended before the robots could search."""
@@ -174,12 +174,14 @@ class ThisMachine(Deployment):
         )
         return open_session(request)
 
-    def _confirmed(self, alone: str | None = None, *, total: float = INFINITE, aside: float | None = None) -> bool:
+    def _confirmed(
+        self, alone: str | None = None, *, total: float = INFINITE, withdrawal_cost: float | None = None
+    ) -> bool:
         """Return whether the central solver agrees, if it is asked. For the arguments see `confirmed`."""
         if not self.options.verify:
             return False
         from robochoc.verification.second_opinion import confirmed  # noqa: PLC0415 - start-up: seldom asked for
 
-        cost = None if aside is None else int(aside)
+        cost = None if withdrawal_cost is None else int(withdrawal_cost)
         solver = self._context.central_solver()
-        return confirmed(solver, self._scenario.team, self.options.protocol, alone, total=total, aside=cost)
+        return confirmed(solver, self._scenario.team, self.options.protocol, alone, total=total, withdrawal_cost=cost)

@@ -109,9 +109,13 @@ class Compiler:
     def compile(self, robot: Robot) -> Compilation:
         """Return the compiled domain of `robot`.
 
-        Raises `TooManySolutionsError`, `CompileTimeoutError`, `CompileError`, `SolverMissingError`, and
-        `UnsupportedError` when a constraint is too large; and `SolverTimeoutError` when the time for all together is
-        over.
+        Raises:
+            TooManySolutionsError: if it has more local solutions than the limit.
+            CompileTimeoutError: if its local problem takes too long.
+            CompileError: if the solver's process died.
+            SolverMissingError: if ACE is needed, and there is no Java.
+            UnsupportedError: if a constraint is too large.
+            SolverTimeoutError: if the time for all robots is over.
         """
         began = time.monotonic()
         sources = [CompiledFrom.DIRECT]

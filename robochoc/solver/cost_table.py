@@ -37,7 +37,8 @@ def cost_table(
 ) -> tuple[int, CostTable]:
     """Return how many checks it takes, and the table of `constraint` over `domains` and the `size` own values.
 
-    Raises `UnsupportedError` when that is too large.
+    Raises:
+        UnsupportedError: when that is too large.
     """
     columns = [domains[agent] for agent in constraint.agents]
     entries = math.prod(map(len, columns)) * size

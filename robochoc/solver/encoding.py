@@ -78,8 +78,10 @@ def components(
     """Return the connected components of `variables` under the hard part of `constraints`.
 
     Components are in the order of their first variables, variables within in their given order. Constraints are on
-    `variables` only; so are the scopes in `together`, each of which is to be in one component. Raises
-    `UnsupportedError` when a constraint has too many tuples to be made a table.
+    `variables` only; so are the scopes in `together`, each of which is to be in one component.
+
+    Raises:
+        UnsupportedError: when a constraint has too many tuples to be made a table.
     """
     domains = {variable.name: sorted(variable.domain) for variable in variables}
     unary: list[Constraint] = []

@@ -88,7 +88,7 @@ class _Filter:
         return all(domains)
 
     def _keep(self, place: int, values: set[int]) -> None:
-        """Restrict the domain at `place` to `values`, and have whoever looks at it look again."""
+        """Restrict the domain at `place` to `values`, and check its tables again."""
         if not self.domains[place] <= values:
             self.domains[place] &= values
             self._waiting.update(dict.fromkeys(self._looking[place]))

@@ -2,7 +2,7 @@
 
 For the variables that share charges there is one more variable, whose codes are what they are charged, and a table
 that says which of them goes with which codes of theirs. What is left for the solver to compute is a sum of these
-variables, none of which is negative; what is minimised is checked again by whoever knows the problem.
+variables, none of which is negative; the minimum is checked again with the original problem.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class WeightedComponent:
         return self.base + self.unit * sum(codes[place] for place in self.costs)
 
     def decoded(self, codes: Sequence[int]) -> dict[str, int]:
-        """Return the values of the variables behind a solution of `network`; those that are aside have none."""
+        """Return the values of the variables behind a solution of `network`; withdrawn ones have none."""
         values = self.part.values
         own = zip(self.part.names, codes, strict=False)
         return {name: values[code] for name, code in own if code < len(values)}
@@ -61,8 +61,10 @@ class WeightedComponent:
 def weighted_components(variables: Iterable[Variable], constraints: Sequence[Constraint]) -> list[WeightedComponent]:
     """Return the problem of `variables` and `constraints`, split into what does not depend on each other.
 
-    What constraints on constants charge is left out. Raises `UnsupportedError` when a constraint has too many tuples,
-    or charges are too high.
+    What constraints on constants charge is left out.
+
+    Raises:
+        UnsupportedError: when a constraint has too many tuples, or charges are too high.
     """
     soft = [constraint for constraint in constraints if is_soft(constraint) and constraint.variables]
     parts = components(variables, constraints, [constraint.variables for constraint in soft])
@@ -104,7 +106,10 @@ def _by_scope(part: Component, soft: Iterable[Constraint]) -> dict[Codes, list[C
 def with_cost_variables(part: Component, network: Network, charges: Mapping[Codes, CostRows]) -> WeightedComponent:
     """Return `network`, which is that of `part`, with a variable for every scope that is charged.
 
-    Combinations of codes that a scope has no price for are forbidden. Raises `UnsupportedError` when they are too high.
+    Combinations of codes that a scope has no price for are forbidden.
+
+    Raises:
+        UnsupportedError: when they are too high.
     """
     least = {scope: int(min(prices.values(), default=0)) for scope, prices in charges.items()}
     above = {scope: {row: int(price) - least[scope] for row, price in charges[scope].items()} for scope in charges}

@@ -1,4 +1,4 @@
-"""A question to the Directory Facilitator of a running master: who is there, and offers what."""
+"""Queries to the Directory Facilitator of a running master: which agents there are, and what they offer."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ SLOTS = ("name", "protocol", "variable", "topic", "ontology", "language")
 
 
 class NoAnswerError(Exception):
-    """The directory refuses, or says nothing."""
+    """The directory refuses a query, or does not answer."""
 
 
 class TemplateError(ValueError):
-    """That is nothing to search for."""
+    """A template that nothing can be searched by."""
 
 
 def search_template(slots: Sequence[str]) -> AgentDescription:
-    """The template that `slot=value` words describe: all of them have to match. Raises `TemplateError`.
+    """Return the template that `slot=value` words describe: all of them have to match. Raises `TemplateError`.
 
-    Names may go without their platform, which may call itself otherwise than whoever asks does.
+    Names need not have their platform: it may call itself otherwise than here.
     """
     given: dict[str, list[str]] = {slot: [] for slot in SLOTS}
     for word in slots:
@@ -57,42 +57,44 @@ def search_template(slots: Sequence[str]) -> AgentDescription:
 
 
 def platform_at(place: Address) -> str:
-    """The name of the platform whose master is at `place`, as agents' names end."""
+    """Return the name of the platform whose master is at `place`: agents' names end with it."""
     return f"{place}/robochoc"
 
 
 def search_request(place: Address, slots: Sequence[str], at_most: int | None = None) -> str:
-    """The search as the directory is asked: an action in SL0. Raises `TemplateError`."""
+    """Return a search as the directory reads it: an action in SL0. Raises `TemplateError`."""
     platform = platform_at(place)
     return request(df_on(platform), Function.SEARCH, search_template(slots), at_most)
 
 
 def query_directory(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> str:
-    """What the directory answers to `words`, in SL0. Raises `CannotConnectError` and `NoAnswerError`."""
+    """Return what the directory answers to `words`, in SL0. Raises `CannotConnectError` and `NoAnswerError`."""
     with Transport(str(place), identity, watch=(), patience_s=patience_s) as transport:
-        return _Asking(place, identity, transport).asked(words, Performative.INFORM)
+        return _Query(place, identity, transport).ask(words, Performative.INFORM)
 
 
 def watch_directory(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> Iterator[str]:
-    """What the directory tells whoever subscribes to what `words` search for, now and whenever it changes, in SL0.
+    """Subscribe to what `words` search for; yield the directory's notices in SL0, now and whenever something changes.
 
-    It ends with `NoAnswerError` when the master is gone for `patience_s`. Raises `CannotConnectError` as well.
+    Raises:
+        CannotConnectError: when no master answers.
+        NoAnswerError: when the directory refuses, or the master is gone for `patience_s` seconds.
     """
     with Transport(str(place), identity, watch=(), patience_s=patience_s) as transport:
-        asking = _Asking(place, identity, transport)
-        asking.asked(words, Performative.AGREE, subscribe=True)
-        heard = time.monotonic()
-        while time.monotonic() - heard < patience_s:
-            told = asking.told()
-            if told:
-                yield told.content
-            if told or transport.router:
-                heard = time.monotonic()
+        query = _Query(place, identity, transport)
+        query.ask(words, Performative.AGREE, subscribe=True)
+        last_seen = time.monotonic()
+        while time.monotonic() - last_seen < patience_s:
+            notice = query.next_notice()
+            if notice:
+                yield notice.content
+            if notice or transport.router:
+                last_seen = time.monotonic()
     raise NoAnswerError(f"the master at {place} is gone")
 
 
-class _Asking:
-    """One who asks; answers to others' questions, and to earlier ones, are none."""
+class _Query:
+    """One query, or subscription. Answers to others, and to earlier queries, are passed over."""
 
     def __init__(self, place: Address, identity: Identity, transport: Transport) -> None:
         self._place = place
@@ -102,8 +104,8 @@ class _Asking:
         self._number = secrets.randbits(_NUMBER_BITS)
         self._early: list[DirectoryAnswer] = []
 
-    def asked(self, words: str, wanted: Performative, *, subscribe: bool = False) -> str:
-        """Ask until there is an answer; its content. Raises `NoAnswerError`."""
+    def ask(self, words: str, wanted: Performative, *, subscribe: bool = False) -> str:
+        """Ask until there is an answer, and return its content. Raises `NoAnswerError`."""
         until, asked = time.monotonic() + ANSWER_S, 0.0
         while time.monotonic() < until:
             if time.monotonic() - asked > ASK_AGAIN_S:
@@ -111,52 +113,52 @@ class _Asking:
                 self._transport.send(
                     MASTER, self._framing.write(MASTER, DirectoryRequest(self._number, words, subscribe))
                 )
-            told = self._next()
-            if told is None:
+            answer = self._next()
+            if answer is None:
                 continue
-            if told.performative == wanted:
-                return told.content
-            if told.performative != Performative.INFORM:
+            if answer.performative == wanted:
+                return answer.content
+            if answer.performative != Performative.INFORM:
                 raise NoAnswerError(
-                    on_one_line(f"the directory answers {told.performative}: {told.content}", LONGEST_REASON)
+                    on_one_line(f"the directory answers {answer.performative}: {answer.content}", LONGEST_REASON)
                 )
-            self._early.append(told)
+            self._early.append(answer)
         raise NoAnswerError(
             f"the master at {self._place} does not answer {self._name}; is it enrolled with its Authority?"
         )
 
-    def told(self) -> DirectoryAnswer | None:
-        """The next INFORM; None: for a moment there was none."""
+    def next_notice(self) -> DirectoryAnswer | None:
+        """Return the next INFORM; None if there was none for a moment."""
         if self._early:
             return self._early.pop(0)
-        told = self._next()
-        return told if told and told.performative == Performative.INFORM else None
+        answer = self._next()
+        return answer if answer and answer.performative == Performative.INFORM else None
 
     def _next(self) -> DirectoryAnswer | None:
         try:
             item = self._transport.inbox.get(timeout=0.1)
         except Empty:
             return None
-        told = _told(self._framing, item) if isinstance(item, FrameArrived) and item.sender == MASTER else None
-        return told if told and told.number == self._number else None
+        answer = _answer_in(self._framing, item) if isinstance(item, FrameArrived) and item.sender == MASTER else None
+        return answer if answer and answer.number == self._number else None
 
 
 def agents_in(answer: str) -> tuple[AgentDescription, ...]:
-    """The agents in an answer."""
+    """Return the agents in an answer."""
     return descriptions_in(answer)
 
 
 def subject_of(answer: str) -> str:
-    """The name of the agent that an answer to a subscriber is about; empty where a search was for no name."""
+    """Return the name of the agent that a notice is about; empty if the search named none."""
     return searched_in(answer).name
 
 
-def _told(framing: Framing, item: FrameArrived) -> DirectoryAnswer | None:
+def _answer_in(framing: Framing, item: FrameArrived) -> DirectoryAnswer | None:
     try:
-        word = framing.read(item.sender, item.content).message
+        message = framing.read(item.sender, item.content).message
     except FrameRefusedError:
         return None
-    return word if isinstance(word, DirectoryAnswer) else None
+    return message if isinstance(message, DirectoryAnswer) else None
 
 
 __all__ = [

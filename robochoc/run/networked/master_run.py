@@ -1,4 +1,4 @@
-"""A whole run from the master's side: open, gather, search, let robots step aside, check, tell the outcome.
+"""A whole run from the master's side: listen, wait for the team, search, check, report the outcome.
 
 Section 5.2: "The master waits for the confirmation of creation all agents before ordering the start of the search."
 """
@@ -42,10 +42,22 @@ LOOPBACK_ADDRESS = Address(LOOPBACK)
 class MasterPlan:
     """What a master is to do.
 
-    `place` is where it listens, `hosts` how robots may call that place besides. `names` says who is in the team, or
-    `number` how many are; without either the team is complete when every neighbour that somebody names is there.
-    `protocol` is by default the one that suits the team. `timeout` counts from when the team is complete, `gather_s`
-    is how long that may take (seconds; None: no limit). `authority` is the folder of the Authority.
+    Attributes:
+        authority: The folder of the Authority.
+        place: The address at which it listens.
+        hosts: Other names and addresses by which robots may call its machine.
+        name: The team's name.
+        names: The robots of the team. Without these, and without a `number`, the team is complete when every neighbour
+            that a robot names has come.
+        number: How many robots the team has.
+        protocol: The protocol's name (None: the default for the team's problem).
+        settings: The protocol's settings, as text.
+        seed: The seed of protocols that draw lots.
+        withdraw: Which robots withdraw when the team has no solution (None: none).
+        gather_s: How many seconds to wait for the team (None: no limit).
+        timeout: A limit in seconds, from when the team is complete (None: no limit).
+        messages: A limit on the number of messages (None: no limit).
+        conditions: The settings of the network.
     """
 
     authority: Path
@@ -84,7 +96,7 @@ class TeamIncompleteError(Exception):
 
 
 class MasterResult(NamedTuple):
-    """The outcome, and what the master knows of the team: silhouettes, without any constraint."""
+    """The outcome, and the team as far as the master knows it: without any constraint."""
 
     outcome: Outcome
     team: Team
@@ -100,12 +112,26 @@ def run_master(
     publication: Publication | None = None,
     concluded: Callable[[Outcome | None], None] = lambda _outcome: None,
 ) -> MasterResult:
-    """Be the master of one run. `listening` is called once robots can come.
+    """Be the master of one run.
 
-    Who has the right to sniff may have what is written to `publication`, while the run lasts and until a moment after
-    `concluded` was called with its outcome (None: it broke off), which writes the last of it.
-    Raises `AuthorityError`, `HostNameError`, `RouterError`, `TeamIncompleteError`, `RobotsLostError`,
-    `UnsupportedError`, `UnknownProtocolError`, `RefutedError`.
+    Args:
+        plan: What to do.
+        observer: Gets all events of the master.
+        watched: Whether the observer gets the robots' events too.
+        progress: Gets the number of messages so far, now and then.
+        listening: Is called once robots can come.
+        publication: What is written to it is given to those who may sniff, until a moment after `concluded`.
+        concluded: Is called with the outcome (None: the run was broken off); it writes the last of the publication.
+
+    Raises:
+        AuthorityError: when the folder has no Authority.
+        HostNameError: when a host has no valid name.
+        RouterError: when the master cannot listen.
+        TeamIncompleteError: when the team is not complete in time.
+        RobotsLostError: when robots were lost, and the run is not to go on without them.
+        UnsupportedError: when the options do not go together, or with the team.
+        UnknownProtocolError: when the protocol is not installed.
+        RefutedError: when the answer does not hold.
     """
     _refuse_early(plan)
     authority = Authority.open(plan.authority)
@@ -131,7 +157,7 @@ def run_master(
 
 @contextmanager
 def _enrolling(authority: Authority, identity: Identity, place: Address) -> Iterator[None]:
-    """Redeem tokens. Raises `RouterError`."""
+    """Serve robots that redeem tokens. Raises `RouterError`."""
     with ExitStack() as stack:
         try:
             stack.enter_context(EnrolmentServer(authority, identity, place.host, place.enrolment_port))
@@ -187,7 +213,7 @@ def _refuse_early(plan: MasterPlan) -> None:
 
 
 def _in_words(outcome: Outcome) -> str:
-    """The outcome, as robots are told it."""
+    """Return the outcome in a few words, as robots get it."""
     aside = f", {len(outcome.withdrawn_alive)} step aside" if outcome.withdrawn_alive else ""
     claim = f", claimed by {outcome.claimed_by}" if outcome.claimed_by else ""
     return f"{outcome.verdict}{aside}{claim}"
