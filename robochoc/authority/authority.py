@@ -8,7 +8,7 @@ certificate would have expired. The holder of the folder's `ca.key` is the Autho
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
@@ -18,7 +18,6 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509 import Certificate
 
 from robochoc.authority.certificates import (
-    LONGEST_NAME,
     MASTER,
     CertificateError,
     ca_certificate,
@@ -35,6 +34,7 @@ from robochoc.authority.certificates import (
 )
 from robochoc.authority.events import AuthorityEvent, AuthorityObserver, Granted, Refused, unobserved
 from robochoc.authority.identity import Identity, private_folder, save
+from robochoc.authority.names import InvalidNameError, UnknownNameError, check_name, describe_enrolled
 from robochoc.authority.registry import (
     PRIVATE,
     AuthorityError,
@@ -47,8 +47,7 @@ from robochoc.authority.registry import (
     locked,
 )
 from robochoc.authority.token import Token, digest
-from robochoc.formats.diagnostics import on_one_line, shortened, suggestion
-from robochoc.formats.names import is_name
+from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.system.files import write_atomically
 
 TOKEN_LIFETIME = timedelta(hours=24)
@@ -57,15 +56,6 @@ IN_FORCE_AT_MOST = 16
 """So many certificates of one name may be in force: who asks for more is out of order, or hostile."""
 _KEY, _CERTIFICATE, _MASTER = "ca.key", "ca.pem", "master"
 _OTHERS = 0o077
-_MOST_NAMED = 10
-
-
-class InvalidNameError(ValueError):
-    """A name that no robot can have, or that is reserved."""
-
-
-class UnknownNameError(LookupError):
-    """A name that is not enrolled."""
 
 
 class NotGrantedError(Exception):
@@ -292,7 +282,7 @@ class Authority:
             member = members.get(name)
             if member is None:
                 what = f"no '{on_one_line(shortened(name))}' is enrolled"
-                raise UnknownNameError(f"{what} ({_enrolled(name, members)})")
+                raise UnknownNameError(f"{what} ({describe_enrolled(name, members)})")
             withdrawn = (*member.withdrawn, *member.certificates)
             members[name] = EnrolledName(name, member.role, None, (), withdrawn, revoked=True).since(self.clock())
 
@@ -352,32 +342,8 @@ class Authority:
             raise
 
 
-def _enrolled(name: str, members: Mapping[str, EnrolledName]) -> str:
-    """Return in words which names are enrolled, and which of them may have been meant instead of `name`."""
-    known = sorted(known for known in members if known != MASTER)
-    if not known:
-        return "nobody is; next: robochoc authority enrol NAME"
-    hint = suggestion(name, known, "names")
-    near = f"{hint} " if hint.startswith("did") else ""
-    more = len(known) - _MOST_NAMED
-    return f"{near}enrolled: {', '.join(known[:_MOST_NAMED])}" + (f" and {more} more" if more > 0 else "")
-
-
 def default_folder() -> Path:
     """Return the Authority's default folder, in the user's data folder."""
     from platformdirs import user_data_path  # noqa: PLC0415 - only who is given no folder needs it
 
     return user_data_path("robochoc") / "authority"
-
-
-def check_name(name: str, role: Role = Role.ROBOT) -> None:
-    """Raise `InvalidNameError` if `name` cannot take part as `role`."""
-    shown = on_one_line(shortened(name))
-    if not is_name(name):
-        raise InvalidNameError(f"'{shown}' is no robot's name: a letter, then letters, digits, '_' and '.'")
-    if len(name) > LONGEST_NAME:
-        raise InvalidNameError(f"'{shown}' is too long: a certificate names at most {LONGEST_NAME} characters")
-    if name.upper() == MASTER or role is Role.MASTER:
-        raise InvalidNameError(
-            f"the name {MASTER} is the master's own, which needs no token; choose another name, or role"
-        )

@@ -58,7 +58,7 @@ class NobodyThereError(EnrolmentError):
 
 
 class NotTrustedError(EnrolmentError):
-    """Whoever answers is not who the token, or the identity, is from. Nothing secret was sent."""
+    """The server is not the one that the token, or the identity, comes from. Nothing secret was sent."""
 
 
 def enrol(
@@ -96,7 +96,7 @@ def renew(identity: Identity, host: str, port: int, patience_s: float = PATIENCE
 
 
 def _introduced(place: tuple[str, int], token: Token, patience_s: float) -> x509.Certificate:
-    """Return the certificate of the Authority that `token` is from, as whoever is at `place` shows it."""
+    """Return the certificate of the Authority of `token`, as the server at `place` shows it."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.minimum_version = ssl.TLSVersion.TLSv1_3
     context.check_hostname = False
@@ -124,7 +124,7 @@ def _believing(ca: x509.Certificate) -> ssl.SSLContext:
 
 
 def _ask(place: tuple[str, int], question: Question, context: ssl.SSLContext, patience_s: float) -> Answer:
-    """Return the answer of whoever is at `place` and passes `context`."""
+    """Return the answer of the server at `place`, if it passes `context`."""
     try:
         raw = socket.create_connection(place, patience_s)
     except OSError as error:

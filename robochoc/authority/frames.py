@@ -25,7 +25,7 @@ class _Frame(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True):
 
 
 class Introduce(_Frame, frozen=True):
-    """Which Authority do you speak for?"""
+    """Asks for the certificate of the server's Authority."""
 
 
 class Redeem(_Frame, frozen=True):

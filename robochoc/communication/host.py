@@ -61,7 +61,7 @@ class Host:
         self._then: Callable[[int], float] | None = None
 
     def observe(self, observer: Observer, now: Callable[[], float], then: Callable[[int], float] | None = None) -> None:
-        """From now on tell `observer` of each event, stamped with `now()`.
+        """Report each event to `observer` from now on, stamped with `now()`.
 
         Where time is counted in checks, `then(n)` is the time when the robot had done n: for what it takes in and says.
         """

@@ -95,7 +95,7 @@ class MasterLoop(ABC):
                 self._kill(name)
 
     def _detect_end(self, now: float) -> None:
-        """Begin a wave when it could show quiescence, or when somebody waits for the count of messages."""
+        """Begin a wave when it could show quiescence, or when the count of messages is wanted."""
         wanted = self._progress is not None and now - self._shown >= TICK_S
         if self._progress and wanted:
             self._shown = now

@@ -116,7 +116,7 @@ class SearchState:
         When the last wave has shown quiescence, the verdict is a solution (unless a robot has concluded another).
 
         Args:
-            wanted: Begin a wave unless one is under way, because somebody waits for the count of messages.
+            wanted: Begin a wave unless one is under way, as the count of messages is wanted.
         """
         if self.counters.quiescent:
             self.verdict = self.verdict or Verdict.SOLUTION

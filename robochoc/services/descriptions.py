@@ -1,4 +1,4 @@
-"""What agents tell the Directory Facilitator about themselves, and when it is what somebody looks for (FIPA00023)."""
+"""Agents' descriptions in the Directory Facilitator, and when one matches a template (FIPA00023)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said to and by the Directory Facilitator, in FIPA-SL0 (FIPA00008), with FIPA00023's words.
+"""The content of messages to and from the Directory Facilitator, in FIPA-SL0 (FIPA00008), with the terms of FIPA00023.
 
 >>> from robochoc.services.descriptions import AgentDescription
 >>> print(request(df_on("host:7447/robochoc"), Function.SEARCH, AgentDescription(protocols=("abt",)), max_results=2))

@@ -70,10 +70,10 @@ def patience_option(text: str, default_s: float, name: str = "patience_s") -> Ca
 def network_failures_told(place: object) -> Iterator[None]:
     """Whatever ends a run across machines becomes one line, and an exit status."""
     try:
-        from robochoc.authority.authority import InvalidNameError
         from robochoc.authority.certificates import HostNameError
         from robochoc.authority.enrolment import EnrolmentError
         from robochoc.authority.identity import IdentityError
+        from robochoc.authority.names import InvalidNameError
         from robochoc.authority.registry import AuthorityError
         from robochoc.authority.token import TokenError
         from robochoc.communication.network.router import RouterError

@@ -17,7 +17,7 @@ from robochoc.communication.network.framing import MASTER
 from robochoc.formats.names import is_name
 
 ALL = "*"
-"""Whoever there is."""
+"""All participants."""
 
 
 def frame_key(receiver: str, sender: str) -> str:

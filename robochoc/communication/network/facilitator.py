@@ -11,7 +11,7 @@ from robochoc.communication.network.profile import Profile
 from robochoc.model.communicative_acts import Performative
 from robochoc.services.descriptions import MAX_SERVICES, AgentDescription, RequestRefusedError, ServiceDescription
 from robochoc.services.directory import Directory
-from robochoc.services.facilitator import handle, subscribe, told
+from robochoc.services.facilitator import handle, notification, subscribe
 from robochoc.services.sl import df_on
 
 ASKED_AT_MOST = 20
@@ -76,21 +76,24 @@ class DirectoryFacilitator:
         now = time.time()
         aid = self._aid(requester)
         if not ask.subscribe:
-            return _told(ask.number, handle(self._directory, aid, ask.content, now))
+            return _answer_to(ask.number, handle(self._directory, aid, ask.content, now))
         self._numbers[aid] = ask.number
-        return _told(ask.number, subscribe(self._directory, aid, ask.content, now))
+        return _answer_to(ask.number, subscribe(self._directory, aid, ask.content, now))
 
     def notices(self) -> Iterator[tuple[str, DirectoryAnswer]]:
         """Yield answers for subscribers, each with the subscriber's name."""
         for notice in self._directory.notices():
             number = self._numbers.get(notice.subscriber, 0)
-            yield notice.subscriber.partition("@")[0], _told(number, (Performative.INFORM, told(self._df, notice)))
+            yield (
+                notice.subscriber.partition("@")[0],
+                _answer_to(number, (Performative.INFORM, notification(self._df, notice))),
+            )
 
     def _aid(self, name: str) -> str:
         """Return the name of a participant's agent identifier: `Robot3.1@host:port/robochoc`."""
         return f"{name}@{self._endpoint}/robochoc"
 
 
-def _told(number: int, answer: tuple[Performative, str]) -> DirectoryAnswer:
+def _answer_to(number: int, answer: tuple[Performative, str]) -> DirectoryAnswer:
     performative, content = answer
     return DirectoryAnswer(number, str(performative), content)

@@ -30,7 +30,7 @@ from robochoc.solver.encoding import UnsupportedError
 MASTER = "MASTER"
 """The master's name, as in Figure 3. No robot can have it."""
 LARGEST_FRAME = 8 * 2**20
-"""Bytes. zenoh drops what is larger than it was told to take without a message, so it is said here, before."""
+"""Bytes. zenoh drops larger content silently, so it is refused before, with a message."""
 
 _OUTSIDE = (
     Register

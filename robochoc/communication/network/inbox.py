@@ -1,4 +1,4 @@
-"""What has come and waits to be read: bounded for each sender, so that nobody's flood fills the memory.
+"""The inbox: items that have come and wait to be read, bounded for each sender, so that no flood fills the memory.
 
 Frames beyond a sender's share (`quotas.py`) are dropped before anybody looks at them, and counted: `FramesLost` stands
 in the queue where the first of them was. That is a loss of that sender's, and of nobody else. Threads may share it.

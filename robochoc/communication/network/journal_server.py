@@ -26,7 +26,7 @@ PIECE_BYTES = 60_000
 ANSWERED_AT_MOST = 200
 """Questions of one follower in a second; those beyond are not answered, and it asks again."""
 PRESENT_S = 2.0
-"""Whoever has not asked for so long does not follow any more, as far as the end of the run waits for it."""
+"""A follower that has not asked for so many seconds is not waited for at the end of the run."""
 LARGEST = 2**53
 """Bytes: no journal is as long."""
 _LARGEST_QUESTION = 200
@@ -74,7 +74,7 @@ class Publication:
         self._lock = threading.Lock()
 
     def write(self, block: bytes) -> None:
-        """Append a block. Where that cannot be done, the run goes on, and who follows it is told (`trouble`)."""
+        """Append a block. Where that fails, the run goes on, and followers learn of it (`trouble`)."""
         done = 0
         try:
             while done < len(block) and not self.trouble:
@@ -89,7 +89,7 @@ class Publication:
         self._over = True
 
     def close(self) -> None:
-        """Answer nobody any more."""
+        """Answer no questions any more."""
         with self._lock:
             self._closed = True
 

@@ -98,15 +98,12 @@ class Master(MasterLoop):
         self._settings = settings
         self._registry_read = 0.0
         self.events = MasterEvents(observer)
-        self._connection = MasterConnection(
-            self.run, identity, admission, endpoint, members.ways, settings, self.events
-        )
-        self._send = self._connection.send
-        self._policy = self._connection.policy
-        self._journal_server = self._connection.journal_server
+        connection = MasterConnection(self.run, identity, admission, endpoint, members.ways, settings, self.events)
+        self._connection, self._send, self._policy = connection, connection.send, connection.policy
+        self._journal_server = connection.journal_server
         self._facilitator = DirectoryFacilitator(endpoint, settings.protocol)
         self._requests = Requests(self._journal_server, self._facilitator, self._send, self.events.refuse)
-        self._registrar = Registrar(members, self._connection, self._facilitator, self.events, settings, watched)
+        self._registrar = Registrar(members, connection, self._facilitator, self.events, settings, watched)
         self._dead: dict[str, str] = {}
         self._frame_loss = LossTracker(members, self.events.refuse, self._lose)
 

@@ -112,9 +112,10 @@ class Members:
         return {name: member.profile for name, member in self.robots.items()}
 
     def register(self, sender: str, profile: Profile, incarnation: str, *, admitted: bool = True) -> Member:
-        """Take `sender` in, if it is `admitted`, or find it there already in the same life.
+        """Register `sender`, or return its registration if it is there in the same incarnation.
 
-        Raises `RegistrationRefusedError`.
+        Raises:
+            RegistrationRefusedError: when it is not `admitted`, or its profile does not fit.
         """
         known = self.robots.get(sender)
         if known and known.incarnation == incarnation:
@@ -124,28 +125,34 @@ class Members:
             raise RegistrationRefusedError(
                 "it is enrolled to observe, not to take part; say: robochoc authority enrol NAME"
             )
-        if profile.name != sender:
-            raise RegistrationRefusedError(f"its file is {profile.name[:80]!r}'s, and its certificate {sender}'s")
-        if incarnation in self._over:
-            raise RegistrationRefusedError("it was away for too long; start it anew")
-        if known and (self.closed or not (known.doubtful or known.gone)):
-            raise RegistrationRefusedError(f"a robot called {sender} is registered already")
-        if self.closed or (self.expected is not None and sender not in self.expected):
-            raise RegistrationRefusedError(
-                "the team is complete without it" if self.closed else "it is not one of the team"
-            )
-        try:
-            visible_robot(profile, {})
-        except ProfileError as bad:
-            raise RegistrationRefusedError(str(bad)) from None
-        others = {name: other for name, other in self.profiles.items() if name != sender}
-        wrong = next(contradictions({**others, sender: profile}), None)
-        if wrong:
-            raise RegistrationRefusedError(wrong)
+        if fault := self._fault_of_incarnation(sender, incarnation) or self._fault_of_profile(sender, profile):
+            raise RegistrationRefusedError(fault)
         if known:
             self._over.add(known.incarnation)
         self.robots[sender] = Member(profile, incarnation)
         return self.robots[sender]
+
+    def _fault_of_incarnation(self, sender: str, incarnation: str) -> str:
+        """Return why this incarnation of `sender` cannot be registered now; empty if it can."""
+        known = self.robots.get(sender)
+        if incarnation in self._over:
+            return "it was away for too long; start it anew"
+        if known and (self.closed or not (known.doubtful or known.gone)):
+            return f"a robot called {sender} is registered already"
+        if self.closed:
+            return "the team is complete without it"
+        return "" if self.expected is None or sender in self.expected else "it is not one of the team"
+
+    def _fault_of_profile(self, sender: str, profile: Profile) -> str:
+        """Return why `profile` is none of `sender`, or contradicts those of others; empty if it fits."""
+        if profile.name != sender:
+            return f"its file is {profile.name[:80]!r}'s, and its certificate {sender}'s"
+        try:
+            visible_robot(profile, {})
+        except ProfileError as bad:
+            return str(bad)
+        others = {name: other for name, other in self.profiles.items() if name != sender}
+        return next(contradictions({**others, sender: profile}), "")
 
     @property
     def awaited(self) -> set[str]:
@@ -154,14 +161,14 @@ class Members:
 
     @property
     def complete(self) -> bool:
-        """Whether all are there now: as many as were asked for, or all that somebody names."""
+        """Whether all are there now: as many as were asked for, and all that are named as neighbours."""
         enough = bool(self.robots) and (self.number is None or len(self.robots) >= self.number)
         return enough and not self.awaited and all(m.joined and not m.doubtful for m in self.robots.values())
 
     def unseen(self) -> dict[str, tuple[str, ...]]:
         """Variables that neighbours' constraints look at, by those who have not shown them and may own them.
 
-        A parent need not say which variables a child has to be told: the child's constraints do.
+        A parent need not say which of its variables a child has to know: the child's constraints do.
         """
         owners = self._owners()
         wanted: dict[str, dict[str, None]] = {}
@@ -200,7 +207,7 @@ class Members:
         return ""
 
     def strangers(self) -> Iterator[str]:
-        """Constraints over variables that no neighbour has, in words; once nothing is `unseen` any more."""
+        """Yield constraints over variables that no neighbour has, in words; once nothing is `unseen` any more."""
         owners = self._owners()
         for name, member in self.robots.items():
             looked_at = [one for names in member.profile.looks_at.values() for one in names]

@@ -1,4 +1,4 @@
-"""What a robot may say of itself and of what it has seen: where one lies, who it is, or between which two. Pure.
+"""Plausibility of what robots report: which one lies, or which of two. Pure.
 
 The master has seen no file. It knows what robots have declared (profiles), what each protocol's robots may conclude
 (traits), and that whatever one robot says it has sent another, that one has had, or will not have had. So a lie is held
@@ -75,7 +75,7 @@ class FinishedSearch(NamedTuple):
     by_quiescence: bool
 
 
-# One robot's words
+# Reports of one robot
 
 
 def fault_of_counters(counts: Counts, before: Counts | None) -> str:
@@ -198,7 +198,7 @@ def fault_of_check(name: str, check: CheckResult, declared: Declarations, order:
     return ""
 
 
-# Words of two robots
+# Reports of two robots
 
 
 def doubts_about_messages(accounts: Mapping[str, DetailedReport], *, quiet: bool) -> Iterator[Doubt]:

@@ -11,7 +11,7 @@ MIB = 2**20
 BURST_S = 60.0
 """What was not used in so many seconds may be used at once: after an outage all comes together."""
 EVENTS_A_SECOND = 10_000
-"""That a robot may tell the master, in the long run."""
+"""The events that a robot may report to the master, in the long run."""
 NO_LIMIT = 1e15
 
 
@@ -56,7 +56,7 @@ class Usage:
 
     def __init__(self, share: Share, now: float) -> None:
         self.dropped = 0
-        """Frames that were too much, and that nobody was told of yet."""
+        """Frames that were too many, and that were not reported yet."""
         self._share = share
         self._framing = self._size = 0
         self._often = Allowance(share.frames_a_second, now)

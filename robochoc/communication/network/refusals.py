@@ -12,11 +12,11 @@ from collections.abc import Callable
 from robochoc.system.plain_text import on_one_line
 
 KINDS = 50
-"""So many kinds of refusals of one and the same are told apart."""
+"""So many kinds of refusals of one and the same are distinguished."""
 WHO = 1000
-"""So many who are refused are told apart."""
+"""So many who are refused are distinguished."""
 LONGEST = 200
-"""Characters. What is refused may be as long as whoever sends it likes."""
+"""Characters. What is refused may be of any length."""
 _OTHERS = "others"
 _ELSE = ("other things", "see what was refused before")
 

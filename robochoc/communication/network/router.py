@@ -50,7 +50,7 @@ _MEANINGS = {
     "received fatal alert: UnknownCA": "it does not believe the master, whom its own Authority has not certified",
     "tls handshake eof": "it has hung up in the middle of the handshake",
 }
-"""What zenoh's words for a connection that it does not take come to; the first that fits counts."""
+"""The meanings of zenoh's texts for refused connections; the first that fits counts."""
 _KEPT_SESSIONS = 10_000
 _COLOURS = re.compile(rb"\x1b\[[0-9;]*m")
 
@@ -114,7 +114,7 @@ class Router:
         return self._process is not None and self._process.poll() is not None
 
     def close(self) -> None:
-        """Let everybody go. Its process ends at once."""
+        """End all links. The router's process ends at once."""
         process, self._process = self._process, None
         if process is None:
             return
@@ -164,7 +164,7 @@ class Router:
             self._process.kill()
 
     def _read(self, output: IO[bytes], log: Log, said: bytes) -> None:
-        """Read the log to its end, and tell of refusals. In chunks: at full load there are 80,000 lines a second."""
+        """Read the log to its end, and report refusals. In chunks: at full load there are 80,000 lines a second."""
         rest = b""
         for refusal in log.refusals(said):
             if self._refused:

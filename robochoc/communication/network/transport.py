@@ -1,7 +1,7 @@
 """The transport of one participant by zenoh: it carries frames both ways, and knows who is there.
 
 Frames travel by zenoh's advanced publishers and subscribers, which number what they carry, keep it, and ask again for
-what an outage has swallowed; plain ones lose messages without a word. Nothing but this file and the router's imports
+what an outage has swallowed; plain ones lose messages silently. Nothing but this file and the router's imports
 zenoh. Its callbacks run in threads of its own, and only put what comes into `inbox`.
 """
 
@@ -51,13 +51,13 @@ TEAM = (MASTER, ALL)
 """Whom robots hear: the master by a subscriber of its own, and all others."""
 _Subscriber = tuple[zenoh.ext.AdvancedSubscriber[None], zenoh.ext.SampleMissListener[None]]
 Answering = Callable[[str, bytes], bytes | None]
-"""The answer to somebody's question; None: it gets none."""
+"""The answer to a question of a participant; None: there is none."""
 
 
 class Transport:
     """The connection of `identity` with the router at `endpoint` (`HOST:PORT`); a context manager.
 
-    It knows of the lives of those in `watch`, and gets the frames of those in `heard` (more: `hear`) into `inbox`.
+    It notices whether those in `watch` are there, and puts the frames of those in `heard` (more: `hear`) into `inbox`.
     `lease_ms` is how long a silent link counts as alive. Raises `CannotConnectError` when there is no connection within
     `patience_s`.
     """
@@ -165,9 +165,8 @@ class Transport:
     def _subscribed(self, sender: str) -> _Subscriber:
         """Return a subscriber to `sender` alone (`ALL`: to all others), which also notices lost frames.
 
-        zenoh tells of a gap just before the frame behind it, in the same thread (not `indirect`: that would be one of
-        Python's own for each). So a gap is put down to the sender of that frame, whom the router has proven, and not
-        to the source that the packet claims.
+        zenoh reports a gap just before the frame behind it, in the same thread (not `indirect`: one thread for each).
+        So the sender of that frame, which the router has proven, has lost frames, not the source that a packet claims.
         """
         gap = 0
 
@@ -179,11 +178,8 @@ class Transport:
             nonlocal gap
             lost, gap = gap, 0
             of = name_in(str(sample.key_expr))
-            if sender == ALL and of in self._subscribers:
-                return
-            if lost:
-                self.inbox.put(FramesLost(of, lost))
-            self.inbox.put(FrameArrived(of, sample.payload.to_bytes()))
+            if sender != ALL or of not in self._subscribers:
+                self._put(of, lost, sample.payload.to_bytes())
 
         subscriber = zenoh.ext.declare_advanced_subscriber(
             self._session,
@@ -195,7 +191,12 @@ class Transport:
         )
         return subscriber, subscriber.sample_miss_listener(zenoh.handlers.Callback(note_miss, indirect=False))
 
-    # What zenoh's threads call
+    # Called by zenoh's threads
+
+    def _put(self, sender: str, lost: int, content: bytes) -> None:
+        if lost:
+            self.inbox.put(FramesLost(sender, lost))
+        self.inbox.put(FrameArrived(sender, content))
 
     def _note_presence(self, sample: zenoh.Sample) -> None:
         self.inbox.put(PresenceChanged(name_in(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT))

@@ -28,9 +28,15 @@ PROGRESS_EVERY = 256
 
 
 class Simulation(Session):
-    """One team in this thread. `observer` is told of all events, with the schedule's time.
+    """One team in this thread.
 
-    `parameters` is what robots are told beside the problem.
+    Args:
+        team: The team, compiled or not.
+        protocol: The protocol that its robots run.
+        schedule: Decides which messages arrive next.
+        observer: Receives all events, with the schedule's time.
+        progress: Receives the count of messages now and then.
+        parameters: What robots are given besides the problem.
     """
 
     def __init__(

@@ -6,9 +6,9 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from robochoc.authority.authority import check_name
 from robochoc.authority.enrolment import EnrolmentError, NobodyThereError, enrol, renew
 from robochoc.authority.identity import Identity, IdentityError, default_folder
+from robochoc.authority.names import check_name
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.transport import Transport

@@ -17,9 +17,7 @@ from hypothesis import strategies as st
 from robochoc.authority.authority import (
     IN_FORCE_AT_MOST,
     Authority,
-    InvalidNameError,
     NotGrantedError,
-    UnknownNameError,
 )
 from robochoc.authority.certificates import (
     MASTER,
@@ -35,6 +33,7 @@ from robochoc.authority.certificates import (
 )
 from robochoc.authority.events import Granted, Refused
 from robochoc.authority.identity import Identity, IdentityError
+from robochoc.authority.names import InvalidNameError, UnknownNameError
 from robochoc.authority.registry import EnrolmentState, Right, Role
 from tests.support.authorities import HOUR, START, Clock, Seen, identity_of
 
