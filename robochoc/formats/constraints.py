@@ -24,7 +24,7 @@ from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Predic
 
 @dataclass(frozen=True)
 class Context:
-    """What a file's constraints can refer to.
+    """The names that a file's constraints can refer to.
 
     `definitions` holds None, and `own` the name nevertheless, for what is defined but has a mistake of its own:
     references to it are no mistakes.

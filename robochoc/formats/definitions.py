@@ -16,9 +16,9 @@ from robochoc.model.expression.parser import MAX_DEPTH, MAX_NODES
 from robochoc.model.problem import Domain, Predicate, ProblemKind, Relation, Semantics, Term, Topic
 
 MAX_VALUES = 100_000
-"""Of a domain."""
+"""The maximum size of a domain."""
 MAX_TUPLES = 1_000_000
-"""Of a relation."""
+"""The maximum number of tuples of a relation."""
 
 _PARAMETER = re.compile(r"[A-Za-z_][A-Za-z0-9_.]*")
 _OPERATORS = {"eq": "eq", "ne": "ne", "neq": "ne", "lt": "lt", "le": "le", "gt": "gt", "ge": "ge"}

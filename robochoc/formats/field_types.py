@@ -21,7 +21,7 @@ _LEAVES = (Apply, Constant, Name)
 """Expressions: they may be too deep to be walked, and have a check of their own."""
 
 AS_BUILT = "build it as its class says"
-"""What to do about a `FieldTypeError`."""
+"""The hint for a `FieldTypeError`."""
 
 _Check = Callable[[object], None]
 

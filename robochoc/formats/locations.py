@@ -1,4 +1,4 @@
-"""Where the parts of a robot stand, for messages: lines of its file, or what its objects are called."""
+"""The locations of a robot's parts, for messages: lines of its file, or names of its objects."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Location(NamedTuple):
 
 
 class Locations(Protocol):
-    """Where one robot and its parts stand."""
+    """The locations of one robot and its parts."""
 
     def robot(self) -> Location:
         """Return where the robot itself stands."""

@@ -36,7 +36,10 @@ def without_schema_errors(tree: etree._Element, schema: etree.XMLSchema) -> etre
 
 
 def _element(document: etree._ElementTree, path: str | None) -> etree._Element | None:
-    found = document.xpath(path) if path else []
+    try:
+        found = document.xpath(path) if path else []
+    except etree.XPathEvalError:  # a prefix that the file has not declared
+        return None
     return found[0] if isinstance(found, list) and len(found) == 1 and isinstance(found[0], _Element) else None
 
 

@@ -50,7 +50,7 @@ class RobotFile(TeamMember):
     """A robot, and what its file says beyond it: that is the team's to check, and then no longer needed."""
 
     context: Context
-    """What constraints that a scenario adds can refer to."""
+    """The names that constraints of a scenario can refer to."""
 
 
 def read_robot(path: Path | str) -> Robot:

@@ -26,9 +26,9 @@ from robochoc.model.problem import (
 )
 
 NEIGHBOURS_ONCE = "list every neighbour once, as parent or as child"
-"""What to do about neighbours that are `repeated_neighbours`."""
+"""The hint for `repeated_neighbours`."""
 NOBODY_LEFT = ("all robots have left after this event", "keep one, or add another")
-"""What is wrong with an event of a scenario after which there is no team, and what to do."""
+"""The message and the hint for an event of a scenario after which there is no team."""
 
 
 def check_terms(terms: Sequence[Term]) -> None:

@@ -14,7 +14,7 @@ from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, Invali
 
 _SCHEMAS = {"instance": "robot.xsd", "scenario": "scenario.xsd"}
 _OPTIONAL = {"topics", "relations", "predicates", "constraints"}
-"""Of the elements that libxml2 offers where one is missing, those that need not be there."""
+"""The optional elements among those that libxml2 names where one is missing."""
 
 _PARTS = (
     re.compile(r"Element '(?P<element>[^']*)'(?:, attribute '(?P<attribute>[^']*)')?: "),
@@ -26,7 +26,7 @@ _PARTS = (
     re.compile(r"(?s)The value '(?P<value>.*)' is greater than the maximum value allowed \((?P<rule>'[^']*')\)\.$"),
     re.compile(r"Expected is (?:one of )?\( (?P<expected>.*) \)\.$"),
 )
-"""What libxml2's messages are made of."""
+"""The parts of libxml2's messages."""
 
 _PHRASES = (
     ("[duplicate]", "a second <{element}>", "it may stand once: put the two together"),
@@ -41,7 +41,7 @@ _PHRASES = (
     ("Character content", "text inside <{element}>, where none belongs", "delete it"),
     ("", "{message}", "see the schemas in xsd/"),
 )
-"""What each kind of message says in plain words, and the next step; the first that fits."""
+"""Each kind of message in plain words, and the next step. The first that fits counts."""
 
 _PATTERNS = {
     "'[A-Za-z][A-Za-z0-9_.]*'": "a name: a letter, then letters, digits, '.' and '_'",

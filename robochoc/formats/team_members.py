@@ -1,4 +1,4 @@
-"""The robots of a team side by side, read from files or built in Python: what the checks of a whole team ask."""
+"""The robots of a team, from files or built in Python, as the checks of a whole team need them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robochoc.model.problem import Child, Constraint, Parent, Robot
 
 
 class NeighbourRole(StrEnum):
-    """What a robot says that another is to it."""
+    """The role of a neighbour: parent or child."""
 
     PARENT = "parent"
     CHILD = "child"
@@ -26,7 +26,7 @@ class NeighbourRole(StrEnum):
 
 @dataclass(frozen=True)
 class TeamMember:
-    """A robot, and where its parts stand; with what only its file says, if it has one."""
+    """A robot with the locations of its parts, and what only its file says."""
 
     robot: Robot
     places: Locations
@@ -38,7 +38,7 @@ class TeamMember:
 
 @dataclass(frozen=True)
 class NeighbourEntry:
-    """What lists a neighbour: a line of a robot's file, or an object."""
+    """The entry of a neighbour: a line of a robot's file, or an object."""
 
     robot: Robot
     other: str

@@ -37,7 +37,7 @@ from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, Re
 from robochoc.model.team_edits import ChangeError
 
 MAX_BETWEEN = 1000
-"""How many mistakes between the robots of one team are reported at most."""
+"""The maximum number of mistakes between the robots of one team that are reported."""
 
 _NOTHING = ScenarioEvent(())
 _Ended = TypeVar("_Ended")

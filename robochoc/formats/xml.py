@@ -39,7 +39,7 @@ _HINTS = {
     etree.ErrorTypes.ERR_TAG_NOT_FINISHED: "close every element by its own end tag; is the file complete?",
     etree.ErrorTypes.ERR_UNDECLARED_ENTITY: "only &lt; &gt; &amp; &quot; &apos; are known: write the character itself",
 }
-"""What to do about libxml2's more frequent messages."""
+"""The hints for libxml2's more frequent messages."""
 
 
 def read_xml(path: Path, root: str) -> etree._Element:

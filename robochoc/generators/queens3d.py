@@ -32,14 +32,14 @@ Cell = tuple[int, int]
 
 
 class QueensModel(StrEnum):
-    """Whose queen it is: Figure 2's, or Allison's."""
+    """How queens attack: as in Figure 2, or as Allison's."""
 
     PLANAR = "planar"
     FULL = "full"
 
 
 class QueensRobots(StrEnum):
-    """What a robot flies: the drone of one cell, or those of a whole row."""
+    """The drones of a robot: that of one cell, or those of a row."""
 
     CELLS = "cells"
     ROWS = "rows"

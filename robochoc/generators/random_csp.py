@@ -40,10 +40,10 @@ from robochoc.model.problem import (
 MAX_AGENTS = 1000
 MAX_VALUES = 1000
 MAX_FORBIDDEN_PAIRS = 1_000_000
-"""Of all constraints together: so no robot's file grows beyond what can be read. With costs: most pairs of values."""
+"""The maximum for all constraints together: robots' files stay readable. With costs: the maximum of pairs of values."""
 MAX_COST = 1_000_000
 MAX_GRAPH_DRAWS = 1000
-"""So many graphs are drawn in search of a connected one."""
+"""The maximum number of graphs that are drawn to find a connected one."""
 
 Edge = tuple[int, int]
 """Numbers of two robots, the smaller one first."""

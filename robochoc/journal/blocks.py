@@ -43,7 +43,7 @@ def _digest(before: bytes, packed: bytes, size: int) -> bytes:
 
 
 BEGINNING = blake2b(PREAMBLE, digest_size=_DIGEST).digest()
-"""What stands for the checksum before the first block's."""
+"""The checksum before the first block's."""
 
 
 def frame_block(content: bytes, before: bytes) -> tuple[bytes, bytes]:

@@ -1,4 +1,4 @@
-"""What a block of a journal holds: its entries in columns, as msgpack (docs/guides/journal.md).
+"""The content of a journal's block: its entries in columns, as msgpack (docs/guides/journal.md).
 
 Most entries are of four kinds. What entries of these have in common stands side by side, as that is packed best; all
 others are written as they are. A block is read without those before it.
@@ -21,7 +21,7 @@ from robochoc.journal.entries import JournalEntry
 from robochoc.journal.events import Decided, Received, Sent, Settled
 
 SENT, RECEIVED, SETTLED, DECIDED, OTHER = range(5)
-"""What `_Block.kinds` says of each entry."""
+"""The kinds of entries in `_Block.kinds`."""
 NANOSECONDS = 1_000_000_000
 _DOUBLE = 8
 _LARGEST = 2**63
@@ -30,7 +30,7 @@ _Index = Annotated[int, Meta(ge=0)]
 
 
 class BlockError(ValueError):
-    """What a block holds is no entries."""
+    """The content of a block that is no entries."""
 
 
 class _Block(msgspec.Struct, array_like=True, forbid_unknown_fields=True, frozen=True, kw_only=True):

@@ -30,7 +30,7 @@ class Began(Event, frozen=True):
 
 
 class Given(Event, frozen=True):
-    """What the robots know when a run, or an epoch, begins; follows its `Began`. Enough to play it again.
+    """The problem that robots get when a run, or an epoch, begins, after its `Began`. It is enough for a replay.
 
     `order` is the priority order, with all robots of the team; `robots` holds the XML files, by name, of those
     whose file is another than in the `Given` before (or all; empty, with the reason in `why`: it could not be

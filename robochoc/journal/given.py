@@ -1,4 +1,4 @@
-"""What robots are given when a run begins: a team as an event, for replays, and back.
+"""The problem that robots get when a run begins: a team as an event, for replays, and back.
 
 Robots travel as the XML files that they could have come from. What such a file cannot say stands beside them: the
 priority order, variables that neighbours see though nothing in the robot's own file says so, and domains that a
@@ -22,7 +22,7 @@ from robochoc.solver.explanation import Invalidated
 
 NOTHING_INVALIDATED = Invalidated(frozenset(), frozenset())
 _STAND_IN = (range(1),)
-"""What is written for an empty domain, as a file has none."""
+"""The domain that is written for an empty one, which a file cannot have."""
 
 
 class GivenProblemError(ValueError):

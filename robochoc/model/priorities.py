@@ -1,4 +1,4 @@
-"""Who ranks above whom: natural order of names, and total orders that respect the links of a team."""
+"""Priorities: natural order of names, and total orders that respect the links of a team."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the solver's process and its parent say to each other: msgpack, each word after its length."""
+"""The messages between the solver's process and its parent: msgpack, each after its length."""
 
 from __future__ import annotations
 

@@ -29,9 +29,9 @@ from robochoc.solver.weighted import WeightedComponent, components_with_withdraw
 MAX_CLIQUE_ROWS = 20_000
 """A clique with more solutions than this stays an allDifferent."""
 TABLE_PATIENCE_S = 20.0
-"""So long, all in all, may it take to make tables of cliques."""
+"""The maximum time for all tables of cliques together."""
 MAX_ORBITS = 20_000
-"""So many solutions up to symmetry are looked at one by one to be counted; of more only the number is asked."""
+"""Up to so many solutions up to symmetry are listed to count all. If there are more, ACE counts."""
 MANY_ROWS = 100_000
 """For a team whose tables have so many rows ACE is started at once, while the first task is still made ready."""
 HEDGE_S = 5.0
@@ -61,7 +61,7 @@ class CentralAnswer:
 
 @dataclass(frozen=True)
 class _Wanted:
-    """What to find: up to `limit` solutions, or their number. `in_order`: in the variables' order at first."""
+    """The task: find up to `limit` solutions, or their number. `in_order`: in the variables' order at first."""
 
     limit: int | None = None
     count_only: bool = False

@@ -17,7 +17,7 @@ from robochoc.solver.propagation import is_small_permutation
 
 
 class Demand(StrEnum):
-    """What a binary table demands of two variables: that they differ, that and more, or something else."""
+    """The kind of a binary table: two variables differ, they differ and more, or something else."""
 
     DIFFER = "differ"
     DIFFER_AND_MORE = "differ and more"

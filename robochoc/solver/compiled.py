@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from robochoc.solver.cost_table import CostTable
 
 LexicographicCost = tuple[int, float]
-"""How many constraints a value breaks, and what all others charge for it. Pairs compare as tuples do: a broken
+"""The number of constraints that a value violates, and the cost of all others. Pairs compare as tuples: a violated
 constraint weighs more than any cost, and differences are never `inf - inf`."""
 
 MIN_TABLE_VALUES = 64
@@ -40,7 +40,7 @@ MAX_BOUNDED_ROWS = 65_536
 
 
 class LocalProblem:
-    """What one robot knows: its compiled domain, its neighbours, and the constraints it has to check.
+    """The local problem of one robot: its compiled domain, its neighbours, and the constraints it has to check.
 
     `values[i]` is the i-th value as neighbours see it; `solution(i)` are the own variables' values behind it.
     `parents` and `children` are the links that the files name, `neighbours` are they and all others in a constraint

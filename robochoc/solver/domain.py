@@ -17,7 +17,7 @@ from robochoc.model.problem import Constraint, Robot
 from robochoc.solver.encoding import Codes, Component, Network, UnsupportedError, components, cost_function, is_soft
 
 MAX_SOLUTIONS = 100_000
-"""How many local solutions a robot may have, unless more are asked for."""
+"""The default maximum of local solutions of a robot."""
 
 SolveNetwork = Callable[[Network], Iterable[Sequence[int]]]
 """All solutions of a network of several variables, in codes; `solver/ace.py` has one."""

@@ -17,7 +17,7 @@ from robochoc.model.expression import UndefinedValueError, compile_expression
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Variable
 
 MAX_TUPLES = 4_000_000
-"""How many tuples of values a constraint may have to be tried on."""
+"""The maximum number of tuples of values that a constraint is tried on."""
 
 MAX_ALLOWED_ROWS = 100_000
 """A constraint on so many combinations of values is a table of allowed tuples, however few it forbids."""

@@ -18,9 +18,9 @@ from typing import NamedTuple
 from robochoc.solver.encoding import Codes, Network, Table
 
 STEPS_EACH = 100_000
-"""So many steps a task may always take: about as long as ACE takes where it runs already."""
+"""The steps that every task may take: about as long as ACE takes where it runs already."""
 STEPS_BEFORE_ACE = 1_500_000
-"""So many steps more all tasks may take together before ACE is started: about as long as it takes to start."""
+"""The further steps of all tasks together before ACE is started: about as long as its start takes."""
 
 ROWS_A_STEP = 256
 """A step looks at one value in a table of so many rows; in a longer table, or a wider domain, that takes more."""
@@ -48,7 +48,7 @@ class Budget:
 
 
 class Enumeration(NamedTuple):
-    """How many solutions there are, whether there are no others, and (unless only counted) which, in order."""
+    """The number of solutions, whether there are no others, and (unless only counted) the solutions, in order."""
 
     number: int
     complete: bool

@@ -14,7 +14,7 @@ Conflict = Mapping[str, Value]
 """Assignments of other robots that rule out an own value: the left side of a nogood."""
 
 OtherValues = tuple[int, ...]
-"""What a constraint sees of the others: their variables' values, in the order in which it looks at them."""
+"""The values of other robots' variables in a constraint, in its order."""
 
 
 class OwnValues:

@@ -1,8 +1,8 @@
-"""Problems with costs, as the solver is handed them: what is charged becomes a column of tables, never an expression.
+"""Problems with costs, as the solver gets them: costs are a column of tables, never an expression.
 
-For the variables that share charges there is one more variable, whose codes are what they are charged, and a table
-that says which of them goes with which codes of theirs. What is left for the solver to compute is a sum of these
-variables, none of which is negative; the minimum is checked again with the original problem.
+For each scope with costs there is one more variable, whose codes are the costs, and a table that relates them to the
+codes of the scope. The solver only minimises the sum of these variables, none of which is negative; the minimum is
+checked again with the original problem.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from robochoc.solver.encoding import (
 from robochoc.solver.propagation import propagate
 
 MAX_COST_ROWS = 1_000_000
-"""How many combinations of values may have a price each."""
+"""The maximum number of combinations of values in a cost table."""
 MAX_TOTAL_COST = 2**30
-"""So much may all charges come to, at worst, in units of their greatest common divisor: ACE's codes are small."""
+"""The maximum of all costs together, in units of their greatest common divisor: ACE's codes are small."""
 
 CostRows = dict[Codes, float]
-"""What combinations of codes are charged; those that are not there are forbidden."""
+"""The costs of combinations of codes. Combinations that are not in it are forbidden."""
 
 
 @dataclass(frozen=True)
 class WeightedComponent:
-    """The variables of `part`, which come first in `network`, and what they are charged.
+    """A component with costs. In `network`, the variables of `part` come first.
 
-    That is `base`, and `unit` times the sum of the codes at the places `costs`.
+    The cost of a solution is `base`, plus `unit` times the sum of the codes at the places `costs`.
     """
 
     part: Component

@@ -1,4 +1,4 @@
-"""What is wrong with JSON, TOML values or settings that msgspec refuses, in plain words, for people."""
+"""The errors of msgspec in plain words: JSON, TOML values and settings that it refuses."""
 
 from __future__ import annotations
 

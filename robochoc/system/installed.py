@@ -11,11 +11,11 @@ from typing import NamedTuple
 from robochoc.system.entry_points import EntryPoint, entry_points
 
 Fault = Callable[[object], str]
-"""Why something that was loaded cannot be used; empty when it can."""
+"""Returns why a loaded object cannot be used. Empty: it can."""
 
 
 class Loaded(NamedTuple):
-    """What stands behind an entry point, or, if it cannot be used, why."""
+    """The object of an entry point, or why it cannot be used."""
 
     what: object
     broken: str

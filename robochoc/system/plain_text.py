@@ -9,7 +9,7 @@ from __future__ import annotations
 LONGEST = 10_000
 """Characters. Our own lines are shorter."""
 LONGEST_REASON = 500
-"""Of what a participant says why it ends, or is refused."""
+"""The maximum number of characters of the reason why a participant ends, or is refused."""
 
 
 def on_one_line(text: str, longest: int = LONGEST) -> str:

@@ -12,7 +12,7 @@ from robochoc.model.expression import UndefinedValueError, evaluate
 from robochoc.model.problem import INFINITE, Assignment, Constraint, Relation, Robot, Semantics, Team, Variable
 
 MAX_TRIES = 20_000
-"""How many values are tried for the variables of a withdrawn robot."""
+"""The maximum number of values that are tried for the variables of a withdrawn robot."""
 
 
 class RefutedError(Exception):

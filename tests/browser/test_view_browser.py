@@ -320,6 +320,22 @@ def test_epochs_that_begin_together_are_told_together(small: Page) -> None:
     assert boxes[1]["x"] + boxes[1]["width"] <= boxes[2]["x"] + 0.5
 
 
+def test_labels_and_legend_can_be_read_on_a_narrow_page(small: Page) -> None:
+    high = """Playback.labels.names.filter((name) => name.visible).map((name) => {
+      const [at, size] = [new MeshCat.THREE.Vector3(), new MeshCat.THREE.Vector3()];
+      const lens = Playback.viewer.camera;
+      const depth = -name.getWorldPosition(at).applyMatrix4(lens.matrixWorldInverse).z;
+      const height = name.getWorldScale(size).y * name.children[0].scale.y;
+      return height * innerHeight / 2 / depth / Math.tan(lens.fov * Math.PI / 360);
+    })"""
+    until(lambda: small.evaluate(high), "no drone has a label")
+    assert min(small.evaluate(high)) > 15
+    assert small.locator("#legend li").count() >= 5
+    assert small.evaluate(
+        "document.getElementById('legend').scrollWidth <= document.getElementById('caption').clientWidth"
+    )
+
+
 def test_a_narrow_dark_page_has_room_for_all(small: Page) -> None:
     assert small.evaluate("document.documentElement.scrollWidth") == 360
     boxes = [small.locator(f"#{name}").bounding_box() for name in ("caption", "controls")]

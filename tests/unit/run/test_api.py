@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import doctest
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 import robochoc
+from robochoc import api
 from robochoc.api import protocol_called
 from robochoc.formats import InvalidInputError, write_team
+from robochoc.generators import queens3d, random_csp
 from robochoc.journal.events import AnyEvent, Concluded
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.run.networked.address import AddressError
@@ -224,3 +228,11 @@ def test_one_container_holds_several_robots(site: Deployment) -> None:
     assert verdict.startswith("solution afc-ng {'V1': ")
     assert sniffed == "Base Relay Scout"
     assert [line.split()[:2] for line in container.output.splitlines()] == [[name, "solution"] for name in tokens]
+
+
+@pytest.mark.parametrize("module", [robochoc, api, queens3d, random_csp])
+def test_examples_in_docstrings_run(module: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    attempted = doctest.testmod(module)
+    assert attempted.attempted > 0
+    assert attempted.failed == 0
