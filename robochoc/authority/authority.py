@@ -8,7 +8,7 @@ certificate would have expired. The holder of the folder's `ca.key` is the Autho
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
@@ -194,21 +194,13 @@ class Authority:
         """
         what = "redeem a token"
         with self._answering(what, request, origin) as (name, holder), self._registry.change() as members:
-            now, known = self.clock(), digest(secret)
-            member = next((m for m in members.values() if m.invitation and m.invitation.digest == known), None)
-            if member is None or member.invitation is None:
-                raise NotGrantedError("the token is unknown here, or a newer one has replaced it")
-            if member.invitation.used:
-                raise NotGrantedError("the token has been used already")
-            if now >= member.invitation.expires:
-                raise NotGrantedError("the token has expired")
-            if member.name != name:
-                raise NotGrantedError("the token is not for this name")
+            now = self.clock()
+            member, invitation = _invited(members, digest(secret), name, now)
             certificate, issued = self._issue(holder, name)
             members[name] = EnrolledName(
                 name,
                 member.role,
-                msgspec.structs.replace(member.invitation, used=True),
+                msgspec.structs.replace(invitation, used=True),
                 (issued,),
                 (*member.withdrawn, *member.certificates),
                 may=member.may,
@@ -220,12 +212,7 @@ class Authority:
         """Return a new certificate (PEM) for the holder of `current`, for the key in `request` (PKCS 10, PEM).
 
         The caller has made sure, by TLS, that the request comes from the holder of the key of `current`. That
-        certificate stays in force until it expires.
-
-        Args:
-            request: The request.
-            current: The certificate so far.
-            origin: Where the request came from, for the observer.
+        certificate stays in force until it expires. `origin` says where the request came from, for the observer.
 
         Raises:
             NotGrantedError: when `current` is not in force, or the request is in another name.
@@ -340,6 +327,25 @@ class Authority:
         except NotGrantedError as refusal:
             self.report(Refused(t=self.clock(), who=who, what=what, why=str(refusal), origin=origin))
             raise
+
+
+def _invited(members: Mapping[str, EnrolledName], known: str, name: str, now: float) -> tuple[EnrolledName, Invitation]:
+    """Return the entry and the invitation of the token with the digest `known`, if it can be redeemed for `name` now.
+
+    Raises `NotGrantedError`.
+    """
+    for member in members.values():
+        invitation = member.invitation
+        if invitation is None or invitation.digest != known:
+            continue
+        if invitation.used:
+            raise NotGrantedError("the token has been used already")
+        if now >= invitation.expires:
+            raise NotGrantedError("the token has expired")
+        if member.name != name:
+            raise NotGrantedError("the token is not for this name")
+        return member, invitation
+    raise NotGrantedError("the token is unknown here, or a newer one has replaced it")
 
 
 def default_folder() -> Path:

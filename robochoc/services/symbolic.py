@@ -70,10 +70,8 @@ def read(text: str, caps: Caps) -> Expression:
 
     Raises `SymbolicExpressionError`, which says what is wrong and where.
     """
-    if len(text) > caps.characters:
-        raise SymbolicExpressionError(
-            f"{len(text)} characters are too many: at most {caps.characters}", caps.characters
-        )
+    if (size := len(text)) > caps.characters:
+        raise SymbolicExpressionError(f"{size} characters are too many: at most {caps.characters}", caps.characters)
     opened: list[tuple[int, list[Expression]]] = []
     count = 0
     at = _after_space(text, 0)

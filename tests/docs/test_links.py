@@ -66,3 +66,9 @@ def test_the_rooms_of_the_page_stand_in_the_order_of_the_layers() -> None:
     assert {*rooms} == {*layers}
     beside = {room: number for number, layer in enumerate(contract["layers"]) for room in layer.split(" | ")}
     assert [beside[room] for room in rooms] == sorted(beside[room] for room in rooms)
+
+
+def test_the_readme_is_short_and_shows_where_to_read_on() -> None:
+    readme = ROOT / "README.md"
+    assert readme.stat().st_size <= 6_000
+    assert {f"docs/{place}/index.md" for place in ("tutorials", "guides")} <= {*links_of(readme)}

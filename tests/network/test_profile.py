@@ -189,7 +189,7 @@ def changed(**news: object) -> Profile:
     return msgspec.structs.replace(GOOD, **news)
 
 
-def test_a_silhouette_shows_what_was_told() -> None:
+def test_a_visible_robot_shows_what_is_in_the_profile() -> None:
     shape = visible_robot(GOOD, {"Y": ((0, 0),)})
     assert [(one.name, list(one.domain)) for one in shape.variables] == [("X", [1, 2, 3, 5]), ("Y", [0])]
     assert shape.interface == ("X", "Y")

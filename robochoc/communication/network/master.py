@@ -18,7 +18,7 @@ from typing import Self
 
 from robochoc.authority.admission import Admission
 from robochoc.authority.identity import Identity
-from robochoc.communication.control import Events, Failed, OfEpoch, Pause, Wave
+from robochoc.communication.control import Events, Failed, OfEpoch, Pause
 from robochoc.communication.master_loop import TICK_S, MasterLoop
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import (
@@ -282,9 +282,6 @@ class Master(MasterLoop):
     def _send_all(self, message: ToRobot) -> None:
         for name in self.members.listening:
             self._send(name, message)
-
-    def _send_wave(self, wave: Wave) -> None:
-        self._send_all(wave)
 
     def _read(self, sender: str, content: bytes) -> None:
         opened = self._connection.read(sender, content)

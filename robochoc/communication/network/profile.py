@@ -1,7 +1,7 @@
-"""What a robot tells the master of its file: who its neighbours are, and the variables that they see. Not more.
+"""A robot's profile, which the master gets instead of its file: its neighbours, and the variables that they see.
 
-The master makes silhouettes of profiles: robots without constraints and without what nobody sees. With them it works
-out what is common knowledge anyway: the priority order, the interfaces, the declared domains.
+From profiles the master makes robots as others see them, without constraints and without hidden variables. With them it
+works out what all robots know anyway: the priority order, the interfaces, the declared domains.
 """
 
 from __future__ import annotations

@@ -25,7 +25,6 @@ from robochoc.communication.control import (
     OpenQueues,
     Pause,
     Ready,
-    Wave,
     sealed,
 )
 from robochoc.communication.master_loop import MasterLoop
@@ -308,9 +307,6 @@ class ProcessesRun(Session, MasterLoop):
     def _send_all(self, order: FromParent) -> None:
         for robot in list(self._pool.robots.values()):
             self._send(robot, order)
-
-    def _send_wave(self, wave: Wave) -> None:
-        self._send_all(wave)
 
     def _send(self, robot: RobotLink, order: FromParent) -> None:
         try:
