@@ -125,9 +125,9 @@ def check_shown_variables(shown: Sequence[str], own: Collection[str]) -> None:
     for variable in shown:
         if variable not in own:
             hint = suggestion(variable, own, "own variables")
-            raise MistakeError(f"the child is to be told '{shortened(variable)}', which is not the robot's own", hint)
+            raise MistakeError(f"the child must know '{shortened(variable)}', which is not the robot's own", hint)
         if variable in seen:
-            raise MistakeError(f"the child is to be told '{shortened(variable)}' twice", "name it once")
+            raise MistakeError(f"the child's variables list '{shortened(variable)}' twice", "name it once")
         seen.add(variable)
 
 

@@ -100,7 +100,7 @@ def missing_shown_variables(members: TeamMembers) -> Iterator[Diagnostic]:
                 needed = members.needed(robot.name, child.name)
                 lacking = [name for name in needed if name not in child.variables]
                 if lacking:
-                    message = f"the child '{child.name}' must also be told {shortened(' '.join(lacking))}"
+                    message = f"the child '{child.name}' must also know {shortened(' '.join(lacking))}"
                     where = members.files[child.name].places.constraint(needed[lacking[0]])
                     hint = f'write variable="{shortened(" ".join([*child.variables, *lacking]))}", as {where} needs it'
                     yield members.files[robot.name].places.neighbour(child).mistake(message, hint)

@@ -65,6 +65,7 @@ def scene_of(
     *,
     flown_mission: Mission | None = None,
     why_not: str = "",
+    weighted: bool | None = None,
 ) -> Scene:
     """Return the scene of `outcome`. Without a flight, the drones are where they are to be in the end.
 
@@ -75,20 +76,21 @@ def scene_of(
         flown_mission: The mission that was flown, if it is not `mission` itself but the same in cells of another size.
             Distances are then not to scale, and the scene names none.
         why_not: Why nothing was flown, for the caption.
+        weighted: Whether robots differ in weight, if that is known.
     """
     flown_mission = flown_mission or mission
     drones = tuple(_drones(flown_mission))
-    title = f"{outcome.team}: {_headline(outcome, mission, drones)}"
+    title = f"{outcome.team}: {_headline(outcome, mission, drones, weighted=weighted)}"
     flight = _flight_facts(flown, why_not, is_to_scale=flown_mission is mission)
     playback = playback_of(flown_mission, flown) if flown else None
     return Scene(title, (*_facts(outcome, mission), *flight), drones, mission.axes, playback)
 
 
-def _headline(outcome: Outcome, mission: Mission, drones: Sequence[DrawnDrone]) -> str:
+def _headline(outcome: Outcome, mission: Mission, drones: Sequence[DrawnDrone], *, weighted: bool | None) -> str:
     """Return what happened, counted in robots; in drones where robots have several, or are not known."""
     robots = {drone.robot for drone in mission.drones if drone.robot}
     if len(robots) == len(drones):
-        return describe_outcome(outcome, len(robots))
+        return describe_outcome(outcome, len(robots), weighted=weighted)
     flying = sum(drone.place is not None for drone in drones)
     return describe_outcome(outcome, len(drones), flying=flying, noun="drone")
 
