@@ -286,7 +286,7 @@ def test_a_robot_of_a_name_that_is_there_already(run: NetworkRun) -> None:
     assert ending.why == "the master does not take RX2: a robot called RX2 is registered already"
     run.wait_for_refusal("RX2", "register", "a robot called RX2 is registered already")
     run.wait_for_progress()
-    assert run.master.members.robots["RX2"].gone is None, "the first one is there as before"
+    assert run.master.members.robots["RX2"].away_since is None, "the first one is there as before"
 
 
 def protocol_named(_name: str) -> type[Protocol]:

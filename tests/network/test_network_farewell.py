@@ -23,7 +23,7 @@ def test_robots_that_are_away_for_a_moment_hear_the_masters_farewell(tmp_path: P
         members = run.master.members.robots
         run.wait_until(lambda: len(members) == len(CHAIN.order) - 1, "robots do not register")
         relay.cut()
-        run.wait_until(lambda: all(member.gone for member in members.values()), "they do not go")
+        run.wait_until(lambda: all(member.away_since for member in members.values()), "they do not go")
         run.give_up()
         time.sleep(2 * SLICE_S)
         relay.mend()

@@ -68,7 +68,7 @@ def registered(team: Team) -> Members:
         members.register(robot.name, profile_of(robot), "incarnation").joined = True
     for name, variables in members.unseen().items():
         domains = {variable.name: variable.domain for variable in team[name].variables}
-        members.robots[name].also.update({one: ranges_of(domains[one]) for one in variables})
+        members.robots[name].shown_later.update({one: ranges_of(domains[one]) for one in variables})
     assert members.complete
     assert not members.unseen()
     return members

@@ -184,7 +184,7 @@ class InMemoryNetwork:
             case Joined(incarnation, card):
                 self.members.robots[name].join(incarnation, card)
             case DomainAnswer(variables):
-                self.members.robots[name].also.update(variables)
+                self.members.robots[name].shown_later.update(variables)
             case Objection() as objection:
                 self.objections.append(objection)
             case Failed() as failed:

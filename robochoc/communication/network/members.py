@@ -40,43 +40,51 @@ class RegistrationRefusedError(ValueError):
 
 @dataclass
 class Member:
-    """A registered robot in its `incarnation`; `gone` since when it is away (None: it is there).
+    """A registered robot.
 
-    `doubtful`: it was away since its last message, and may have been started again since. `also` are variables that it
-    has shown since, as it was `asked` for them.
+    Attributes:
+        profile: What it has declared of its file.
+        incarnation: The process of it that is registered.
+        shown_later: Variables that it has shown since, as it was asked for them.
+        card: Its key card of this run.
+        joined: It has confirmed the welcome.
+        away_since: Since when it is away, on the monotonic clock; None while it is there.
+        unconfirmed: It was away since its last message, and may have been started again since.
+        asked: Variables that it was asked for.
+        left: It has confirmed that the run is over.
     """
 
     profile: Profile
     incarnation: str
-    also: dict[str, Ranges] = field(default_factory=dict)
+    shown_later: dict[str, Ranges] = field(default_factory=dict)
     card: bytes = b""
     joined: bool = False
-    gone: float | None = None
-    doubtful: bool = False
+    away_since: float | None = None
+    unconfirmed: bool = False
     asked: set[str] = field(default_factory=set)
     left: bool = False
 
     @property
     def robot(self) -> Robot:
         """The robot as others see it."""
-        return visible_robot(self.profile, self.also)
+        return visible_robot(self.profile, self.shown_later)
 
     def join(self, incarnation: str, card: bytes) -> None:
         """Note that it has read the welcome. Messages of another incarnation change nothing."""
         if incarnation == self.incarnation:
-            self.card, self.joined, self.doubtful = card, True, False
+            self.card, self.joined, self.unconfirmed = card, True, False
 
     def note_presence(self, *, there: bool) -> None:
         """Note whether it is there, as far as the router knows."""
-        self.gone = None if there else self.gone or time.monotonic()
-        self.doubtful = self.doubtful or not there
+        self.away_since = None if there else self.away_since or time.monotonic()
+        self.unconfirmed = self.unconfirmed or not there
 
     def is_away(self, for_s: float) -> bool:
         """Return whether it has been away for longer than that.
 
         For a moment all are, behind a router that is opened anew.
         """
-        return self.gone is not None and time.monotonic() - self.gone > for_s
+        return self.away_since is not None and time.monotonic() - self.away_since > for_s
 
 
 class Members:
@@ -119,7 +127,7 @@ class Members:
         """
         known = self.robots.get(sender)
         if known and known.incarnation == incarnation:
-            known.gone, known.doubtful = None, False
+            known.away_since, known.unconfirmed = None, False
             return known
         if not admitted:
             raise RegistrationRefusedError(
@@ -137,7 +145,7 @@ class Members:
         known = self.robots.get(sender)
         if incarnation in self._over:
             return "it was away for too long; start it anew"
-        if known and (self.closed or not (known.doubtful or known.gone)):
+        if known and (self.closed or not (known.unconfirmed or known.away_since)):
             return f"a robot called {sender} is registered already"
         if self.closed:
             return "the team is complete without it"
@@ -163,7 +171,7 @@ class Members:
     def complete(self) -> bool:
         """Whether all are there now: as many as were asked for, and all that are named as neighbours."""
         enough = bool(self.robots) and (self.number is None or len(self.robots) >= self.number)
-        return enough and not self.awaited and all(m.joined and not m.doubtful for m in self.robots.values())
+        return enough and not self.awaited and all(m.joined and not m.unconfirmed for m in self.robots.values())
 
     def unseen(self) -> dict[str, tuple[str, ...]]:
         """Variables that neighbours' constraints look at, by those who have not shown them and may own them.
@@ -183,7 +191,7 @@ class Members:
         for name, variables in wanted.items():
             member_asked = self.robots.get(name)
             if member_asked:
-                known = {*member_asked.profile.variables, *member_asked.also, *member_asked.asked}
+                known = {*member_asked.profile.variables, *member_asked.shown_later, *member_asked.asked}
                 unseen[name] = tuple(variable for variable in variables if variable not in known)
         return {name: variables for name, variables in unseen.items() if variables}
 
@@ -199,11 +207,11 @@ class Members:
             return "it has shown variables that it was not asked for"
         shown = {variable: variables[variable] for variable in wanted if variable in variables}
         try:
-            visible_robot(member.profile, {**member.also, **shown})
+            visible_robot(member.profile, {**member.shown_later, **shown})
         except ProfileError as bad:
             return str(bad)
         member.asked.update(wanted)
-        member.also.update(shown)
+        member.shown_later.update(shown)
         return ""
 
     def strangers(self) -> Iterator[str]:
@@ -220,7 +228,7 @@ class Members:
         return {
             variable: name
             for name, member in self.robots.items()
-            for variable in (*member.profile.variables, *member.also)
+            for variable in (*member.profile.variables, *member.shown_later)
         }
 
     def remove(self, names: Collection[str]) -> None:
@@ -241,7 +249,9 @@ class Members:
         Their answer may have been lost; and of two incarnations only the one that is still there answers.
         """
         waiting = {
-            name: m.incarnation for name, m in self.robots.items() if m.gone is None and (m.doubtful or not m.joined)
+            name: m.incarnation
+            for name, m in self.robots.items()
+            if m.away_since is None and (m.unconfirmed or not m.joined)
         }
         return {} if self.closed else waiting
 
