@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 class CommonArguments(TypedDict):
     """The arguments that the sessions of all runtimes take."""
 
-    brief: RunParameters
+    parameters: RunParameters
     observer: Observer | None
     progress: Callable[[Progress], None] | None
 
@@ -59,7 +59,7 @@ class SessionRequest:
     @property
     def common(self) -> CommonArguments:
         """The arguments that the sessions of all runtimes take."""
-        return {"brief": self.parameters, "observer": self.observer, "progress": self.progress}
+        return {"parameters": self.parameters, "observer": self.observer, "progress": self.progress}
 
 
 OpenSession = Callable[[SessionRequest], Session]

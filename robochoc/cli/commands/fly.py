@@ -21,7 +21,7 @@ from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.reports.failures import INVALID, LOST, Failure, invalid_input_fails
 
 if TYPE_CHECKING:
-    from robochoc.flight.flight import FlightLog
+    from robochoc.flight.log import FlightLog
     from robochoc.flight.mission import Mission
 
 

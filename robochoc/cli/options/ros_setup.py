@@ -13,8 +13,8 @@ from robochoc.cli.options.ros import CONDITIONS, FLIGHT, FRAME, IN_FRAME, NOT_PU
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure
 
 if TYPE_CHECKING:
-    from robochoc.flight.flight import FlightConditions
     from robochoc.flight.mission import Drone, Mission
+    from robochoc.flight.quadrotor.conditions import FlightConditions
     from robochoc.model.problem import Assignment, Robot, Team
     from robochoc.ros.closed_loop import ClosedLoop, Feedback
     from robochoc.ros.simulated_feedback import FlightSettings
